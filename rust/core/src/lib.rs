@@ -1,0 +1,41 @@
+//! Intuitive physics of human bodies (Tripathi et al., *3D Human Pose Estimation via Intuitive Physics*, CVPR 2023), in
+//! the paper's order: a body mesh over a ground, its parts closed and filled, its surface sampled, its centre of mass,
+//! pressure and base of support, and the losses made of them. Every formula is written once, for any [`number::Real`].
+
+/// What can be wrong with a call, and with one body of a batch.
+pub mod error;
+/// The numbers that rooms compute with: f32, f64, dual numbers.
+pub mod number;
+
+/// The ground plane: signed height h(u), projection g(u).
+pub mod ground;
+/// The checked topology: the only way in for vertices and faces.
+pub mod mesh;
+/// Close: interfaces between parts get shared virtual vertices and caps.
+pub mod closing;
+/// Fill: signed tetrahedra of each closed part; exact mass properties.
+pub mod volume;
+/// Triangle point picking, W and Wᵀ, and the passes over the points.
+pub mod sampling;
+/// The centre of mass in all its formulations.
+pub mod mass;
+/// Height to pressure to centre of pressure.
+pub mod pressure;
+/// Contact set, hull, signed margin; the linear programme.
+pub mod support;
+/// Stability, ground, balance.
+pub mod losses;
+
+/// Everything about a body's surface that is computed once.
+pub mod template;
+/// One closed body over its ground, in local coordinates.
+pub mod scene;
+/// What a differentiable room offers, and the list of all.
+pub mod quantity;
+/// Many bodies over threads.
+pub mod batch;
+
+pub use batch::Batch;
+pub use error::{Error, Result};
+pub use ground::Ground;
+pub use template::Template;

@@ -1,0 +1,87 @@
+//! 2^x and tanh from additions and multiplications alone: the same bits on every machine, and loops over them vectorise.
+
+use super::Real;
+
+/// What the curves need to know of a floating-point format.
+pub(super) trait Format: Real {
+    /// 1.5 · 2^(mantissa bits): adding and subtracting it rounds to the nearest integer.
+    const ROUNDER: f64;
+    /// Exponents of the smallest and largest power of two that are kept.
+    const EXPONENTS: (f64, f64);
+    /// Degree of the polynomial for 2^f − 1 on |f| ≤ 1/2 whose remainder is below the format's rounding.
+    const DEGREE: usize;
+    /// 2^k of an integral k within `EXPONENTS`.
+    fn power_of_two(k: Self) -> Self;
+}
+
+/// ln(2)^k / k!, k = 1, 2, …: Taylor's coefficients of 2^x − 1.
+const POWERS: [f64; 13] = {
+    let mut table = [0.0; 13];
+    let mut term = 1.0;
+    let mut k = 0;
+    while k < 13 {
+        term *= std::f64::consts::LN_2 / (k + 1) as f64;
+        table[k] = term;
+        k += 1;
+    }
+    table
+};
+
+/// Splits x = k + f with k integral and |f| ≤ 1/2, and returns (2^k, 2^f − 1).
+#[inline(always)]
+fn split<T: Format>(x: T) -> (T, T) {
+    let x = x.at_least(T::of(T::EXPONENTS.0)).at_most(T::of(T::EXPONENTS.1));
+    let k = (x + T::of(T::ROUNDER)) - T::of(T::ROUNDER);
+    let f = x - k;
+    let mut series = T::of(POWERS[T::DEGREE - 1]);
+    for power in (0..T::DEGREE - 1).rev() {
+        series = series * f + T::of(POWERS[power]);
+    }
+    (T::power_of_two(k), series * f)
+}
+
+#[inline(always)]
+pub(super) fn exp2<T: Format>(x: T) -> T {
+    let (power, fraction) = split(x);
+    power + power * fraction
+}
+
+/// tanh x = −m / (2 + m) with m = e^(−2|x|) − 1, which keeps its relative accuracy down to x = 0.
+#[inline(always)]
+pub(super) fn tanh<T: Format>(x: T) -> T {
+    let (power, fraction) = split(x.abs() * T::of(-2.0 * std::f64::consts::LOG2_E));
+    let m = power * fraction + (power - T::of(1.0));
+    let t = -m / (T::of(2.0) + m);
+    x.if_negative(-t, t)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::number::Real;
+
+    #[test]
+    fn exp2_is_within_two_ulp_of_the_platform() {
+        for i in -4000..4000 {
+            let x = i as f64 * 0.0371;
+            assert!((x.exp2() / f64::exp2(x) - 1.0).abs() < 5e-16, "{x}");
+            let x = x as f32;
+            let want = f64::exp2(x as f64);
+            assert!((Real::exp2(x) as f64 / want - 1.0).abs() < 2.5e-7 || x.abs() > 125.0, "{x}");
+        }
+        assert!(Real::exp2(-1e30_f32) > 0.0 && Real::exp2(1e30_f64).is_finite());
+    }
+
+    #[test]
+    fn tanh_keeps_its_relative_accuracy_near_zero() {
+        for i in 1..2000 {
+            let x = 1.0123_f64.powi(i - 1900);
+            assert!((Real::tanh(x) / f64::tanh(x) - 1.0).abs() < 1e-15, "{x}");
+            assert_eq!(Real::tanh(-x), -Real::tanh(x));
+            let narrow = x as f32;
+            if narrow > 1e-30 {
+                assert!((Real::tanh(narrow) as f64 / f64::tanh(narrow as f64) - 1.0).abs() < 4e-7, "{x}");
+            }
+        }
+        assert_eq!(Real::tanh(0.0_f64), 0.0);
+    }
+}

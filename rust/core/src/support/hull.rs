@@ -1,0 +1,84 @@
+//! Convex hull in the plane: Andrew's monotone chain with exact orientation tests, so that duplicates, collinear and
+//! nearly collinear points need no tolerance.
+
+use robust::{Coord, orient2d};
+
+/// Indices of the hull's corners, counter-clockwise from the lowest x; no corner is repeated or lies on an edge.
+/// One distinct point gives one corner, collinear points give their two ends.
+pub fn convex_hull(points: &[[f64; 2]]) -> Vec<usize> {
+    let mut order = candidates(points);
+    order.sort_unstable_by(|&i, &j| points[i][0].total_cmp(&points[j][0]).then(points[i][1].total_cmp(&points[j][1])));
+    order.dedup_by_key(|i| points[*i]);
+    if order.len() < 3 {
+        return order;
+    }
+    let mut lower = chain(points, order.iter().copied());
+    let mut upper = chain(points, order.iter().rev().copied());
+    lower.pop();
+    upper.pop();
+    lower.extend(upper);
+    lower
+}
+
+/// One side of the hull: every turn is strictly to the left.
+fn chain(points: &[[f64; 2]], order: impl Iterator<Item = usize>) -> Vec<usize> {
+    let coord = |i: usize| Coord { x: points[i][0], y: points[i][1] };
+    let mut chain: Vec<usize> = Vec::new();
+    for next in order {
+        while let [.., a, b] = chain[..] {
+            if orient2d(coord(a), coord(b), coord(next)) > 0.0 {
+                break;
+            }
+            chain.pop();
+        }
+        chain.push(next);
+    }
+    chain
+}
+
+/// The points outside the quadrilateral of the four extremes (Akl and Toussaint): the rest cannot be corners.
+fn candidates(points: &[[f64; 2]]) -> Vec<usize> {
+    let extreme = |key: fn(&[f64; 2]) -> f64| {
+        (0..points.len()).max_by(|&i, &j| key(&points[i]).total_cmp(&key(&points[j])))
+    };
+    let keys: [fn(&[f64; 2]) -> f64; 4] = [|p| -p[0] - p[1], |p| p[0] - p[1], |p| p[0] + p[1], |p| p[1] - p[0]];
+    let Some(corners) = keys.into_iter().map(extreme).collect::<Option<Vec<_>>>() else { return Vec::new() };
+    let coord = |i: usize| Coord { x: points[i][0], y: points[i][1] };
+    let inside = |&i: &usize| {
+        (0..4).all(|k| orient2d(coord(corners[k]), coord(corners[(k + 1) % 4]), coord(i)) > 0.0)
+    };
+    (0..points.len()).filter(|i| !inside(i)).collect()
+}
+
+/// Area of a counter-clockwise polygon.
+pub fn area(corners: &[[f64; 2]]) -> f64 {
+    let Some(&[x0, y0]) = corners.first() else { return 0.0 };
+    let doubled: f64 = corners
+        .windows(2)
+        .map(|pair| (pair[0][0] - x0) * (pair[1][1] - y0) - (pair[1][0] - x0) * (pair[0][1] - y0))
+        .sum();
+    doubled / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn degenerate_sets_have_degenerate_hulls() {
+        assert!(convex_hull(&[]).is_empty());
+        assert_eq!(convex_hull(&[[1.0, 2.0]; 5]).len(), 1);
+        let line: Vec<_> = (0..9).map(|i| [i as f64 * 0.1, i as f64 * 0.2]).collect();
+        let ends = convex_hull(&line);
+        assert_eq!(ends.len(), 2);
+        assert_eq!(area(&[line[ends[0]], line[ends[1]]]), 0.0);
+    }
+
+    #[test]
+    fn a_filled_square_has_four_corners() {
+        let grid: Vec<_> = (0..121).map(|i| [(i / 11) as f64, (i % 11) as f64]).collect();
+        let corners: Vec<_> = convex_hull(&grid).into_iter().map(|i| grid[i]).collect();
+        assert_eq!(corners, [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]);
+        assert_eq!(area(&corners), 100.0);
+    }
+}

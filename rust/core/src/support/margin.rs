@@ -1,0 +1,137 @@
+//! The signed margin: metres from a point to the boundary of a convex polygon, positive inside.
+
+use crate::number::Scalar;
+
+/// Where on the boundary the nearest point lies: within an edge that runs counter-clockwise, or at a corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Nearest<P> {
+    Edge(P, P),
+    Corner(P),
+}
+
+impl<P: Copy> Nearest<P> {
+    pub fn map<Q>(self, f: impl Fn(P) -> Q) -> Nearest<Q> {
+        match self {
+            Nearest::Edge(a, b) => Nearest::Edge(f(a), f(b)),
+            Nearest::Corner(a) => Nearest::Corner(f(a)),
+        }
+    }
+
+    /// The edge's ends; a corner counts for both.
+    pub fn ends(self) -> [P; 2] {
+        match self {
+            Nearest::Edge(a, b) => [a, b],
+            Nearest::Corner(a) => [a, a],
+        }
+    }
+}
+
+impl Nearest<usize> {
+    /// For a counter-clockwise polygon of any number of corners; None without corners. Two corners are an edge that is
+    /// walked both ways, which puts every point outside it or on it.
+    pub fn find(corners: &[[f64; 2]], point: [f64; 2]) -> Option<Self> {
+        let mut best: Option<(f64, Self)> = match corners.len() {
+            0 => return None,
+            1 => return Some(Nearest::Corner(0)),
+            _ => None,
+        };
+        for a in 0..corners.len() {
+            let b = (a + 1) % corners.len();
+            let (foot, distance, left) = to_segment(corners[a], corners[b], point);
+            // Among equals an edge that sees the point on its right decides the sign.
+            let rank = if left < 0.0 { distance * (1.0 - 1e-15) } else { distance };
+            if best.is_none_or(|(least, _)| rank < least) {
+                best = Some((rank, match foot {
+                    t if t <= 0.0 => Nearest::Corner(a),
+                    t if t >= 1.0 => Nearest::Corner(b),
+                    _ => Nearest::Edge(a, b),
+                }));
+            }
+        }
+        Some(best?.1)
+    }
+}
+
+/// The foot's position along the segment, unclamped; the distance to the segment; and the side (> 0: left).
+fn to_segment(a: [f64; 2], b: [f64; 2], point: [f64; 2]) -> (f64, f64, f64) {
+    let edge = [b[0] - a[0], b[1] - a[1]];
+    let arm = [point[0] - a[0], point[1] - a[1]];
+    let foot = (arm[0] * edge[0] + arm[1] * edge[1]) / (edge[0] * edge[0] + edge[1] * edge[1]);
+    let t = foot.clamp(0.0, 1.0);
+    let distance = f64::hypot(arm[0] - t * edge[0], arm[1] - t * edge[1]);
+    (foot, distance, edge[0] * arm[1] - edge[1] * arm[0])
+}
+
+/// A margin and its derivatives: `direction` by the point, −share · `direction` by each end of the nearest edge.
+pub struct Margin<S> {
+    pub value: S,
+    pub direction: [S; 2],
+    pub shares: [S; 2],
+}
+
+impl<S: Scalar> Margin<S> {
+    pub fn new(nearest: Nearest<[S; 2]>, point: [S; 2]) -> Self {
+        match nearest {
+            Nearest::Edge(a, b) => Self::to_edge(a, b, point),
+            Nearest::Corner(a) => Self::to_corner(a, point),
+        }
+    }
+
+    /// Distance to the edge's line along its inward normal.
+    fn to_edge(a: [S; 2], b: [S; 2], point: [S; 2]) -> Self {
+        let edge = [b[0] - a[0], b[1] - a[1]];
+        let arm = [point[0] - a[0], point[1] - a[1]];
+        let squared = edge[0] * edge[0] + edge[1] * edge[1];
+        let length = squared.sqrt();
+        let normal = [-edge[1] / length, edge[0] / length];
+        let share = (arm[0] * edge[0] + arm[1] * edge[1]) / squared;
+        Margin {
+            value: normal[0] * arm[0] + normal[1] * arm[1],
+            direction: normal,
+            shares: [S::of(1.0) - share, share],
+        }
+    }
+
+    /// A corner is nearest only from outside.
+    fn to_corner(a: [S; 2], point: [S; 2]) -> Self {
+        let arm = [point[0] - a[0], point[1] - a[1]];
+        let distance = (arm[0] * arm[0] + arm[1] * arm[1]).sqrt();
+        let inverse = S::of(-1.0) / distance.at_least(S::of(1e-300));
+        Margin {
+            value: -distance,
+            direction: arm.map(|x| x * inverse),
+            shares: [S::of(1.0), S::zero()],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn margin(corners: &[[f64; 2]], point: [f64; 2]) -> f64 {
+        Margin::new(Nearest::find(corners, point).unwrap().map(|i| corners[i]), point).value
+    }
+
+    #[test]
+    fn a_rectangle_has_the_margins_that_a_ruler_gives() {
+        let corners = [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0]];
+        assert_eq!(margin(&corners, [2.0, 0.5]), 0.5);
+        assert_eq!(margin(&corners, [3.75, 1.0]), 0.25);
+        assert_eq!(margin(&corners, [2.0, -1.0]), -1.0);
+        assert_eq!(margin(&corners, [7.0, 6.0]), -5.0);
+        assert_eq!(margin(&corners, [0.0, 1.0]), 0.0);
+        assert_eq!(margin(&corners, [0.0, 0.0]), 0.0);
+    }
+
+    #[test]
+    fn a_segment_and_a_point_have_no_inside() {
+        let segment = [[0.0, 0.0], [2.0, 0.0]];
+        assert_eq!(margin(&segment, [1.0, 0.3]), -0.3);
+        assert_eq!(margin(&segment, [1.0, -0.3]), -0.3);
+        assert_eq!(margin(&segment, [1.0, 0.0]), 0.0);
+        assert_eq!(margin(&segment, [5.0, 4.0]), -5.0);
+        assert_eq!(margin(&[[1.0, 1.0]], [1.0, 3.0]), -2.0);
+        assert_eq!(Nearest::find(&[], [0.0, 0.0]), None);
+    }
+}

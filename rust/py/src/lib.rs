@@ -1,0 +1,45 @@
+//! `ipman_rs._core`: the crate `ipman` for Python. It translates arrays and errors and knows no formula.
+
+mod array;
+mod error;
+mod evaluate;
+mod support;
+mod template;
+
+use pyo3::prelude::*;
+
+/// The Rust engine behind ipman_rs.
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use crate::evaluate::{jvp, output_size, value, value_and_vjp, vjp, vjp_jvp};
+    #[pymodule_export]
+    use crate::support::{base_of_support, bose_lp, status};
+    #[pymodule_export]
+    use crate::template::Template;
+    #[pymodule_export]
+    use crate::threads::{get_num_threads, set_num_threads};
+
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}
+
+mod threads {
+    use pyo3::prelude::*;
+
+    /// The number of threads that batches use.
+    #[pyfunction]
+    pub fn get_num_threads() -> usize {
+        ipman::batch::num_threads()
+    }
+
+    /// Sets the number of threads that batches use, at least 1.
+    #[pyfunction]
+    pub fn set_num_threads(threads: usize) {
+        ipman::batch::set_num_threads(threads);
+    }
+}

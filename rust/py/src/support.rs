@@ -1,0 +1,130 @@
+//! What is known of a body's base of support and its state: results without a gradient.
+
+use crate::array::Vertices;
+use crate::error::detached;
+use crate::evaluate::{Grounds, check_vertices};
+use crate::template::Template;
+use ipman::Batch;
+use ipman::mass::Method;
+use ipman::number::Scalar;
+use ipman::support::{Contact, ContactRule};
+use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+/// The bodies and the rule of contact, in the words of Python.
+struct Question<'a, 'py> {
+    py: Python<'py>,
+    template: &'a Template,
+    grounds: Grounds<'py>,
+}
+
+impl Question<'_, '_> {
+    fn ask<O: Send>(
+        &self,
+        vertices: Vertices<'_>,
+        single: impl FnOnce(&Batch<'_, f32>) -> ipman::Result<O> + Send,
+        double: impl FnOnce(&Batch<'_, f64>) -> ipman::Result<O> + Send,
+    ) -> PyResult<O> {
+        match vertices {
+            Vertices::Single(vertices) => self.run(&vertices, single),
+            Vertices::Double(vertices) => self.run(&vertices, double),
+        }
+    }
+
+    fn run<T: Scalar + Element, O: Send>(
+        &self,
+        vertices: &PyReadonlyArray3<'_, T>,
+        f: impl FnOnce(&Batch<'_, T>) -> ipman::Result<O> + Send,
+    ) -> PyResult<O> {
+        let (normals, heights) = self.grounds.slices()?;
+        check_vertices(vertices.shape(), self.template, heights.len())?;
+        let (vertices, template) = (vertices.as_slice()?, &self.template.inner);
+        detached(self.py, |interrupted| f(&Batch::new(template, vertices, normals, heights, interrupted)?))
+    }
+}
+
+fn contact(rule: &str, threshold: f64) -> PyResult<Contact> {
+    let rule = ContactRule::named(rule).map_err(|error| pyo3::exceptions::PyValueError::new_err(error.to_string()))?;
+    Ok(Contact { rule, threshold })
+}
+
+fn method(name: &str) -> PyResult<Method> {
+    Method::named(name).map_err(|error| pyo3::exceptions::PyValueError::new_err(error.to_string()))
+}
+
+type Supports<'py> = (
+    Vec<Bound<'py, PyArray2<f64>>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<i64>>,
+);
+
+/// Polygons (K, 3), areas (B,), margins (B,) and numbers of contacts (B,).
+#[pyfunction]
+pub fn base_of_support<'py>(
+    py: Python<'py>,
+    template: &Template,
+    contact_rule: &str,
+    method_name: &str,
+    threshold: f64,
+    vertices: Vertices<'py>,
+    normal: PyReadonlyArray2<'py, f64>,
+    height: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Supports<'py>> {
+    let (contact, method) = (contact(contact_rule, threshold)?, method(method_name)?);
+    let question = Question { py, template, grounds: Grounds::new(normal, height) };
+    let supports = question.ask(
+        vertices,
+        |batch| batch.base_of_support(&contact, method),
+        |batch| batch.base_of_support(&contact, method),
+    )?;
+    let polygon = |corners: &Vec<[f64; 3]>| {
+        corners.as_flattened().to_vec().into_pyarray(py).reshape([corners.len(), 3])
+    };
+    Ok((
+        supports.iter().map(|support| polygon(&support.polygon)).collect::<PyResult<_>>()?,
+        supports.iter().map(|support| support.area).collect::<Vec<_>>().into_pyarray(py),
+        supports.iter().map(|support| support.margin).collect::<Vec<_>>().into_pyarray(py),
+        supports.iter().map(|support| support.num_contacts as i64).collect::<Vec<_>>().into_pyarray(py),
+    ))
+}
+
+/// BoSE by the paper's linear programme, (B,).
+#[pyfunction]
+pub fn bose_lp<'py>(
+    py: Python<'py>,
+    template: &Template,
+    contact_rule: &str,
+    method_name: &str,
+    threshold: f64,
+    vertices: Vertices<'py>,
+    normal: PyReadonlyArray2<'py, f64>,
+    height: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    let (contact, method) = (contact(contact_rule, threshold)?, method(method_name)?);
+    let question = Question { py, template, grounds: Grounds::new(normal, height) };
+    let inside = question.ask(
+        vertices,
+        |batch| batch.is_supported_lp(&contact, method),
+        |batch| batch.is_supported_lp(&contact, method),
+    )?;
+    Ok(inside.into_pyarray(py))
+}
+
+/// The bits of ipman_rs.Status for each body, (B,).
+#[pyfunction]
+pub fn status<'py>(
+    py: Python<'py>,
+    template: &Template,
+    contact_rule: &str,
+    threshold: f64,
+    vertices: Vertices<'py>,
+    normal: PyReadonlyArray2<'py, f64>,
+    height: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    let contact = contact(contact_rule, threshold)?;
+    let question = Question { py, template, grounds: Grounds::new(normal, height) };
+    let bits = question.ask(vertices, |batch| batch.status(&contact), |batch| batch.status(&contact))?;
+    Ok(bits.into_iter().map(i64::from).collect::<Vec<_>>().into_pyarray(py))
+}
