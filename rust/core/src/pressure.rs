@@ -134,14 +134,14 @@ impl<R: Real> Pass<R> for CopPass<R> {
     fn read(&mut self, chunk: &Chunk<R>) {
         self.lower_shift(chunk);
         let mut density = [R::zero(); CHUNK];
-        for i in 0..chunk.len {
-            density[i] = self.of.curve.density(chunk.height[i], self.shift);
+        for (density, &height) in density.iter_mut().zip(&chunk.height) {
+            *density = self.of.curve.density(height, self.shift);
         }
         let mut sums = [R::zero(); 4];
-        for i in 0..chunk.len {
-            sums[0] = sums[0] + density[i];
+        for (i, &density) in density[..chunk.len].iter().enumerate() {
+            sums[0] = sums[0] + density;
             for k in 0..3 {
-                sums[1 + k] = sums[1 + k] + density[i] * chunk.position[k][i];
+                sums[1 + k] = sums[1 + k] + density * chunk.position[k][i];
             }
         }
         sums[0].add_to(&mut self.total);
@@ -155,7 +155,7 @@ impl<R: Real> Pass<R> for CopPass<R> {
         let d_wide = self.d_point.map(|d| d / self.total);
         let lever = R::narrow(dot(d_wide, self.point));
         let d = narrow::<R>(d_wide);
-        for i in 0..chunk.len {
+        for i in 0..CHUNK {
             let height = chunk.height[i];
             let density = self.of.curve.density(height, self.shift);
             let arm = dot(d, chunk.position.map(|axis| axis[i])) - lever;

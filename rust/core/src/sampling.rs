@@ -142,7 +142,8 @@ pub enum Points {
     Vertices,
 }
 
-/// Up to [`CHUNK`] consecutive points with their heights above the ground, or their gradients.
+/// Up to [`CHUNK`] consecutive points with their heights above the ground, or their gradients. Rooms may compute on the
+/// places from `len` on (they hold old points), so that their loops have a fixed length, but must not sum over them.
 pub struct Chunk<R> {
     /// The first point's index.
     pub start: usize,
@@ -237,7 +238,7 @@ impl<R: Real> Chunk<R> {
     }
 
     fn clear(&mut self) {
-        *self = Chunk::empty();
+        self.position.iter_mut().chain([&mut self.height]).for_each(|axis| axis.fill(R::zero()));
     }
 }
 

@@ -96,13 +96,13 @@ impl<R: Real> GroundPass<'_, R> {
 impl<R: Real> Pass<R> for GroundPass<'_, R> {
     fn read(&mut self, chunk: &Chunk<R>) {
         let mut curve = [R::zero(); CHUNK];
-        for i in 0..chunk.len {
-            curve[i] = self.of.tanh.value_and_slope(self.of.scaled(chunk.height[i]).0).0;
+        for (curve, &height) in curve.iter_mut().zip(&chunk.height) {
+            *curve = self.of.tanh.value_and_slope(self.of.scaled(height).0).0;
         }
         let (mut pull, mut push) = (R::zero(), R::zero());
-        for i in 0..chunk.len {
-            pull = pull + chunk.height[i].if_negative(R::zero(), curve[i]);
-            push = push + chunk.height[i].if_negative(curve[i], R::zero());
+        for (&height, &curve) in chunk.height.iter().zip(&curve).take(chunk.len) {
+            pull = pull + height.if_negative(R::zero(), curve);
+            push = push + height.if_negative(curve, R::zero());
         }
         pull.add_to(&mut self.pull);
         push.add_to(&mut self.push);
@@ -110,7 +110,7 @@ impl<R: Real> Pass<R> for GroundPass<'_, R> {
 
     fn hand_back(&self, chunk: &Chunk<R>, d_chunk: &mut Chunk<R>) {
         let [d_pull, d_push] = self.d_sums;
-        for i in 0..chunk.len {
+        for i in 0..CHUNK {
             let height = chunk.height[i];
             let (x, width) = self.of.scaled(height);
             let slope = self.of.tanh.value_and_slope(x).1 * width;

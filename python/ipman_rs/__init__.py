@@ -1,0 +1,49 @@
+"""Intuitive physics of 3D human bodies: volume, centre of mass, pressure, support and balance, with exact gradients.
+
+The functions here take numpy arrays; `ipman_rs.torch` has the same names on tensors, with autograd.
+Importing this package needs numpy alone.
+"""
+
+from ipman_rs import body, presets
+from ipman_rs._core import __version__, get_num_threads, set_num_threads
+from ipman_rs.analysis import Analysis, analyze
+from ipman_rs.body import load_body
+from ipman_rs.ground import Ground
+from ipman_rs.losses import balance_cost, ground_loss, stability_loss
+from ipman_rs.mass import center_of_mass
+from ipman_rs.pressure import center_of_pressure, pressure
+from ipman_rs.sampling import sample_surface
+from ipman_rs.status import Status, UnitsWarning, body_status
+from ipman_rs.support import BaseOfSupport, base_of_support, bose, support_margin
+from ipman_rs.template import BodyTemplate
+from ipman_rs.volume import MassProperties, mass_properties, part_volumes
+
+__all__ = [
+    "Analysis",
+    "BaseOfSupport",
+    "BodyTemplate",
+    "Ground",
+    "MassProperties",
+    "Status",
+    "UnitsWarning",
+    "__version__",
+    "analyze",
+    "balance_cost",
+    "base_of_support",
+    "body",
+    "body_status",
+    "bose",
+    "center_of_mass",
+    "center_of_pressure",
+    "get_num_threads",
+    "ground_loss",
+    "load_body",
+    "mass_properties",
+    "part_volumes",
+    "presets",
+    "pressure",
+    "sample_surface",
+    "set_num_threads",
+    "stability_loss",
+    "support_margin",
+]

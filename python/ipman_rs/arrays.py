@@ -1,0 +1,67 @@
+"""What numpy users pass, turned into what the core takes: bodies (B, V, 3) and their grounds."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from ipman_rs.ground import Ground
+    from ipman_rs.template import BodyTemplate
+
+
+def plain(name: str, value: ArrayLike) -> NDArray[Any]:
+    """An ordinary array of real numbers; masked arrays are refused, for their mask would be lost."""
+    masked = sys.modules.get("numpy.ma")  # not imported here: that would cost every user 30 ms
+    if masked is not None and isinstance(value, masked.MaskedArray):
+        raise TypeError(f"{name}: masked arrays are not supported, for the mask would be ignored; fill or drop first")
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name}: expected a regular array of numbers ({error})") from None
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name}: expected real numbers, got dtype {array.dtype}")
+    return array
+
+
+def single_or_double(array: NDArray[Any]) -> NDArray[Any]:
+    """float32 and half stay or become native float32; everything else becomes native float64."""
+    dtype = np.float32 if array.dtype.kind == "f" and array.dtype.itemsize <= 4 else np.float64
+    return np.ascontiguousarray(array, dtype=dtype)
+
+
+class Bodies:
+    """A batch of posed bodies of one template: `vertices` (B, V, 3) and the free batch `shape` that B stands for."""
+
+    def __init__(self, vertices: ArrayLike, template: BodyTemplate) -> None:
+        array = plain("vertices", vertices)
+        expected = (template.num_vertices, 3)
+        if array.ndim < 2 or array.shape[-2:] != expected:
+            hint = "; the last two axes look swapped" if array.shape[-2:] == expected[::-1] else ""
+            raise ValueError(f"vertices: expected (..., {expected[0]}, 3) for this template, got {array.shape}{hint}")
+        self.template = template
+        self.shape = array.shape[:-2]
+        self.vertices = single_or_double(array.reshape((-1, *expected) if array.size else (0, *expected)))
+
+    def over(self, ground: Ground) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]:
+        """The arguments that every entry of the core takes: vertices, normals (B, 3) and heights (B,)."""
+        try:
+            normal = np.broadcast_to(ground.normal, (*self.shape, 3))
+            height = np.broadcast_to(ground.height, self.shape)
+        except ValueError:
+            raise ValueError(
+                f"ground: normal {ground.normal.shape} and height {ground.height.shape} do not fit "
+                f"a batch of shape {self.shape}; pass one ground, or one for each body"
+            ) from None
+        batch = len(self.vertices)
+        return self.vertices, normal.reshape(batch, 3).copy(), height.reshape(batch).copy()
+
+    def evaluate(self, quantity: str, options: list[float], ground: Ground, *shape: int) -> NDArray[Any]:
+        """The quantity of each body, (..., *shape)."""
+        from ipman_rs import _core
+
+        rows = _core.value(self.template._core, quantity, options, *self.over(ground))
+        return rows.reshape((*self.shape, *shape))[()]

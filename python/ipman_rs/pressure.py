@@ -1,0 +1,33 @@
+"""Pressure and the centre of pressure, from the samples' heights."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import ArrayLike, NDArray
+
+from ipman_rs.arrays import Bodies
+from ipman_rs.ground import Ground
+from ipman_rs.template import BodyTemplate
+
+
+def pressure(
+    vertices: ArrayLike, template: BodyTemplate, ground: Ground, alpha: float = 100.0, gamma: float = 10.0
+) -> NDArray[Any]:
+    """ρ = 1 − αh below the ground, e^(−γh) from the ground up, of each sample: (..., S), no unit.
+
+    vertices (..., V, 3) m; alpha, gamma in 1/m.
+    """
+    return Bodies(vertices, template).evaluate("pressure", [alpha, gamma], ground, template.num_samples)
+
+
+def center_of_pressure(
+    vertices: ArrayLike,
+    template: BodyTemplate,
+    ground: Ground,
+    alpha: float = 100.0,
+    gamma: float = 10.0,
+    epsilon: float = 0.0,
+) -> NDArray[Any]:
+    """s̄ = Σ ρ v / (Σ ρ + epsilon), (..., 3) m; finite for hovering bodies. epsilon is 1e-6 in the released code."""
+    return Bodies(vertices, template).evaluate("center_of_pressure", [alpha, gamma, epsilon], ground, 3)

@@ -1,0 +1,118 @@
+"""The base of support: where the body stands, and whether its centre of mass lies over it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ipman_rs import _core
+from ipman_rs.arrays import Bodies
+from ipman_rs.ground import Ground
+from ipman_rs.mass import Method
+from ipman_rs.template import BodyTemplate
+
+Contact = Literal["paper", "released"]
+
+
+@dataclass(frozen=True, eq=False)
+class BaseOfSupport:
+    """The hull of the contact samples on the ground.
+
+    polygon: corners (K, 3) m on the ground, counter-clockwise seen from above, empty without contact; nested lists in the
+        batch's shape for a batch. area: (...,) m². margin: (...,) m from the centre of mass on the ground to the polygon's
+        boundary, positive inside, −inf without contact. inside: (...,) BoSE. has_contact, num_contacts: (...,).
+    """
+
+    polygon: Any
+    area: NDArray[Any]
+    margin: NDArray[Any]
+    inside: NDArray[np.bool_]
+    has_contact: NDArray[np.bool_]
+    num_contacts: NDArray[np.int64]
+
+
+def base_of_support(
+    vertices: ArrayLike,
+    template: BodyTemplate,
+    ground: Ground,
+    threshold: float = 0.1,
+    method: Method = "pcom",
+    contact: Contact = "paper",
+) -> BaseOfSupport:
+    """The base of support of each body. vertices (..., V, 3) m.
+
+    Args:
+        threshold: τ, m. A sample touches the ground when |h| < τ (`contact="paper"`); with `contact="released"`, as the
+            authors' code has it, when h < τ, and ten contacts or fewer count as none.
+        method: the centre of mass whose margin is taken.
+    """
+    bodies = Bodies(vertices, template)
+    found = _core.base_of_support(template._core, contact, method, _positive(threshold), *bodies.over(ground))
+    polygons, area, margin, num_contacts = found
+    margin = margin.reshape(bodies.shape)
+    num_contacts = num_contacts.reshape(bodies.shape)
+    dtype = bodies.vertices.dtype
+    return BaseOfSupport(
+        polygon=_nest([polygon.astype(dtype, copy=False) for polygon in polygons], bodies.shape),
+        area=area.reshape(bodies.shape).astype(dtype, copy=False),
+        margin=margin.astype(dtype, copy=False),
+        inside=margin >= 0.0,
+        has_contact=num_contacts > 0,
+        num_contacts=num_contacts,
+    )
+
+
+def support_margin(
+    vertices: ArrayLike,
+    template: BodyTemplate,
+    ground: Ground,
+    threshold: float = 0.1,
+    method: Method = "pcom",
+    contact: Contact = "paper",
+) -> NDArray[Any]:
+    """Metres from the centre of mass to the boundary of the base of support, (...,): positive inside, −inf without
+    contact. A hull of zero area (one or two points, a line) has no inside: minus the distance to it."""
+    return Bodies(vertices, template).evaluate(
+        f"support_margin.{contact}.{method}", [_positive(threshold)], ground
+    )
+
+
+def bose(
+    vertices: ArrayLike,
+    template: BodyTemplate,
+    ground: Ground,
+    threshold: float = 0.1,
+    method: Literal["hull", "lp"] = "hull",
+    com_method: Method = "pcom",
+    contact: Contact = "paper",
+) -> NDArray[np.bool_]:
+    """The paper's BoSE for each body, (...,) bool: does the centre of mass lie over the base of support?
+
+    `hull` tests the convex hull; `lp` solves the paper's linear programme. They agree wherever |margin| > 1e-9 m.
+    """
+    bodies = Bodies(vertices, template)
+    if method == "lp":
+        inside = _core.bose_lp(template._core, contact, com_method, _positive(threshold), *bodies.over(ground))
+        return inside.reshape(bodies.shape)
+    if method != "hull":
+        raise ValueError(f'method: expected "hull" or "lp", got {method!r}')
+    return base_of_support(vertices, template, ground, threshold, com_method, contact).inside
+
+
+def _positive(threshold: float) -> float:
+    if not threshold > 0.0:
+        raise ValueError(f"threshold: expected positive metres, got {threshold!r}")
+    return float(threshold)
+
+
+def _nest(items: list[Any], shape: tuple[int, ...]) -> Any:
+    """The items as nested lists of this shape."""
+    if not shape:
+        return items[0]
+    if len(shape) == 1:
+        return items
+    step = int(np.prod(shape[1:]))
+    return [_nest(items[start * step : (start + 1) * step], shape[1:]) for start in range(shape[0])]
