@@ -9,7 +9,7 @@ use crate::mass::Method;
 use crate::number::vector::{Vec3, sub};
 use crate::number::{Dual, Real, Scalar};
 use crate::quantity::Quantity;
-use crate::scene::Scene;
+use crate::scene::{self, Scene};
 use crate::support::{BaseOfSupport, Contact};
 use crate::template::Template;
 use crate::volume::signed_volumes;
@@ -195,11 +195,11 @@ impl<'a, T: Scalar> Batch<'a, T> {
         f(&Scene::new(self.template, &points, &self.grounds[body], origin));
     }
 
-    /// The body's first vertex, if all its vertices are finite.
+    /// The body's local origin, if all its vertices are finite.
     fn origin(&self, body: usize) -> Option<Vec3<f64>> {
         let vertices = self.vertices_of(body);
         let finite = vertices.iter().all(|x| x.value().is_finite());
-        finite.then(|| std::array::from_fn(|k| vertices[k].value()))
+        finite.then(|| scene::origin(std::array::from_fn(|k| vertices[k].value())))
     }
 
     fn vertices_of(&self, body: usize) -> &[T] {

@@ -65,9 +65,12 @@ impl Samples {
     /// (W V)_i
     #[inline(always)]
     pub fn point<R: Real>(&self, sample: usize, vertices: &[Vec3<R>]) -> Vec3<R> {
-        let [a, b, c] = self.corners[sample].map(|corner| vertices[corner as usize]);
-        let [u, v, w] = self.barycentric[sample].map(R::of);
-        std::array::from_fn(|k| u * a[k] + v * b[k] + w * c[k])
+        blend(self.corners[sample].map(|corner| vertices[corner as usize]), self.barycentric[sample])
+    }
+
+    /// (W V)_i in double precision, for decisions and for inner solvers.
+    pub fn wide_point<R: Real>(&self, sample: usize, vertices: &[Vec3<R>]) -> Vec3<R::Wide> {
+        blend(self.corners[sample].map(|corner| widen(vertices[corner as usize])), self.barycentric[sample])
     }
 
     /// Adds the sample's gradient to its face's vertices: a row of Wᵀ.
@@ -77,6 +80,13 @@ impl Samples {
             add_scaled(&mut d_vertices[corner as usize], R::of(weight), d_point);
         }
     }
+}
+
+/// The weighted corners, from the first along the edges: the weights' rounding then scales with the face, not the body.
+#[inline(always)]
+fn blend<R: Real>([a, b, c]: [Vec3<R>; 3], weights: [f64; 3]) -> Vec3<R> {
+    let [_, v, w] = weights.map(R::of);
+    std::array::from_fn(|k| a[k] + (v * (b[k] - a[k]) + w * (c[k] - a[k])))
 }
 
 fn areas(mesh: &Mesh, vertices: &[Vec3<f64>]) -> Vec<f64> {

@@ -6,25 +6,32 @@
 
 use crate::closing::Closing;
 use crate::number::Real;
-use crate::number::vector::{Vec3, add_scaled, cross, dot, narrow, sub, widen};
+use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, scale, sub, widen};
 use crate::quantity::Quantity;
 use crate::scene::Scene;
 use crate::template::Template;
 
-/// Signed volume of each part, m³: vol^P = Σ a·(b × c) / 6 over the part's faces and caps.
+/// Twice the area vector of a face, from its edges: they keep single precision where products of positions cancel.
+fn area_vector<R: Real>(a: Vec3<R>, b: Vec3<R>, c: Vec3<R>) -> Vec3<R> {
+    cross(sub(b, a), sub(c, a))
+}
+
+/// Signed volume of each part, m³: vol^P = Σ a·(b × c) / 6 = Σ a·N / 6 over the part's faces and caps, N = (b−a) × (c−a).
 pub fn signed_volumes<R: Real>(closing: &Closing, points: &[Vec3<R>]) -> Vec<R::Wide> {
     let sixth = R::Wide::of(1.0 / 6.0);
     let volume = |part: &std::ops::Range<usize>| {
         let mut sum = R::Wide::zero();
-        for &[a, b, c] in &closing.faces[part.clone()] {
-            dot(points[a as usize], cross(points[b as usize], points[c as usize])).add_to(&mut sum);
+        for face in &closing.faces[part.clone()] {
+            let [a, b, c] = face.map(|index| points[index as usize]);
+            dot(a, area_vector(a, b, c)).add_to(&mut sum);
         }
         sum * sixth
     };
     closing.parts.iter().map(volume).collect()
 }
 
-/// Adds Σ_p d_volumes[p] ∂vol_p/∂points: each corner's derivative is the cross product of the other two, over 6.
+/// Adds Σ_p d_volumes[p] ∂vol_p/∂points. A corner's derivative is the cross product of the other two, over 6; around a
+/// vertex of a closed part these add up to the faces' N/6, so every corner gets N/6.
 pub fn signed_volumes_backward<R: Real>(
     closing: &Closing,
     points: &[Vec3<R>],
@@ -35,9 +42,10 @@ pub fn signed_volumes_backward<R: Real>(
         let factor = R::narrow(d_volume * R::Wide::of(1.0 / 6.0));
         for face in &closing.faces[part.clone()] {
             let [a, b, c] = face.map(|index| points[index as usize]);
-            add_scaled(&mut d_points[face[0] as usize], factor, cross(b, c));
-            add_scaled(&mut d_points[face[1] as usize], factor, cross(c, a));
-            add_scaled(&mut d_points[face[2] as usize], factor, cross(a, b));
+            let d_corner = scale(factor, area_vector(a, b, c));
+            for &index in face {
+                d_points[index as usize] = add(d_points[index as usize], d_corner);
+            }
         }
     }
 }
@@ -168,7 +176,7 @@ pub fn part_moments_backward<R: Real>(
             let corners = face.map(|index| widen(points[index as usize]));
             for (index, d_corner) in face.iter().zip(Moments::tetrahedron_backward(d_part, corners)) {
                 let d_point = &mut d_points[*index as usize];
-                *d_point = sub(*d_point, narrow::<R>(d_corner.map(|x| -x)));
+                *d_point = add(*d_point, narrow::<R>(d_corner));
             }
         }
     }

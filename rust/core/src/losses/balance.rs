@@ -9,7 +9,7 @@
 
 use crate::error::Result;
 use crate::mass::{Centre, Method};
-use crate::number::vector::{Vec3, add_scaled, narrow, scale, widen};
+use crate::number::vector::{Vec3, add_scaled, narrow, scale};
 use crate::number::{Real, Scalar};
 use crate::pressure::PressureCurve;
 use crate::quantity::{Quantity, unknown_choice};
@@ -91,7 +91,7 @@ impl BalanceCost {
         let target = scene.plane.flatten(centre.point);
         let zero = R::Wide::zero();
         let support = |sample| {
-            let point = widen(scene.template.samples.point(sample, scene.points));
+            let point = scene.template.samples.wide_point(sample, scene.points);
             let flat = scene.plane.flatten(point);
             let height = scene.ground.signed_height(point);
             Support {
@@ -137,7 +137,7 @@ impl BalanceCost {
         let start = here.value;
         let mut length = W::of(1.0);
         for _ in 0..MAX_STEPS {
-            if here.all_within(TOLERANCE) {
+            if here.has_arrived() {
                 break;
             }
             let step = here.newton_step();
@@ -147,11 +147,13 @@ impl BalanceCost {
             // The slack admits steps whose gain drowns in rounding.
             let slack = W::of(1e-13) * (W::of(1.0) + here.value.abs());
             let excess = there.value - here.value - W::of(1e-4) * length * promised - slack;
+            // A lane that has arrived stays, however long the others take.
+            let refused = here.excess_residual().if_negative(W::of(1.0), excess);
             for k in 0..2 {
-                lambda[k] = excess.if_negative(trial[k], lambda[k]);
+                lambda[k] = refused.if_negative(trial[k], lambda[k]);
             }
-            here = here.replaced_where_negative(excess, there);
-            length = excess.if_negative(W::of(1.0), W::of(0.5) * length);
+            here = here.replaced_where_negative(refused, there);
+            length = refused.if_negative(W::of(1.0), W::of(0.5) * length);
         }
         let step = here.newton_step();
         let lambda = std::array::from_fn(|k| lambda[k] + step[k]);
@@ -185,8 +187,14 @@ impl<W: Real> Dual<W> {
         [(xy * gy - yy * gx) / determinant, (xy * gx - xx * gy) / determinant]
     }
 
-    fn all_within(&self, tolerance: f64) -> bool {
-        (0..W::LANES).all(|lane| self.gradient.iter().all(|g| g.lane(lane).value().abs() <= tolerance))
+    /// Negative in a lane whose residual is small enough.
+    fn excess_residual(&self) -> W {
+        self.gradient[0].abs().at_least(self.gradient[1].abs()) - W::of(TOLERANCE)
+    }
+
+    fn has_arrived(&self) -> bool {
+        let excess = self.excess_residual();
+        (0..W::LANES).all(|lane| excess.lane(lane).value() < 0.0)
     }
 
     fn replaced_where_negative(self, test: W, other: Self) -> Self {

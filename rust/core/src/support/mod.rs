@@ -8,7 +8,7 @@ pub mod program;
 use crate::error::Result;
 use crate::ground::values;
 use crate::mass::{Centre, Method};
-use crate::number::vector::{Vec3, narrow, widen};
+use crate::number::vector::{Vec3, narrow};
 use crate::number::{Real, Scalar};
 use crate::quantity::{Quantity, unknown_choice};
 use crate::scene::Scene;
@@ -56,7 +56,7 @@ impl Contact {
     fn find<R: Real>(&self, scene: &Scene<R>, lane: usize) -> (Vec<u32>, Vec<[f64; 2]>) {
         let (mut samples, mut positions) = (Vec::new(), Vec::new());
         for sample in 0..scene.template.samples.len() {
-            let point = sample_point(scene, sample);
+            let point = scene.template.samples.wide_point(sample, scene.points);
             if self.touches(scene.ground.signed_height(point).lane(lane).value()) {
                 samples.push(sample as u32);
                 positions.push(values(scene.plane.flatten(point).map(|x| x.lane(lane))));
@@ -67,12 +67,6 @@ impl Contact {
         }
         (samples, positions)
     }
-}
-
-fn sample_point<R: Real>(scene: &Scene<R>, sample: usize) -> Vec3<R::Wide> {
-    let corners = scene.template.samples.corners[sample].map(|corner| widen(scene.points[corner as usize]));
-    let weights = scene.template.samples.barycentric[sample].map(R::Wide::of);
-    std::array::from_fn(|k| (0..3).fold(R::Wide::zero(), |sum, c| sum + weights[c] * corners[c][k]))
 }
 
 /// The base of support of one body.
@@ -155,7 +149,8 @@ impl SupportMargin {
         lane: usize,
     ) -> Margin<<R::Wide as Real>::Scalar> {
         let flatten = |point| scene.plane.flatten(point).map(|x: R::Wide| x.lane(lane));
-        let ends = nearest.map(|sample| flatten(sample_point(scene, sample as usize)));
+        let samples = &scene.template.samples;
+        let ends = nearest.map(|sample| flatten(samples.wide_point(sample as usize, scene.points)));
         Margin::new(ends, flatten(centre.point))
     }
 }

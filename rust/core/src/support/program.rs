@@ -8,8 +8,9 @@ use faer::linalg::solvers::{Ldlt, Solve};
 use faer::{Col, Mat, Side};
 
 const MAX_ITERATIONS: usize = 100;
-/// Relative residuals and gap. The hull's reach is then known to about 1e-12 of its size.
-const TOLERANCE: f64 = 1e-13;
+/// Mean complementarity from which on only rounding is left: the iteration ends when the residuals stop falling. They
+/// reach about 1e-13, and the hull's reach is then known to about 1e-12 of its size.
+const CONVERGED_GAP: f64 = 1e-10;
 
 /// Whether `point` is a convex combination of `points`.
 pub fn is_convex_combination(points: &[[f64; 2]], point: [f64; 2]) -> bool {
@@ -37,10 +38,15 @@ pub fn is_convex_combination(points: &[[f64; 2]], point: [f64; 2]) -> bool {
 /// max t of the ray programme; t is the last column's variable.
 fn reach(columns: &[[f64; 3]]) -> f64 {
     let mut at = Iterate::start(columns);
+    let (mut least, mut reach) = (f64::INFINITY, 0.0);
     for _ in 0..MAX_ITERATIONS {
         let residual = Residual::of(columns, &at);
-        if residual.size() < TOLERANCE {
+        let size = residual.size();
+        if residual.gap < CONVERGED_GAP && size >= least {
             break;
+        }
+        if size < least {
+            (least, reach) = (size, *at.x.last().expect("the ray's column is always there"));
         }
         let Some(factor) = Factor::new(columns, &at) else { break };
         let affine = factor.direction(columns, &at, &residual, &|i| at.x[i] * at.s[i]);
@@ -57,7 +63,7 @@ fn reach(columns: &[[f64; 3]]) -> f64 {
         let dual = (back_off * step_length(&at.s, &step.s)).min(1.0);
         at.advance(&step, primal, dual);
     }
-    *at.x.last().expect("the ray's column is always there")
+    reach
 }
 
 /// Primal x, dual y and slack s, or a direction of them.
