@@ -158,7 +158,7 @@ impl<R: Real> Pass<R> for CopPass<R> {
         for i in 0..CHUNK {
             let height = chunk.height[i];
             let density = self.of.curve.density(height, self.shift);
-            let arm = dot(d, chunk.position.map(|axis| axis[i])) - lever;
+            let arm = dot(d, chunk.point(i)) - lever;
             for k in 0..3 {
                 d_chunk.position[k][i] = d_chunk.position[k][i] + density * d[k];
             }

@@ -215,7 +215,7 @@ impl Points {
             d_chunk.clear();
             room.hand_back(&chunk, &mut d_chunk);
             for i in 0..chunk.len {
-                let mut d_point = d_chunk.position.map(|axis| axis[i]);
+                let mut d_point = d_chunk.point(i);
                 add_scaled(&mut d_point, d_chunk.height[i], normal);
                 match self {
                     Points::Samples => scene.template.samples.point_backward(start + i, d_point, d_points),
@@ -245,6 +245,11 @@ impl Points {
 impl<R: Real> Chunk<R> {
     fn empty() -> Self {
         Chunk { start: 0, len: 0, position: [[R::zero(); CHUNK]; 3], height: [R::zero(); CHUNK] }
+    }
+
+    #[inline(always)]
+    pub fn point(&self, i: usize) -> Vec3<R> {
+        [self.position[0][i], self.position[1][i], self.position[2][i]]
     }
 
     fn clear(&mut self) {
