@@ -26,14 +26,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     let never = || false;
     let batch = Batch::new(&template, data, &[0.0, 1.0, 0.0], &[height], &never)?;
     let pressure = CenterOfPressure { curve: PressureCurve { alpha: 100.0, gamma: 10.0 }, epsilon: 0.0 };
-    let ground =
-        GroundLoss { points: Points::Samples, tanh: Tanh::Squared, alpha1: 1.0, alpha2: 0.15, beta1: 10.0, beta2: 0.15 };
+    let ground = GroundLoss {
+        points: Points::Samples,
+        tanh: Tanh::Squared,
+        alpha1: 1.0,
+        alpha2: 0.15,
+        beta1: 10.0,
+        beta2: 0.15,
+    };
     let contact = Contact { rule: ContactRule::Paper, threshold: 0.1 };
 
     let solid = batch.value(&MassProperties { densities: vec![985.0] })?;
     let support = &batch.base_of_support(&contact, Method::Exact)?[0];
     let losses = batch.value(&ground)?;
-    println!("body        {} vertices, {} faces, watertight: {}", vertices.len(), faces.len(), template.mesh.watertight);
+    println!(
+        "body        {} vertices, {} faces, watertight: {}",
+        vertices.len(),
+        faces.len(),
+        template.mesh.watertight
+    );
     println!("ground      y = {height:.4} m");
     println!("volume      {:.6} m³, mass {:.2} kg at 985 kg/m³", solid[0], solid[1]);
     println!("CoM         {} m", show(&batch.value(&CenterOfMass { method: Method::Exact })?));
@@ -45,8 +56,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+type Mesh = (Vec<[f64; 3]>, Vec<[i64; 3]>);
+
 /// All objects of an OBJ file as one mesh.
-fn read(path: &str) -> Result<(Vec<[f64; 3]>, Vec<[i64; 3]>), Box<dyn Error>> {
+fn read(path: &str) -> Result<Mesh, Box<dyn Error>> {
     let options = tobj::LoadOptions { triangulate: true, single_index: false, ..Default::default() };
     let (models, _) = tobj::load_obj(path, &options)?;
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());

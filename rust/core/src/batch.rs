@@ -188,9 +188,7 @@ impl<'a, T: Scalar> Batch<'a, T> {
         let Some(origin) = self.origin(body) else { return };
         let row = 3 * self.template.mesh.num_vertices;
         let mut slopes = d_vertices[body * row..][..row].iter();
-        let dual = |x: T, o: f64| {
-            Dual::new(x.value() - o, slopes.next().expect("as long as the vertices").value())
-        };
+        let dual = |x: T, o: f64| Dual::new(x.value() - o, slopes.next().expect("as long as the vertices").value());
         let points = self.points(body, dual, origin);
         f(&Scene::new(self.template, &points, &self.grounds[body], origin));
     }

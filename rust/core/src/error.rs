@@ -9,15 +9,23 @@ pub enum Error {
     TemplateNotFinite { vertex: usize },
     #[error("faces: face {face} refers to vertex {index}, but there are {num_vertices} vertices (0 to {})", num_vertices.saturating_sub(1))]
     VertexIndex { face: usize, index: i64, num_vertices: usize },
-    #[error("faces: face {face} uses vertex {vertex} twice; remove degenerate faces (trimesh: mesh.update_faces(mesh.nondegenerate_faces()))")]
+    #[error(
+        "faces: face {face} uses vertex {vertex} twice; remove degenerate faces (trimesh: mesh.update_faces(mesh.nondegenerate_faces()))"
+    )]
     RepeatedVertex { face: usize, vertex: usize },
-    #[error("faces: face {second} repeats face {first}; remove duplicates (trimesh: mesh.update_faces(mesh.unique_faces()))")]
+    #[error(
+        "faces: face {second} repeats face {first}; remove duplicates (trimesh: mesh.update_faces(mesh.unique_faces()))"
+    )]
     DuplicateFace { first: usize, second: usize },
     #[error("faces: edge ({a}, {b}) belongs to {count} faces; a surface has at most two at an edge (non-manifold)")]
     NonManifoldEdge { a: usize, b: usize, count: usize },
-    #[error("faces: faces {first} and {second} run along edge ({a}, {b}) in the same direction; orient them alike (trimesh.repair.fix_winding)")]
+    #[error(
+        "faces: faces {first} and {second} run along edge ({a}, {b}) in the same direction; orient them alike (trimesh.repair.fix_winding)"
+    )]
     MixedWinding { first: usize, second: usize, a: usize, b: usize },
-    #[error("faces: the surface is inside out (signed volume {volume:.3e} m³ < 0); reverse every face (faces[:, ::-1])")]
+    #[error(
+        "faces: the surface is inside out (signed volume {volume:.3e} m³ < 0); reverse every face (faces[:, ::-1])"
+    )]
     InsideOut { volume: f64 },
     #[error("vertices: the template encloses no volume ({volume:.3e} m³): is it a closed body, or a flat sheet?")]
     NoVolume { volume: f64 },

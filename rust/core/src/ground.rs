@@ -21,7 +21,11 @@ impl Ground<f64> {
             return Err(Error::GroundNormal { body: 0 });
         }
         if !height.is_finite() {
-            return Err(Error::Argument { name: "height", expected: "a finite number".into(), got: height.to_string() });
+            return Err(Error::Argument {
+                name: "height",
+                expected: "a finite number".into(),
+                got: height.to_string(),
+            });
         }
         let scaled = scale(1.0 / largest, normal);
         Ok(Ground { normal: scale(1.0 / dot(scaled, scaled).sqrt(), scaled), height })

@@ -119,7 +119,10 @@ fn wrong_lengths_and_grounds_are_named() {
     assert!(matches!(batch(&[0.0, 1.0, 0.0], &[0.0; 2]), Some(Error::Argument { name: "normal", .. })));
     let zero = batch(&[0.0, 1.0, 0.0, 0.0, 0.0, 0.0], &[0.0; 2]);
     assert_eq!(zero, Some(Error::GroundNormal { body: 1 }));
-    assert!(matches!(batch(&[0.0, 1.0, 0.0].repeat(2), &[0.0, f64::NAN]), Some(Error::Argument { name: "height", .. })));
+    assert!(matches!(
+        batch(&[0.0, 1.0, 0.0].repeat(2), &[0.0, f64::NAN]),
+        Some(Error::Argument { name: "height", .. })
+    ));
 }
 
 #[test]

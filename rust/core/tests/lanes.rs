@@ -2,12 +2,12 @@
 
 mod common;
 
+use ipman::Template;
 use ipman::ground::Ground;
 use ipman::number::Real;
 use ipman::number::vector::Vec3;
 use ipman::quantity::{Quantity, Visitor, named};
 use ipman::scene::Scene;
-use ipman::Template;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 #[derive(Clone, Copy)]
@@ -111,10 +111,8 @@ fn two_lanes_are_two_bodies() {
         points
     };
     // The second body leans far, so that branches and Newton's path differ between the lanes.
-    let bodies = [
-        close(&vertices),
-        close(&vertices.iter().map(|v| [v[0] + 0.6 * v[1], v[1] - 0.03, v[2]]).collect::<Vec<_>>()),
-    ];
+    let bodies =
+        [close(&vertices), close(&vertices.iter().map(|v| [v[0] + 0.6 * v[1], v[1] - 0.03, v[2]]).collect::<Vec<_>>())];
     let pairs: Vec<Vec3<Pair>> =
         (0..bodies[0].len()).map(|i| std::array::from_fn(|k| Pair([bodies[0][i][k], bodies[1][i][k]]))).collect();
     for (name, options) in common::quantities() {

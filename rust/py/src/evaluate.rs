@@ -34,7 +34,11 @@ impl<T: Scalar> Run<'_, T> {
         let (out, row) = (self.batch.len() * self.size, self.batch.len() * 3 * template.inner.mesh.num_vertices);
         let check = |name, expected: usize, got: usize| {
             let (expected, got) = (format!("{expected} numbers"), got.to_string());
-            if expected == format!("{got} numbers") { Ok(()) } else { Err(ipman::Error::Argument { name, expected, got }) }
+            if expected == format!("{got} numbers") {
+                Ok(())
+            } else {
+                Err(ipman::Error::Argument { name, expected, got })
+            }
         };
         match self.verb {
             Verb::Value => Ok(()),
@@ -105,18 +109,18 @@ fn evaluate<'py, T: Scalar + Element>(
     vertices: &PyReadonlyArray3<'py, T>,
     grounds: &Grounds<'py>,
     verb: Verb<'_, T>,
-) -> PyResult<[Bound<'py, PyArray1<T>>; 2]> {
+) -> PyResult<([Bound<'py, PyArray1<T>>; 2], usize)> {
     let (normals, heights) = grounds.slices()?;
     check_vertices(vertices.shape(), template, heights.len())?;
     let vertices = vertices.as_slice()?;
-    let (first, second) = detached(py, |interrupted| {
+    let (results, size) = detached(py, |interrupted| {
         let size = named(&template.inner, quantity, options, Size(template))?;
         let batch = Batch::new(&template.inner, vertices, normals, heights, interrupted)?;
         let run = Run { batch, verb, size };
         run.check(template)?;
-        named(&template.inner, quantity, options, run)?
+        Ok((named(&template.inner, quantity, options, run)??, size))
     })?;
-    Ok([first.into_pyarray(py), second.into_pyarray(py)])
+    Ok(([results.0.into_pyarray(py), results.1.into_pyarray(py)], size))
 }
 
 /// Upstream arrays must have the vertices' precision.
@@ -152,8 +156,8 @@ macro_rules! verb {
             $(let $upstream = upstream::<$T>(&$upstream, stringify!($upstream))?;)*
             let verb = verb!(@make $verb, $($upstream),*);
             let shape = vertices.shape();
-            let [first, second] = evaluate($py, $template, ($quantity, &$options), vertices, &$grounds, verb)?;
-            return $result($py, shape, first.into_any(), second.into_any());
+            let ([first, second], size) = evaluate($py, $template, ($quantity, &$options), vertices, &$grounds, verb)?;
+            return $result(shape, size, first.into_any(), second.into_any());
         }
     };
     (@make Value,) => { Verb::Value };
@@ -163,28 +167,20 @@ macro_rules! verb {
 type Reply<'py> = PyResult<Bound<'py, PyAny>>;
 
 /// (B, K): one row a body.
-fn rows<'py>(_: Python<'py>, shape: &[usize], values: Bound<'py, PyAny>, _: Bound<'py, PyAny>) -> Reply<'py> {
-    by_body(shape, values)
-}
-
-fn by_body<'py>(shape: &[usize], values: Bound<'py, PyAny>) -> Reply<'py> {
-    let columns = values.len()?.checked_div(shape[0]).unwrap_or(0);
-    values.call_method1("reshape", (shape[0], columns))
+fn rows<'py>(shape: &[usize], size: usize, values: Bound<'py, PyAny>, _: Bound<'py, PyAny>) -> Reply<'py> {
+    values.call_method1("reshape", (shape[0], size))
 }
 
 /// (B, V, 3)
-fn gradient<'py>(_: Python<'py>, shape: &[usize], values: Bound<'py, PyAny>, _: Bound<'py, PyAny>) -> Reply<'py> {
+fn gradient<'py>(shape: &[usize], _: usize, values: Bound<'py, PyAny>, _: Bound<'py, PyAny>) -> Reply<'py> {
     values.call_method1("reshape", (shape[0], shape[1], shape[2]))
 }
 
-fn both<'py>(
-    py: Python<'py>,
-    shape: &[usize],
-    values: Bound<'py, PyAny>,
-    d_vertices: Bound<'py, PyAny>,
-) -> Reply<'py> {
-    let d_vertices = gradient(py, shape, d_vertices.clone(), d_vertices)?;
-    Ok((by_body(shape, values)?, d_vertices).into_pyobject(py)?.into_any())
+/// (B, K) and (B, V, 3)
+fn both<'py>(shape: &[usize], size: usize, values: Bound<'py, PyAny>, d_vertices: Bound<'py, PyAny>) -> Reply<'py> {
+    let py = values.py();
+    let d_vertices = gradient(shape, size, d_vertices, py.None().into_bound(py))?;
+    Ok((rows(shape, size, values, py.None().into_bound(py))?, d_vertices).into_pyobject(py)?.into_any())
 }
 
 verb!(

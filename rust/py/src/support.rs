@@ -53,12 +53,8 @@ fn method(name: &str) -> PyResult<Method> {
     Method::named(name).map_err(|error| pyo3::exceptions::PyValueError::new_err(error.to_string()))
 }
 
-type Supports<'py> = (
-    Vec<Bound<'py, PyArray2<f64>>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<i64>>,
-);
+type Supports<'py> =
+    (Vec<Bound<'py, PyArray2<f64>>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>);
 
 /// Polygons (K, 3), areas (B,), margins (B,) and numbers of contacts (B,).
 #[pyfunction]
@@ -79,9 +75,8 @@ pub fn base_of_support<'py>(
         |batch| batch.base_of_support(&contact, method),
         |batch| batch.base_of_support(&contact, method),
     )?;
-    let polygon = |corners: &Vec<[f64; 3]>| {
-        corners.as_flattened().to_vec().into_pyarray(py).reshape([corners.len(), 3])
-    };
+    let polygon =
+        |corners: &Vec<[f64; 3]>| corners.as_flattened().to_vec().into_pyarray(py).reshape([corners.len(), 3]);
     Ok((
         supports.iter().map(|support| polygon(&support.polygon)).collect::<PyResult<_>>()?,
         supports.iter().map(|support| support.area).collect::<Vec<_>>().into_pyarray(py),

@@ -240,4 +240,3 @@ impl Quantity for BalanceCost {
         }
     }
 }
-

@@ -38,15 +38,12 @@ fn chain(points: &[[f64; 2]], order: impl Iterator<Item = usize>) -> Vec<usize> 
 
 /// The points outside the quadrilateral of the four extremes (Akl and Toussaint): the rest cannot be corners.
 fn candidates(points: &[[f64; 2]]) -> Vec<usize> {
-    let extreme = |key: fn(&[f64; 2]) -> f64| {
-        (0..points.len()).max_by(|&i, &j| key(&points[i]).total_cmp(&key(&points[j])))
-    };
+    let extreme =
+        |key: fn(&[f64; 2]) -> f64| (0..points.len()).max_by(|&i, &j| key(&points[i]).total_cmp(&key(&points[j])));
     let keys: [fn(&[f64; 2]) -> f64; 4] = [|p| -p[0] - p[1], |p| p[0] - p[1], |p| p[0] + p[1], |p| p[1] - p[0]];
     let Some(corners) = keys.into_iter().map(extreme).collect::<Option<Vec<_>>>() else { return Vec::new() };
     let coord = |i: usize| Coord { x: points[i][0], y: points[i][1] };
-    let inside = |&i: &usize| {
-        (0..4).all(|k| orient2d(coord(corners[k]), coord(corners[(k + 1) % 4]), coord(i)) > 0.0)
-    };
+    let inside = |&i: &usize| (0..4).all(|k| orient2d(coord(corners[k]), coord(corners[(k + 1) % 4]), coord(i)) > 0.0);
     (0..points.len()).filter(|i| !inside(i)).collect()
 }
 

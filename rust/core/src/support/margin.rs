@@ -41,11 +41,14 @@ impl Nearest<usize> {
             // Among equals an edge that sees the point on its right decides the sign.
             let rank = if left < 0.0 { distance * (1.0 - 1e-15) } else { distance };
             if best.is_none_or(|(least, _)| rank < least) {
-                best = Some((rank, match foot {
-                    t if t <= 0.0 => Nearest::Corner(a),
-                    t if t >= 1.0 => Nearest::Corner(b),
-                    _ => Nearest::Edge(a, b),
-                }));
+                best = Some((
+                    rank,
+                    match foot {
+                        t if t <= 0.0 => Nearest::Corner(a),
+                        t if t >= 1.0 => Nearest::Corner(b),
+                        _ => Nearest::Edge(a, b),
+                    },
+                ));
             }
         }
         Some(best?.1)
@@ -97,11 +100,7 @@ impl<S: Scalar> Margin<S> {
         let arm = [point[0] - a[0], point[1] - a[1]];
         let distance = (arm[0] * arm[0] + arm[1] * arm[1]).sqrt();
         let inverse = S::of(-1.0) / distance.at_least(S::of(1e-300));
-        Margin {
-            value: -distance,
-            direction: arm.map(|x| x * inverse),
-            shares: [S::of(1.0), S::zero()],
-        }
+        Margin { value: -distance, direction: arm.map(|x| x * inverse), shares: [S::of(1.0), S::zero()] }
     }
 }
 

@@ -174,9 +174,8 @@ impl Quantity for SupportMargin {
     }
 
     fn backward<R: Real>(&self, scene: &Scene<R>, saved: &SavedMargin<R::Wide>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        let margins: Vec<_> = (0..R::LANES)
-            .map(|lane| Some(Self::margin(scene, &saved.centre, saved.nearest[lane]?, lane)))
-            .collect();
+        let margins: Vec<_> =
+            (0..R::LANES).map(|lane| Some(Self::margin(scene, &saved.centre, saved.nearest[lane]?, lane))).collect();
         // The direction of each lane's derivative; no contact, no derivative.
         let direction: [R::Wide; 2] = std::array::from_fn(|k| {
             R::Wide::from_lanes(|lane| margins[lane].as_ref().map_or(Real::zero(), |margin| margin.direction[k]))

@@ -51,10 +51,9 @@ fn reach(columns: &[[f64; 3]]) -> f64 {
         let Some(factor) = Factor::new(columns, &at) else { break };
         let affine = factor.direction(columns, &at, &residual, &|i| at.x[i] * at.s[i]);
         let (primal, dual) = (step_length(&at.x, &affine.x), step_length(&at.s, &affine.s));
-        let ahead: f64 = (0..at.x.len())
-            .map(|i| (at.x[i] + primal * affine.x[i]) * (at.s[i] + dual * affine.s[i]))
-            .sum::<f64>()
-            / at.x.len() as f64;
+        let ahead: f64 =
+            (0..at.x.len()).map(|i| (at.x[i] + primal * affine.x[i]) * (at.s[i] + dual * affine.s[i])).sum::<f64>()
+                / at.x.len() as f64;
         let centring = (ahead / residual.gap).powi(3) * residual.gap;
         let step =
             factor.direction(columns, &at, &residual, &|i| at.x[i] * at.s[i] + affine.x[i] * affine.s[i] - centring);
