@@ -64,4 +64,8 @@ class Bodies:
         from ipman_rs import _core
 
         rows = _core.value(self.template._core, quantity, options, *self.over(ground))
+        return self.unfold(rows, *shape)
+
+    def unfold(self, rows: NDArray[Any], *shape: int) -> Any:
+        """Rows (B, …) as (..., *shape); a plain number where that is no dimension at all."""
         return rows.reshape((*self.shape, *shape))[()]

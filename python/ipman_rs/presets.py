@@ -41,7 +41,8 @@ PRESETS: dict[str, Preset] = {
             contact="released",
             weights={"stability": 0.01, "pull": 0.01, "push": 0.1},
         ),
-        # facts: log(1 + J) with λ = 1 beside a ground of 0.01 in training; push 2.5 times pull does not make bodies hover.
+        # A push ten times the pull makes uncertain predictions hover, and the balance cost is in nats where the paper's
+        # norm is in metres: hence 2.5 and 1.
         Preset("balanced", beta1=2.5, stability="balance", weights={"balance": 1.0, "pull": 0.01, "push": 0.01}),
     )
 }

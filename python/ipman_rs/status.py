@@ -47,7 +47,7 @@ def body_status(
     from ipman_rs.arrays import Bodies
 
     bodies = Bodies(vertices, template)
-    return _core.status(template._core, contact, threshold, *bodies.over(ground)).reshape(bodies.shape)
+    return bodies.unfold(_core.status(template._core, contact, threshold, *bodies.over(ground)))
 
 
 def warn_odd_size(size: float, what: str) -> None:

@@ -52,16 +52,14 @@ def base_of_support(
     bodies = Bodies(vertices, template)
     found = _core.base_of_support(template._core, contact, method, _positive(threshold), *bodies.over(ground))
     polygons, area, margin, num_contacts = found
-    margin = margin.reshape(bodies.shape)
-    num_contacts = num_contacts.reshape(bodies.shape)
     dtype = bodies.vertices.dtype
     return BaseOfSupport(
         polygon=_nest([polygon.astype(dtype, copy=False) for polygon in polygons], bodies.shape),
-        area=area.reshape(bodies.shape).astype(dtype, copy=False),
-        margin=margin.astype(dtype, copy=False),
-        inside=margin >= 0.0,
-        has_contact=num_contacts > 0,
-        num_contacts=num_contacts,
+        area=bodies.unfold(area.astype(dtype, copy=False)),
+        margin=bodies.unfold(margin.astype(dtype, copy=False)),
+        inside=bodies.unfold(margin >= 0.0),
+        has_contact=bodies.unfold(num_contacts > 0),
+        num_contacts=bodies.unfold(num_contacts),
     )
 
 
@@ -96,7 +94,7 @@ def bose(
     bodies = Bodies(vertices, template)
     if method == "lp":
         inside = _core.bose_lp(template._core, contact, com_method, _positive(threshold), *bodies.over(ground))
-        return inside.reshape(bodies.shape)
+        return bodies.unfold(inside)
     if method != "hull":
         raise ValueError(f'method: expected "hull" or "lp", got {method!r}')
     return base_of_support(vertices, template, ground, threshold, com_method, contact).inside

@@ -126,12 +126,16 @@ fn pick(areas: &[f64], num_samples: usize, seed: u64) -> Vec<(u32, [f64; 3])> {
 }
 
 fn part_sums(mesh: &Mesh, parts: &[u32], corners: &[[u32; 3]], barycentric: &[[f64; 3]]) -> Vec<PartSum> {
+    let mut members = vec![Vec::new(); mesh.num_parts];
+    for (sample, &part) in parts.iter().enumerate() {
+        members[part as usize].push(sample);
+    }
     let mut sums = vec![PartSum::default(); mesh.num_parts];
     let mut weight_of = vec![0.0; mesh.num_vertices];
-    for (part, sum) in sums.iter_mut().enumerate() {
+    for (sum, members) in sums.iter_mut().zip(members) {
         let mut touched = Vec::new();
-        for sample in (0..parts.len()).filter(|&sample| parts[sample] as usize == part) {
-            sum.count += 1;
+        sum.count = members.len();
+        for sample in members {
             for (&corner, &weight) in corners[sample].iter().zip(&barycentric[sample]) {
                 touched.push(corner);
                 weight_of[corner as usize] += weight;
