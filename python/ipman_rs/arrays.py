@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def plain(name: str, value: ArrayLike) -> NDArray[Any]:
     """An ordinary array of real numbers; masked arrays are refused, for their mask would be lost."""
     masked = sys.modules.get("numpy.ma")  # not imported here: that would cost every user 30 ms
-    if masked is not None and isinstance(value, masked.MaskedArray):
+    if masked is not None and _holds(value, masked.MaskedArray):
         raise TypeError(f"{name}: masked arrays are not supported, for the mask would be ignored; fill or drop first")
     try:
         array = np.asarray(value)
@@ -25,6 +25,36 @@ def plain(name: str, value: ArrayLike) -> NDArray[Any]:
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name}: expected real numbers, got dtype {array.dtype}")
     return array
+
+
+def _holds(value: Any, kind: type) -> bool:
+    """Whether a value is of that kind, or a list that starts with one."""
+    while isinstance(value, (list, tuple)) and value:
+        value = value[0]
+    return isinstance(value, kind)
+
+
+def number(name: str, value: float) -> float:
+    """A finite real number, as a float."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise TypeError(f"{name}: expected a number, got {value!r}")
+    if not np.isfinite(value):
+        raise ValueError(f"{name}: expected a finite number, got {value!r}")
+    return float(value)
+
+
+def positive(name: str, value: float, unit: str = "metres") -> float:
+    """A finite number above zero."""
+    if not number(name, value) > 0.0:
+        raise ValueError(f"{name}: expected positive {unit}, got {value!r}")
+    return float(value)
+
+
+def not_negative(name: str, value: float) -> float:
+    """A finite number, zero or above."""
+    if not number(name, value) >= 0.0:
+        raise ValueError(f"{name}: expected zero or more, got {value!r}")
+    return float(value)
 
 
 def single_or_double(array: NDArray[Any]) -> NDArray[Any]:
@@ -37,6 +67,8 @@ class Bodies:
     """A batch of posed bodies of one template: `vertices` (B, V, 3) and the free batch `shape` that B stands for."""
 
     def __init__(self, vertices: ArrayLike, template: BodyTemplate) -> None:
+        if not hasattr(template, "_core"):
+            raise TypeError(f"template: expected ipman_rs.BodyTemplate, got {type(template).__name__}")
         array = plain("vertices", vertices)
         expected = (template.num_vertices, 3)
         if array.ndim < 2 or array.shape[-2:] != expected:
@@ -48,6 +80,8 @@ class Bodies:
 
     def over(self, ground: Ground) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]:
         """The arguments that every entry of the core takes: vertices, normals (B, 3) and heights (B,)."""
+        if not hasattr(ground, "signed_height"):
+            raise TypeError(f"ground: expected ipman_rs.Ground, got {type(ground).__name__}")
         try:
             normal = np.broadcast_to(ground.normal, (*self.shape, 3))
             height = np.broadcast_to(ground.height, self.shape)

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.arrays import Bodies
+from ipman_rs.arrays import Bodies, not_negative, number, positive
 from ipman_rs.ground import Ground
 from ipman_rs.mass import Method
 from ipman_rs.template import BodyTemplate
@@ -29,7 +29,8 @@ def stability_loss(
 
     vertices (..., V, 3) m; alpha, gamma, epsilon as in `center_of_pressure`; method as in `center_of_mass`.
     """
-    return Bodies(vertices, template).evaluate(f"stability_loss.{method}", [alpha, gamma, epsilon], ground)
+    options = [number("alpha", alpha), number("gamma", gamma), not_negative("epsilon", epsilon)]
+    return Bodies(vertices, template).evaluate(f"stability_loss.{method}", options, ground)
 
 
 def ground_loss(
@@ -52,12 +53,9 @@ def ground_loss(
         points: the surface samples or the mesh's vertices.
         curve: (tanh x)², the paper's, or tanh(x²).
     """
-    for name, width in (("alpha2", alpha2), ("beta2", beta2)):
-        if not width > 0.0:
-            raise ValueError(f"{name}: expected positive metres, got {width!r}")
-    both = Bodies(vertices, template).evaluate(
-        f"ground_loss.{points}.{curve}", [alpha1, alpha2, beta1, beta2], ground, 2
-    )
+    pull = [number("alpha1", alpha1), positive("alpha2", alpha2)]
+    push = [number("beta1", beta1), positive("beta2", beta2)]
+    both = Bodies(vertices, template).evaluate(f"ground_loss.{points}.{curve}", pull + push, ground, 2)
     return both[..., 0][()], both[..., 1][()]
 
 
@@ -77,6 +75,5 @@ def balance_cost(
     centre of mass, p the pressure distribution, supports blurred by sigma metres. Unlike the paper's norm it does not
     assume how separate supports share the load. `wrap`: log(1 + J), J/(1 + J) where bodies may be falling, or J.
     """
-    if not sigma > 0.0:
-        raise ValueError(f"sigma: expected positive metres, got {sigma!r}")
-    return Bodies(vertices, template).evaluate(f"balance_cost.{wrap}.{method}", [alpha, gamma, sigma], ground)
+    options = [number("alpha", alpha), number("gamma", gamma), positive("sigma", sigma)]
+    return Bodies(vertices, template).evaluate(f"balance_cost.{wrap}.{method}", options, ground)

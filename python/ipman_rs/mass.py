@@ -18,6 +18,6 @@ def center_of_mass(vertices: ArrayLike, template: BodyTemplate, method: Method =
 
     `pcom` is the paper's: samples weighted by their part's volume. `vertex_mean`, `sample_mean` and `face_area` are the
     alternatives of its supplement; `exact` integrates a solid of uniform density. On a standing body pcom and exact lie
-    about 45 mm apart, because samples sit on the skin.
+    several centimetres apart, because samples sit on the skin.
     """
     return Bodies(vertices, template).evaluate(f"center_of_mass.{method}", [], Ground(), 3)

@@ -54,7 +54,6 @@ def get(name: str) -> Preset:
     Raises:
         ValueError: there is none; the message lists all.
     """
-    try:
-        return PRESETS[name]
-    except KeyError:
-        raise ValueError(f"preset: expected one of {', '.join(PRESETS)}, got {name!r}") from None
+    if not isinstance(name, str) or name not in PRESETS:
+        raise ValueError(f"preset: expected one of {', '.join(PRESETS)}, got {name!r}")
+    return PRESETS[name]

@@ -6,7 +6,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.arrays import Bodies
+from ipman_rs.arrays import Bodies, not_negative, number
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 
@@ -18,7 +18,8 @@ def pressure(
 
     vertices (..., V, 3) m; alpha, gamma in 1/m.
     """
-    return Bodies(vertices, template).evaluate("pressure", [alpha, gamma], ground, template.num_samples)
+    options = [number("alpha", alpha), number("gamma", gamma)]
+    return Bodies(vertices, template).evaluate("pressure", options, ground, template.num_samples)
 
 
 def center_of_pressure(
@@ -30,4 +31,5 @@ def center_of_pressure(
     epsilon: float = 0.0,
 ) -> NDArray[Any]:
     """s̄ = Σ ρ v / (Σ ρ + epsilon), (..., 3) m; finite for hovering bodies. epsilon is 1e-6 in the released code."""
-    return Bodies(vertices, template).evaluate("center_of_pressure", [alpha, gamma, epsilon], ground, 3)
+    options = [number("alpha", alpha), number("gamma", gamma), not_negative("epsilon", epsilon)]
+    return Bodies(vertices, template).evaluate("center_of_pressure", options, ground, 3)

@@ -44,9 +44,10 @@ def body_status(
 ) -> NDArray[np.int64]:
     """The `Status` bits of each body, (...,). vertices (..., V, 3) m; contact is |h| < `threshold` metres."""
     from ipman_rs import _core
-    from ipman_rs.arrays import Bodies
+    from ipman_rs.arrays import Bodies, positive
 
     bodies = Bodies(vertices, template)
+    threshold = positive("threshold", threshold)
     return bodies.unfold(_core.status(template._core, contact, threshold, *bodies.over(ground)))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs import _core
-from ipman_rs.arrays import Bodies
+from ipman_rs.arrays import Bodies, positive
 from ipman_rs.ground import Ground
 from ipman_rs.mass import Method
 from ipman_rs.template import BodyTemplate
@@ -50,7 +50,7 @@ def base_of_support(
         method: the centre of mass whose margin is taken.
     """
     bodies = Bodies(vertices, template)
-    found = _core.base_of_support(template._core, contact, method, _positive(threshold), *bodies.over(ground))
+    found = _core.base_of_support(template._core, contact, method, positive("threshold", threshold), *bodies.over(ground))
     polygons, area, margin, num_contacts = found
     dtype = bodies.vertices.dtype
     return BaseOfSupport(
@@ -74,7 +74,7 @@ def support_margin(
     """Metres from the centre of mass to the boundary of the base of support, (...,): positive inside, −inf without
     contact. A hull of zero area (one or two points, a line) has no inside: minus the distance to it."""
     return Bodies(vertices, template).evaluate(
-        f"support_margin.{contact}.{method}", [_positive(threshold)], ground
+        f"support_margin.{contact}.{method}", [positive("threshold", threshold)], ground
     )
 
 
@@ -93,17 +93,11 @@ def bose(
     """
     bodies = Bodies(vertices, template)
     if method == "lp":
-        inside = _core.bose_lp(template._core, contact, com_method, _positive(threshold), *bodies.over(ground))
+        inside = _core.bose_lp(template._core, contact, com_method, positive("threshold", threshold), *bodies.over(ground))
         return bodies.unfold(inside)
     if method != "hull":
         raise ValueError(f'method: expected "hull" or "lp", got {method!r}')
     return base_of_support(vertices, template, ground, threshold, com_method, contact).inside
-
-
-def _positive(threshold: float) -> float:
-    if not threshold > 0.0:
-        raise ValueError(f"threshold: expected positive metres, got {threshold!r}")
-    return float(threshold)
 
 
 def _nest(items: list[Any], shape: tuple[int, ...]) -> Any:

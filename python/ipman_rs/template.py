@@ -159,6 +159,8 @@ def _whole(name: str, value: int, low: int, high: int) -> int:
 def _names(names: Sequence[str] | None, num_parts: int) -> tuple[str, ...]:
     if names is None:
         return ("body",) if num_parts == 1 else tuple(f"part_{part}" for part in range(num_parts))
-    if isinstance(names, str) or len(names) != num_parts:
+    if isinstance(names, str) or not isinstance(names, Sequence):
+        raise TypeError(f"part_names: expected a list of {num_parts} names, got {names!r}")
+    if len(names) != num_parts:
         raise ValueError(f"part_names: expected {num_parts} names, got {names!r}")
     return tuple(str(name) for name in names)

@@ -29,6 +29,7 @@ mod _core {
 }
 
 mod threads {
+    use pyo3::exceptions::PyValueError;
     use pyo3::prelude::*;
 
     /// The number of threads that batches use.
@@ -37,9 +38,12 @@ mod threads {
         ipman::batch::num_threads()
     }
 
-    /// Sets the number of threads that batches use, at least 1.
+    /// Sets the number of threads that batches use, 1 to 1024.
     #[pyfunction]
-    pub fn set_num_threads(threads: usize) {
-        ipman::batch::set_num_threads(threads);
+    pub fn set_num_threads(threads: Bound<'_, PyAny>) -> PyResult<()> {
+        match threads.extract() {
+            Ok(number @ 1..=1024) => Ok(ipman::batch::set_num_threads(number)),
+            _ => Err(PyValueError::new_err(format!("threads: expected 1 to 1024, got {threads}"))),
+        }
     }
 }
