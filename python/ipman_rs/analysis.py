@@ -49,8 +49,10 @@ class Analysis:
     balance: NDArray[Any]
 
     def to_json(self) -> str:
-        """Strict JSON: the fields by name, nested as the batch, status as names; what is not finite becomes null. Of the
-        pressure only its sum and its largest value are kept."""
+        """Strict JSON: the fields by name, nested as the batch, status as names; what is not finite becomes null.
+
+        Of the pressure only its sum and its largest value are kept.
+        """
         values = {name: value for name, value in vars(self).items() if name not in {"pressure", "status"}}
         values["status"] = _status_names(self.status)
         values["pressure_sum"] = self.pressure.sum(axis=-1)
@@ -97,9 +99,7 @@ def analyze(
         center_of_pressure=center_of_pressure(vertices, template, ground, **curve, epsilon=constants.epsilon),
         base_of_support=support,
         bose=support.inside,
-        stability=stability_loss(
-            vertices, template, ground, **curve, epsilon=constants.epsilon, method=com_method
-        ),
+        stability=stability_loss(vertices, template, ground, **curve, epsilon=constants.epsilon, method=com_method),
         pull=pull,
         push=push,
         balance=balance_cost(

@@ -65,7 +65,7 @@ class Ground:
         along = np.where(np.abs(self.normal[..., :1]) < 0.9, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
         first = along - (along * self.normal).sum(axis=-1, keepdims=True) * self.normal
         first = first / np.linalg.norm(first, axis=-1, keepdims=True)
-        return first, np.cross(self.normal, first)
+        return first, np.cross(self.normal, first).astype(np.float64)
 
     def _beside_points(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         normal = self.normal if self.normal.ndim == 1 else self.normal[..., None, :]

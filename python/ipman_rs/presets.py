@@ -41,8 +41,8 @@ PRESETS: dict[str, Preset] = {
             contact="released",
             weights={"stability": 0.01, "pull": 0.01, "push": 0.1},
         ),
-        # A push ten times the pull makes uncertain predictions hover: hence 2.5. The λ stand, as paper-r's, inside SPIN's
-        # bracket that is multiplied by 60, so the balance cost counts once.
+        # A push ten times the pull makes uncertain predictions hover: hence 2.5. The λ stand, as paper-r's, inside
+        # SPIN's bracket that is multiplied by 60, so the balance cost counts once.
         Preset("balanced", beta1=2.5, stability="balance", weights={"balance": 1 / 60, "pull": 0.01, "push": 0.01}),
     )
 }

@@ -21,9 +21,13 @@ Contact = Literal["paper", "released"]
 class BaseOfSupport:
     """The hull of the contact samples on the ground.
 
-    polygon: corners (K, 3) m on the ground, counter-clockwise seen from above, empty without contact; nested lists in the
-        batch's shape for a batch. area: (...,) m². margin: (...,) m from the centre of mass on the ground to the polygon's
-        boundary, positive inside, −inf without contact. inside: (...,) BoSE. has_contact, num_contacts: (...,).
+    polygon: corners (K, 3) m on the ground, counter-clockwise seen from above, empty without contact; nested lists in
+        the batch's shape for a batch.
+    area: (...,) m².
+    margin: (...,) m from the centre of mass on the ground to the polygon's boundary, positive inside, −inf without
+        contact.
+    inside: (...,) the paper's BoSE.
+    has_contact, num_contacts: (...,).
     """
 
     polygon: Any
@@ -50,7 +54,9 @@ def base_of_support(
         method: the centre of mass whose margin is taken.
     """
     bodies = Bodies(vertices, template)
-    found = _core.base_of_support(template._core, contact, method, positive("threshold", threshold), *bodies.over(ground))
+    found = _core.base_of_support(
+        template._core, contact, method, positive("threshold", threshold), *bodies.over(ground)
+    )
     polygons, area, margin, num_contacts = found
     dtype = bodies.vertices.dtype
     return BaseOfSupport(
@@ -93,7 +99,9 @@ def bose(
     """
     bodies = Bodies(vertices, template)
     if method == "lp":
-        inside = _core.bose_lp(template._core, contact, com_method, positive("threshold", threshold), *bodies.over(ground))
+        inside = _core.bose_lp(
+            template._core, contact, com_method, positive("threshold", threshold), *bodies.over(ground)
+        )
         return bodies.unfold(inside)
     if method != "hull":
         raise ValueError(f'method: expected "hull" or "lp", got {method!r}')
