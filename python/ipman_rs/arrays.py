@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,10 +57,18 @@ def not_negative(name: str, value: float) -> float:
     return float(value)
 
 
+def choice(name: str, value: str, words: Any) -> str:
+    """One of the words of a `Literal`."""
+    options = get_args(words)
+    if value not in options:
+        raise ValueError(f"{name}: expected one of {', '.join(options)}, got {value!r}")
+    return value
+
+
 def single_or_double(array: NDArray[Any]) -> NDArray[Any]:
     """float32 and half stay or become native float32; everything else becomes native float64."""
     dtype = np.float32 if array.dtype.kind == "f" and array.dtype.itemsize <= 4 else np.float64
-    return np.ascontiguousarray(array, dtype=dtype)
+    return np.require(array, dtype, ["C", "A"])  # what comes from packed records is not aligned
 
 
 class Bodies:

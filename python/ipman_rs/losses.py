@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.arrays import Bodies, not_negative, number, positive
+from ipman_rs.arrays import Bodies, choice, not_negative, number, positive
 from ipman_rs.ground import Ground
 from ipman_rs.mass import Method
 from ipman_rs.template import BodyTemplate
@@ -30,7 +30,8 @@ def stability_loss(
     vertices (..., V, 3) m; alpha, gamma, epsilon as in `center_of_pressure`; method as in `center_of_mass`.
     """
     options = [number("alpha", alpha), number("gamma", gamma), not_negative("epsilon", epsilon)]
-    return Bodies(vertices, template).evaluate(f"stability_loss.{method}", options, ground)
+    quantity = f"stability_loss.{choice('method', method, Method)}"
+    return Bodies(vertices, template).evaluate(quantity, options, ground)
 
 
 def ground_loss(
@@ -55,7 +56,8 @@ def ground_loss(
     """
     pull = [number("alpha1", alpha1), positive("alpha2", alpha2)]
     push = [number("beta1", beta1), positive("beta2", beta2)]
-    both = Bodies(vertices, template).evaluate(f"ground_loss.{points}.{curve}", pull + push, ground, 2)
+    quantity = f"ground_loss.{choice('points', points, Points)}.{choice('curve', curve, Curve)}"
+    both = Bodies(vertices, template).evaluate(quantity, pull + push, ground, 2)
     return both[..., 0][()], both[..., 1][()]
 
 
@@ -76,4 +78,5 @@ def balance_cost(
     assume how separate supports share the load. `wrap`: log(1 + J), J/(1 + J) where bodies may be falling, or J.
     """
     options = [number("alpha", alpha), number("gamma", gamma), positive("sigma", sigma)]
-    return Bodies(vertices, template).evaluate(f"balance_cost.{wrap}.{method}", options, ground)
+    quantity = f"balance_cost.{choice('wrap', wrap, Wrap)}.{choice('method', method, Method)}"
+    return Bodies(vertices, template).evaluate(quantity, options, ground)

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.arrays import Bodies
+from ipman_rs.arrays import Bodies, choice
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 
@@ -20,4 +20,4 @@ def center_of_mass(vertices: ArrayLike, template: BodyTemplate, method: Method =
     alternatives of its supplement; `exact` integrates a solid of uniform density. On a standing body pcom and exact lie
     several centimetres apart, because samples sit on the skin.
     """
-    return Bodies(vertices, template).evaluate(f"center_of_mass.{method}", [], Ground(), 3)
+    return Bodies(vertices, template).evaluate(f"center_of_mass.{choice('method', method, Method)}", [], Ground(), 3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from enum import IntFlag
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,10 +44,11 @@ def body_status(
 ) -> NDArray[np.int64]:
     """The `Status` bits of each body, (...,). vertices (..., V, 3) m; contact is |h| < `threshold` metres."""
     from ipman_rs import _core
-    from ipman_rs.arrays import Bodies, positive
+    from ipman_rs.arrays import Bodies, choice, positive
 
     bodies = Bodies(vertices, template)
     threshold = positive("threshold", threshold)
+    choice("contact", contact, Literal["paper", "released"])
     return bodies.unfold(_core.status(template._core, contact, threshold, *bodies.over(ground)))
 
 

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs import _core
-from ipman_rs.arrays import Bodies, positive
+from ipman_rs.arrays import Bodies, choice, positive
 from ipman_rs.ground import Ground
 from ipman_rs.mass import Method
 from ipman_rs.template import BodyTemplate
 
 Contact = Literal["paper", "released"]
+Solver = Literal["hull", "lp"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +80,9 @@ def support_margin(
 ) -> NDArray[Any]:
     """Metres from the centre of mass to the boundary of the base of support, (...,): positive inside, −inf without
     contact. A hull of zero area (one or two points, a line) has no inside: minus the distance to it."""
-    return Bodies(vertices, template).evaluate(
-        f"support_margin.{contact}.{method}", [positive("threshold", threshold)], ground
-    )
+    rule, method_name, metres = _question(contact, method, "method", threshold)
+    quantity = f"support_margin.{rule}.{method_name}"
+    return Bodies(vertices, template).evaluate(quantity, [metres], ground)
 
 
 def bose(
@@ -89,7 +90,7 @@ def bose(
     template: BodyTemplate,
     ground: Ground,
     threshold: float = 0.1,
-    method: Literal["hull", "lp"] = "hull",
+    method: Solver = "hull",
     com_method: Method = "pcom",
     contact: Contact = "paper",
 ) -> NDArray[np.bool_]:
@@ -97,15 +98,20 @@ def bose(
 
     `hull` tests the convex hull; `lp` solves the paper's linear programme. They agree wherever |margin| > 1e-9 m.
     """
+    if choice("method", method, Solver) == "hull":
+        return base_of_support(vertices, template, ground, threshold, com_method, contact).inside
     bodies = Bodies(vertices, template)
-    if method == "lp":
-        inside = _core.bose_lp(
-            template._core, contact, com_method, positive("threshold", threshold), *bodies.over(ground)
-        )
-        return bodies.unfold(inside)
-    if method != "hull":
-        raise ValueError(f'method: expected "hull" or "lp", got {method!r}')
-    return base_of_support(vertices, template, ground, threshold, com_method, contact).inside
+    question = _question(contact, com_method, "com_method", threshold)
+    return bodies.unfold(_core.bose_lp(template._core, *question, *bodies.over(ground)))
+
+
+def _question(contact: Contact, method: Method, name: str, threshold: float) -> tuple[str, str, float]:
+    """The checked options of every question about the support."""
+    return (
+        choice("contact", contact, Contact),
+        choice(name, method, Method),
+        positive("threshold", threshold),
+    )
 
 
 def _nest(items: list[Any], shape: tuple[int, ...]) -> Any:

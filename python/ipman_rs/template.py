@@ -159,6 +159,8 @@ def _whole(name: str, value: int, low: int, high: int) -> int:
 def _names(names: Sequence[str] | None, num_parts: int) -> tuple[str, ...]:
     if names is None:
         return ("body",) if num_parts == 1 else tuple(f"part_{part}" for part in range(num_parts))
+    if isinstance(names, np.ndarray):
+        names = names.tolist()
     if isinstance(names, str) or not isinstance(names, Sequence):
         raise TypeError(f"part_names: expected a list of {num_parts} names, got {names!r}")
     if len(names) != num_parts:

@@ -1,0 +1,148 @@
+"""The compiled engine, as rust/py exports it; tests/test_stubs.py compares the two.
+
+Arrays are C-contiguous. The vertices' dtype, float32 or float64, is that of every other array of the call except
+`normal` (B, 3) and `height` (B,), and of its results. Functions release the GIL, answer Ctrl-C, and raise ValueError
+for numbers that do not fit, TypeError for arrays of another type.
+"""
+
+from collections.abc import Sequence
+from typing import Any, TypeVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+_Float = TypeVar("_Float", np.float32, np.float64)
+
+@final
+class Template:
+    """Topology, closing and samples of one body surface, computed once."""
+
+    def __new__(
+        cls,
+        vertices: NDArray[np.float64],
+        faces: NDArray[np.int64],
+        face_parts: NDArray[np.int64],
+        num_samples: int,
+        seed: int,
+    ) -> Template:
+        """vertices (V, 3), faces (F, 3), face_parts (F,) or empty for one part."""
+
+    @property
+    def num_vertices(self) -> int: ...
+    @property
+    def num_parts(self) -> int: ...
+    @property
+    def num_samples(self) -> int: ...
+    @property
+    def watertight(self) -> bool: ...
+    @property
+    def sample_faces(self) -> NDArray[np.int64]:
+        """The face of each sample, (S,), ascending."""
+
+    @property
+    def sample_parts(self) -> NDArray[np.int64]:
+        """The part of each sample, (S,)."""
+
+    @property
+    def sample_barycentric(self) -> NDArray[np.float64]:
+        """The weights of each sample on its face's vertices, (S, 3)."""
+
+# A quantity is a name and its options; the list is `named` in rust/core/src/quantity.rs.
+
+def output_size(template: Template, quantity: str, options: Sequence[float]) -> int:
+    """K: how many numbers the quantity has for one body."""
+
+def value(
+    template: Template,
+    quantity: str,
+    options: Sequence[float],
+    vertices: NDArray[_Float],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+) -> NDArray[_Float]:
+    """The quantity of each body: vertices (B, V, 3) -> (B, K)."""
+
+def vjp(
+    template: Template,
+    quantity: str,
+    options: Sequence[float],
+    vertices: NDArray[_Float],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+    d_out: NDArray[_Float],
+) -> NDArray[_Float]:
+    """The gradient of Σ d_out · value by the vertices: d_out (B, K) -> (B, V, 3)."""
+
+def jvp(
+    template: Template,
+    quantity: str,
+    options: Sequence[float],
+    vertices: NDArray[_Float],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+    d_vertices: NDArray[_Float],
+) -> NDArray[_Float]:
+    """The derivative of the value along d_vertices: (B, V, 3) -> (B, K)."""
+
+def vjp_jvp(
+    template: Template,
+    quantity: str,
+    options: Sequence[float],
+    vertices: NDArray[_Float],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+    d_out: NDArray[_Float],
+    d_vertices: NDArray[_Float],
+) -> NDArray[_Float]:
+    """The derivative of vjp(d_out) along d_vertices, a Hessian-vector product: (B, V, 3)."""
+
+def value_and_vjp(
+    template: Template,
+    quantity: str,
+    options: Sequence[float],
+    vertices: NDArray[_Float],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+    d_out: NDArray[_Float],
+) -> tuple[NDArray[_Float], NDArray[_Float]]:
+    """The value (B, K) and the gradient of Σ d_out · value (B, V, 3), in one pass."""
+
+def base_of_support(
+    template: Template,
+    contact_rule: str,
+    method_name: str,
+    threshold: float,
+    vertices: NDArray[Any],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+) -> tuple[list[NDArray[np.float64]], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Polygons (K, 3), areas (B,), margins (B,) and numbers of contacts (B,)."""
+
+def bose_lp(
+    template: Template,
+    contact_rule: str,
+    method_name: str,
+    threshold: float,
+    vertices: NDArray[Any],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """BoSE by the paper's linear programme, (B,)."""
+
+def status(
+    template: Template,
+    contact_rule: str,
+    threshold: float,
+    vertices: NDArray[Any],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+) -> NDArray[np.int64]:
+    """The bits of ipman_rs.Status for each body, (B,)."""
+
+def get_num_threads() -> int:
+    """The number of threads that batches use."""
+
+def set_num_threads(threads: int) -> None:
+    """Sets the number of threads that batches use, 1 to 1024."""

@@ -1,0 +1,7 @@
+"""The command line: `ipman demo` and `ipman analyze`. Heavy imports wait until a command runs."""
+
+from __future__ import annotations
+
+from .commands import main
+
+__all__ = ["main"]

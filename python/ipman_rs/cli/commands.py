@@ -1,0 +1,158 @@
+"""The commands of `ipman` and their options."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .errors import FileError
+from .options import GROUND, PRESETS, UP
+
+if TYPE_CHECKING:
+    from ..view import Study
+
+_CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
+
+_preset = click.option(
+    "--preset", type=click.Choice(PRESETS), default="paper-r", show_default=True, help="Constants of the formulas."
+)
+
+
+def _version(context: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
+    if wanted and not context.resilient_parsing:
+        import ipman_rs as ip
+
+        click.echo(f"ipman {ip.__version__}")
+        context.exit()
+
+
+@click.group(context_settings=_CONTEXT)
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Show the version.")
+def main() -> None:
+    """Intuitive physics of 3D human bodies: pressure, centre of mass, base of support and balance.
+
+    \b
+    ipman demo -o out               the named poses of the built-in body
+    ipman analyze body.obj -o out   your own mesh; open out/report.html afterwards
+    """
+
+
+@main.command()
+@click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Report folder.")
+@_preset
+def demo(output: Path, preset: str) -> None:
+    """Analyse the named poses of the built-in body: a table here, the report in the output folder."""
+    import numpy as np
+
+    import ipman_rs as ip
+
+    from .. import view
+    from . import console
+
+    body = ip.load_body("anny")
+    names = ip.body.poses.NAMES
+    with console.progress("posing and measuring", len(names)) as step:
+        vertices = np.stack([ip.body.posed(body, name) for name in names])
+        study = view.study(
+            "Named poses", vertices, body.template, ip.Ground.y_up(), preset, labels=names, progress=step.to,
+            source="the built-in body “anny”, y up, standing on the plane y = 0",
+        )  # fmt: skip
+    page = _write([study], output, [])
+    console.print_table([study])
+    console.say(f"report: {page}")
+
+
+@main.command()
+@click.argument("bodies", nargs=-1, required=True, metavar="BODY...", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), help="Report folder.")
+@click.option(
+    "--body", "model", default="anny", show_default=True, metavar="NAME|PATH",
+    help="Body model that parameters pose: anny, anny-lite, or an SMPL, SMPL+H or SMPL-X file (.pkl, .npz).",
+)  # fmt: skip
+@click.option(
+    "--up", type=UP, metavar="AXIS", default=None,
+    help="What points up: x, y, z, -x, -y, -z or a normal such as 0,0.1,1. Default: y, and z for AMASS files.",
+)  # fmt: skip
+@click.option(
+    "--ground", type=GROUND, default="auto", show_default=True, metavar="HEIGHT|auto",
+    help="Height of the ground along that axis in metres; auto: the lowest vertex of each body lies on it.",
+)  # fmt: skip
+@click.option(
+    "--parts", type=click.Path(path_type=Path), metavar="FILE",
+    help="Body parts of a mesh: JSON {part: [vertex ids]}, or one label a face (.json, .npy, .npz).",
+)  # fmt: skip
+@_preset
+@click.option("--json", "as_json", is_flag=True, help="Print report.json to stdout and nothing else there.")
+def analyze(
+    bodies: tuple[Path, ...],
+    output: Path | None,
+    model: str,
+    up: tuple[float, float, float] | None,
+    ground: float | None,
+    parts: Path | None,
+    preset: str,
+    as_json: bool,
+) -> None:
+    """Analyse bodies and write a report: report.html, report.json, report.npz and pictures.
+
+    BODY is a mesh in metres (.obj .ply .glb .stl, or .npz with vertices and faces), or the parameters of a body model
+    (.npz: poses/betas/trans as AMASS ships them, or global_orient/body_pose/betas/transl, or pose/betas/transl).
+    Vertices (T, V, 3) and parameters over time are sequences. Several bodies come into one report, each with its own
+    folder of pictures.
+
+    \b
+    ipman analyze scan.ply -o out --up z            a scan of a z-up scanner, its lowest point on the floor
+    ipman analyze smpl.obj -o out --parts parts.json
+    ipman analyze walk_poses.npz -o out --body SMPLH_NEUTRAL.pkl
+    ipman analyze *.obj -o out --ground 0           several bodies on the plane y = 0
+    ipman analyze scan.ply --json | jq .bodies[0].frames[0].margin
+
+    Exit code: 0 when all is well, 1 when a file could not be analysed (the others are), 2 for wrong usage.
+    """
+    if output is None and not as_json:
+        raise click.UsageError("Missing option '-o' / '--output' (or '--json' to print the numbers only).")
+    from . import console
+    from .measure import Request, measure
+
+    request = Request(model=model, up=up, ground=ground, parts=parts, preset=preset)
+    studies: list[Study] = []
+    failures: list[tuple[str, str]] = []
+    for path in bodies:
+        try:
+            studies.append(measure(path, request))
+        except FileError as error:
+            failures.append((str(path), error.what))
+            console.error(str(error))
+    # The report first: a reader that closes stdout early (`| head`) must not cost it.
+    page = _write(studies, output, failures) if studies and output is not None else None
+    if as_json:
+        _print_json(studies, failures)
+    elif studies:
+        console.print_table(studies)
+        console.print_notes(studies)
+        console.say(f"report: {page}")
+    sys.exit(1 if failures else 0)
+
+
+def _write(studies: list[Study], output: Path, failures: list[tuple[str, str]]) -> Path:
+    from ..view.report import count_files, write_report
+    from . import console
+
+    try:
+        with console.progress("writing the report", count_files(studies)) as step:
+            return write_report(studies, output, failures, progress=lambda _name: step.one()).resolve()
+    except OSError as error:
+        console.error(f"{output}: the report cannot be written ({error.strerror or error}); choose another folder")
+        sys.exit(1)
+
+
+def _print_json(studies: list[Study], failures: list[tuple[str, str]]) -> None:
+    import json
+
+    from ..view.record import report_record
+
+    record: dict[str, Any] = report_record(studies, failures)
+    click.echo(json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1))

@@ -1,0 +1,111 @@
+"""What the terminal shows: the table and the notes on stdout, progress, warnings and errors on stderr."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from ..view import Study
+from .errors import one_line
+
+
+def error(text: str) -> None:
+    _line(f"ipman: error: {text}")
+
+
+def warn(text: str) -> None:
+    _line(f"ipman: warning: {text}")
+
+
+def _line(text: str) -> None:
+    import click
+
+    click.echo(one_line(text), err=True)
+
+
+def say(text: str) -> None:
+    import click
+
+    click.echo(text)
+
+
+class Step:
+    """How far a piece of work is: `to` a number, or `one` further."""
+
+    def __init__(self, bar: Progress, total: int, title: str) -> None:
+        self._bar, self._task = bar, bar.add_task(one_line(title), total=total)
+
+    def to(self, done: int) -> None:
+        self._bar.update(self._task, completed=done)
+
+    def one(self) -> None:
+        self._bar.advance(self._task)
+
+
+@contextmanager
+def progress(title: str, total: int) -> Iterator[Step]:
+    """A bar on stderr while the work lasts; nothing where stderr is no terminal."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        yield Step(bar, total, title)
+
+
+def print_table(studies: Sequence[Study]) -> None:
+    """A line for each body or named pose; a recording's line has medians, and the smallest margin of its contacts.
+
+    Stable: the CoM lies over the base of support (BoS).
+    """
+    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
+    table.add_column("body" if not studies[0].labels else "pose", overflow="fold", min_width=14)
+    for title in ("kg", "CoM–CoP mm", "margin mm", "BoS cm²", "contacts", "balance"):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("stable", no_wrap=True)
+    for study in studies:
+        one_each = bool(study.labels) or study.num_frames == 1
+        for frames in range(study.num_frames) if one_each else (slice(None),):
+            table.add_row(*_row(study, frames))
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 120
+    console.print(table)
+
+
+def _row(study: Study, frames: int | slice) -> list[Text]:
+    value = {key: np.atleast_1d(column[frames]) for key, column in study.numbers.items() if column.ndim == 1}
+    single = isinstance(frames, int)
+    name = study.label(frames) if single else f"{study.name} ({study.num_frames} frames)"
+    stable = value["bose"].astype(bool)
+    if single:
+        said = "yes" if stable[0] else ("no" if value["has_contact"][0] else "no contact")
+    else:
+        said = f"{100 * stable.mean():.0f} %"
+    cells = [
+        one_line(name),
+        _number(np.median(value["mass"]), 1, 1),
+        _number(np.median(value["com_cop_distance"]), 1e3, 0),
+        _number(value["margin"].min(where=value["has_contact"], initial=np.inf), 1e3, 0),
+        _number(np.median(value["area"]), 1e4, 0),
+        _number(np.median(value["num_contacts"]), 1, 0),
+        _number(np.median(value["balance"]), 1, 2),
+    ]
+    return [*map(Text, cells), Text(said, style="green" if stable.all() else "red")]
+
+
+def _number(value: float, factor: float, digits: int) -> str:
+    return f"{value * factor:.{digits}f}" if np.isfinite(value) else "–"
+
+
+def print_notes(studies: Sequence[Study]) -> None:
+    """What was assumed, under each body's name."""
+    for study in studies:
+        say("")
+        say(one_line(study.source))
+        for note in study.notes:
+            say(f"  {one_line(note)}")

@@ -1,0 +1,200 @@
+"""Read .npz files: vertices with faces, or the parameters of a body model, one body or a sequence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..body import safe_npz
+from ..body.joints import BODY, SMPL, SMPLH, SMPLX
+from .errors import FileError
+from .meshes import join_seams
+from .parts import match_body
+from .recording import Y_UP, Z_UP, Recording
+
+_EXPECTED = (
+    "expected vertices and faces, or poses/betas/trans (AMASS), or global_orient/body_pose/betas/transl, or "
+    "pose/betas/transl"
+)
+_FRAME_RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
+_LEFT = tuple(name for name in SMPLH if name.startswith("left_") and name not in BODY)
+_RIGHT = tuple(name for name in SMPLH if name.startswith("right_") and name not in BODY)
+# Arrays that hold a piece of the pose, and the joints of that piece by its number of columns / 3.
+_PIECES: dict[str, tuple[tuple[str, ...], ...]] = {
+    "global_orient": (BODY[:1],),
+    "root_orient": (BODY[:1],),
+    "body_pose": (BODY[1:], SMPL[1:]),
+    "pose_body": (BODY[1:], SMPL[1:]),
+    "left_hand_pose": (_LEFT,),
+    "right_hand_pose": (_RIGHT,),
+    "pose_hand": ((*_LEFT, *_RIGHT),),
+    "jaw_pose": (("jaw",),),
+    "pose_jaw": (("jaw",),),
+    "leye_pose": (SMPLX[23:24],),
+    "reye_pose": (SMPLX[24:25],),
+    "pose_eye": (SMPLX[23:25],),
+}
+_WHOLE = (BODY, SMPL, SMPLH, SMPLX)
+
+
+class _Npz:
+    """Arrays of a file by name; nothing in it is executed."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.names = path, safe_npz.names(path)
+
+    def first(self, *names: str) -> np.ndarray | None:
+        """The first of these that is there, as numbers."""
+        for name in names:
+            if name in self.names:
+                array = safe_npz.read(self.path, name)
+                if array.dtype.kind not in "fiu":
+                    raise FileError(self.path, f"{name} holds {array.dtype}, not numbers; save plain numbers")
+                return array
+        return None
+
+
+def read_npz(path: Path, model: str) -> Recording:
+    """The bodies of an .npz file. Raises FileError."""
+    try:
+        stored = _Npz(path)
+        if stored.names & {"vertices", "verts", "v"}:
+            return _read_vertices(stored, model)
+        if stored.names & {"poses", "pose", "fullpose", *_PIECES}:
+            return _read_parameters(stored, model)
+    except ValueError as error:
+        raise FileError(path, str(error)) from error
+    raise FileError(path, f"holds {', '.join(sorted(stored.names))[:120] or 'nothing'}; {_EXPECTED}")
+
+
+def _read_vertices(stored: _Npz, model: str) -> Recording:
+    import ipman_rs as ip
+
+    vertices, faces = stored.first("vertices", "verts", "v"), stored.first("faces", "f")
+    if vertices is None or vertices.ndim not in (2, 3) or vertices.shape[-1] != 3 or 0 in vertices.shape:
+        raise FileError(stored.path, f"vertices have shape {getattr(vertices, 'shape', 0)}, not (V, 3) or (T, V, 3)")
+    vertices = vertices.reshape(-1, *vertices.shape[-2:])
+    if faces is None:
+        body = ip.load_body(model)
+        if body.num_vertices != vertices.shape[1]:
+            what = f"has {vertices.shape[1]} vertices and no faces, but the body {body.name} has {body.num_vertices}"
+            raise FileError(stored.path, f"{what}; add faces, or name the body with --body")
+        faces = body.faces
+    if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0 or faces.dtype.kind not in "iu":
+        raise FileError(stored.path, f"faces are {faces.dtype} {faces.shape}; expected whole numbers (F, 3)")
+    faces = faces.astype(np.int64)
+    if faces.min() < 0 or faces.max() >= vertices.shape[1]:
+        raise FileError(stored.path, f"faces name vertex {faces.max()}, but there are {vertices.shape[1]} vertices")
+    vertex_map = None
+    if len(vertices) == 1 and match_body(faces, vertices.shape[1], model) is None:
+        joined, faces, vertex_map = join_seams(vertices[0], faces)
+        vertices = joined[None]
+    return Recording(
+        stored.path, vertices, faces, vertex_map=vertex_map, seconds=_seconds(stored, len(vertices)), up=Y_UP
+    )
+
+
+def _read_parameters(stored: _Npz, model: str) -> Recording:
+    import ipman_rs as ip
+
+    amass = "poses" in stored.names or "root_orient" in stored.names
+    # AMASS stores absolute hand angles, the smplx package angles relative to the mean hand.
+    body = ip.load_body(model, flat_hand_mean=True) if amass else ip.load_body(model)
+    angles, names = _pose(stored)
+    pose, notes = _onto(angles, names, body)
+    trans = stored.first("trans", "transl")
+    if trans is not None and (trans.shape[-1:] != (3,) or trans.reshape(-1, 3).shape[0] not in (1, len(pose))):
+        raise FileError(stored.path, f"trans has shape {trans.shape}; expected ({len(pose)}, 3)")
+    betas, more = _betas(stored, body, len(pose), amass)
+    vertices = body(
+        pose.astype(np.float32),
+        betas,
+        None if trans is None else np.broadcast_to(trans.reshape(-1, 3), (len(pose), 3)).astype(np.float32),
+    ).vertices
+    if len(pose) == 1:
+        vertices = vertices.astype(np.float64)
+    why = ", as AMASS has it" if amass else ""
+    said = f"body: {body.name}, posed by {len(names)} joints of the file"
+    return Recording(
+        stored.path, vertices, body.faces, body.template, seconds=_seconds(stored, len(pose)),
+        up=Z_UP if amass else Y_UP, up_why=why, notes=(said, *notes, *more),
+    )  # fmt: skip
+
+
+def _pose(stored: _Npz) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Axis-angle (T, J, 3) and the names of its joints."""
+    whole = stored.first("poses", "fullpose", "pose")
+    if whole is not None:
+        by_columns = {3 * len(names): names for names in _WHOLE}
+        by_columns[72] = SMPL
+        if whole.ndim >= 2 and whole.shape[-1] == 3 and 3 * whole.shape[-2] in by_columns:
+            whole = whole.reshape(*whole.shape[:-2], -1)
+        if whole.ndim not in (1, 2) or whole.shape[-1] not in by_columns or whole.size == 0:
+            counts = ", ".join(str(count) for count in sorted(by_columns))
+            raise FileError(stored.path, f"the pose has shape {whole.shape}; expected (T, n) with n of {counts}")
+        names = by_columns[whole.shape[-1]]
+        return whole.reshape(-1, len(names), 3).astype(np.float64), names
+    pieces: list[np.ndarray] = []
+    names: tuple[str, ...] = ()
+    for key, choices in _PIECES.items():
+        piece = stored.first(key)
+        if piece is None:
+            continue
+        if piece.ndim >= 2 and piece.shape[-1] == 3 and piece.shape[-2] in {len(choice) for choice in choices}:
+            piece = piece.reshape(*piece.shape[:-2], -1)
+        joints = next((choice for choice in choices if piece.shape[-1:] == (3 * len(choice),)), None)
+        if joints is None or piece.ndim > 2 or piece.size == 0:
+            counts = " or ".join(str(3 * len(choice)) for choice in choices)
+            raise FileError(stored.path, f"{key} has shape {piece.shape}; expected (T, {counts}) axis-angle")
+        pieces.append(piece.reshape(-1, len(joints), 3).astype(np.float64))
+        names += joints
+    frames = max(len(piece) for piece in pieces)
+    if any(len(piece) not in (1, frames) for piece in pieces):
+        counts = sorted({len(piece) for piece in pieces})
+        raise FileError(stored.path, f"pose arrays have {counts} frames; expected equal numbers")
+    return np.concatenate([np.broadcast_to(p, (frames, *p.shape[1:])) for p in pieces], axis=1), names
+
+
+def _onto(angles: np.ndarray, names: tuple[str, ...], body: Any) -> tuple[np.ndarray, list[str]]:
+    """The pose on the joints that the body has, and what was left out."""
+    pose = np.zeros((len(angles), body.num_joints, 3))
+    left_out = []
+    for k, name in enumerate(names):
+        if name in body.joint_names:
+            pose[:, body.joint_names.index(name)] = angles[:, k]
+        else:
+            left_out.append(name)
+    if not left_out:
+        return pose, []
+    return pose, [f"pose: {len(left_out)} joints are left out, for the body {body.name} has no {_kind(left_out)}"]
+
+
+def _kind(joints: list[str]) -> str:
+    fingers = [name for name in joints if name in _LEFT or name in _RIGHT]
+    others = [name.replace("_", " ") for name in joints if name not in fingers]
+    return " or ".join((["fingers"] if fingers else []) + others)
+
+
+def _betas(stored: _Npz, body: Any, frames: int, amass: bool) -> tuple[np.ndarray | None, list[str]]:
+    import ipman_rs as ip
+
+    betas = stored.first("betas", "shape")
+    if betas is None:
+        return None, ["shape: the body's mean (the file has no betas)"]
+    if amass and body.name in ip.body.embedded.NAMES:
+        return None, [f"shape: the mean of {body.name} (the file's betas belong to SMPL; --body FILE uses them)"]
+    rows = betas.reshape(-1, betas.shape[-1]) if betas.ndim else betas.reshape(1, 1)
+    if len(rows) not in (1, frames):
+        raise FileError(stored.path, f"betas have shape {betas.shape}; expected one row, or {frames}")
+    used = min(rows.shape[1], body.num_betas)
+    notes = [f"shape: the first {used} of {rows.shape[1]} betas"] if used < rows.shape[1] else []
+    return np.broadcast_to(rows[:, :used], (frames, used)).astype(np.float32), notes
+
+
+def _seconds(stored: _Npz, frames: int) -> np.ndarray | None:
+    rate = stored.first(*_FRAME_RATES)
+    if rate is None or frames < 2 or rate.size != 1 or not np.isfinite(rate).all() or rate.reshape(()) <= 0:
+        return None
+    return np.arange(frames) / float(rate.reshape(()))

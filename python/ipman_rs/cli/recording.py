@@ -1,0 +1,34 @@
+"""What a file holds: one body, or a body over time, with its surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Y_UP, Z_UP = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """``vertices`` (T, V, 3) m and ``faces`` (F, 3).
+
+    ``template`` when the file's body model has one; ``vertex_map`` (N,) the vertex that each vertex of the file became,
+    where some were merged; ``seconds`` (T,) of a sequence; ``up`` what the file's kind has pointing up, ``up_why`` why.
+    """
+
+    path: Path
+    vertices: np.ndarray
+    faces: np.ndarray
+    template: Any = None
+    vertex_map: np.ndarray | None = None
+    seconds: np.ndarray | None = None
+    up: tuple[float, float, float] = Y_UP
+    up_why: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def up_name(self) -> str:
+        return "z" if self.up == Z_UP else "y"

@@ -1,0 +1,209 @@
+"""Derivatives of the ops: who calls which verb in reverse, forward and second order, eager and compiled.
+
+    out = f(V)          reverse: vjp(V, d_out)                forward: jvp(V, d_vertices)
+    g = vjp(V, d_out)   reverse: jvp and vjp_jvp              forward: vjp_jvp + vjp
+    t = jvp(V, d_V)     reverse: vjp_jvp and vjp
+
+The Hessian of Σ d_out · out is symmetric, so vjp_jvp serves both modes. Third derivatives are refused. Dynamo takes no
+Function that defines `jvp`, so compiled code gets classes of its own, differentiable once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor
+from torch._C._functorch import is_functorch_wrapped_tensor
+from torch.autograd import Function
+
+from . import ops
+from .folding import fold, unfold
+
+if TYPE_CHECKING:
+    pass
+
+THIRD = "third derivatives (and forward over forward) are not implemented; use jacfwd(jacrev(f)) for a Hessian"
+
+
+class _Op(Function):
+    """What the eager Functions share. Inputs: tensors, then (template, quantity, options).
+
+    The template itself travels, not its key, so that it lives until the backward.
+    """
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
+        *tensors, template, quantity, options = inputs
+        ctx.save_for_backward(*tensors)
+        ctx.save_for_forward(*tensors)
+        ctx.quantity = (template, quantity, options)
+
+    @classmethod
+    def vmap(cls, info: Any, in_dims: Sequence[int | None], *args: Any) -> tuple[Tensor, int]:
+        return unfold(info.batch_size, cls.apply(*fold(info.batch_size, in_dims, args))), 0
+
+
+class Value(_Op):
+    """f(V): vertices, normal, height -> (B, K)."""
+
+    @staticmethod
+    def forward(*args: Any) -> Tensor:
+        *tensors, template, quantity, options = args
+        return ops.value(*tensors, template._key, quantity, options)
+
+    @staticmethod
+    def backward(ctx: Any, d_out: Tensor) -> tuple[Tensor | None, ...]:
+        return Vjp.apply(*ctx.saved_tensors, d_out, *ctx.quantity), None, None, None, None, None
+
+    @staticmethod
+    def jvp(ctx: Any, d_vertices: Tensor, *_: Any) -> Tensor:
+        return Jvp.apply(*ctx.saved_tensors, d_vertices, *ctx.quantity)
+
+
+class Vjp(_Op):
+    """vertices, normal, height, d_out -> Jᵀ d_out (B, V, 3)."""
+
+    @staticmethod
+    def forward(*args: Any) -> Tensor:
+        *tensors, template, quantity, options = args
+        return ops.vjp(*tensors, template._key, quantity, options)
+
+    @staticmethod
+    def backward(ctx: Any, d_gradient: Tensor) -> tuple[Tensor | None, ...]:
+        vertices, normal, height, d_out = ctx.saved_tensors
+        hessian_product = VjpJvp.apply(vertices, normal, height, d_out, d_gradient, *ctx.quantity)
+        d_d_out = Jvp.apply(vertices, normal, height, d_gradient, *ctx.quantity)
+        return hessian_product, None, None, d_d_out, None, None, None
+
+    @staticmethod
+    def jvp(ctx: Any, d_vertices: Tensor, _normal: Any, _height: Any, d_d_out: Tensor, *_: Any) -> Tensor:
+        vertices, normal, height, d_out = ctx.saved_tensors
+        along_vertices = VjpJvp.apply(vertices, normal, height, d_out, d_vertices, *ctx.quantity)
+        return along_vertices + Vjp.apply(vertices, normal, height, d_d_out, *ctx.quantity)
+
+
+class Jvp(_Op):
+    """vertices, normal, height, d_vertices -> J d_vertices (B, K)."""
+
+    @staticmethod
+    def forward(*args: Any) -> Tensor:
+        *tensors, template, quantity, options = args
+        return ops.jvp(*tensors, template._key, quantity, options)
+
+    @staticmethod
+    def backward(ctx: Any, d_out: Tensor) -> tuple[Tensor | None, ...]:
+        vertices, normal, height, d_vertices = ctx.saved_tensors
+        hessian_product = VjpJvp.apply(vertices, normal, height, d_out, d_vertices, *ctx.quantity)
+        return hessian_product, None, None, Vjp.apply(vertices, normal, height, d_out, *ctx.quantity), None, None, None
+
+    @staticmethod
+    def jvp(ctx: Any, *_: Any) -> Tensor:
+        raise NotImplementedError(THIRD)
+
+
+class VjpJvp(_Op):
+    """vertices, normal, height, d_out, d_vertices -> Hessian of d_out · f times d_vertices (B, V, 3)."""
+
+    @staticmethod
+    def forward(*args: Any) -> Tensor:
+        *tensors, template, quantity, options = args
+        return ops.vjp_jvp(*tensors, template._key, quantity, options)
+
+    @staticmethod
+    def backward(ctx: Any, *_: Any) -> Any:
+        raise NotImplementedError(THIRD)
+
+    @staticmethod
+    def jvp(ctx: Any, *_: Any) -> Tensor:
+        raise NotImplementedError(THIRD)
+
+
+class Weighted(Function):
+    """One pass: vertices, normal, height, weights (B, K) -> totals (B,), values (B, K), gradient of the totals' sum.
+
+    Only the totals Σ_k weights · values are differentiable. The gradient waits for the backward, which scales it by its
+    upstream in place and hands it over; a second backward through the same graph computes it again.
+    """
+
+    @staticmethod
+    def forward(*args: Any) -> tuple[Tensor, Tensor, Tensor]:
+        *tensors, template, quantity, options = args
+        values, gradient = ops.value_and_vjp(*tensors, template._key, quantity, options)
+        return (values * tensors[-1]).sum(dim=-1), values, gradient
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
+        *tensors, template, quantity, options = inputs
+        ctx.save_for_backward(*tensors)
+        ctx.save_for_forward(*tensors)
+        ctx.quantity = (template, quantity, options)
+        ctx.gradient = output[2]
+        ctx.mark_non_differentiable(*output[1:])
+        ctx.set_materialize_grads(False)
+
+    @staticmethod
+    def backward(ctx: Any, d_totals: Tensor | None, *_: Any) -> tuple[Tensor | None, ...]:
+        nothing = (None,) * 6
+        if d_totals is None:
+            return None, *nothing
+        vertices, normal, height, weights = ctx.saved_tensors
+        gradient, ctx.gradient = ctx.gradient, None
+        if gradient is None or torch.is_grad_enabled() or is_functorch_wrapped_tensor(d_totals):
+            return Vjp.apply(vertices, normal, height, weights * d_totals[:, None], *ctx.quantity), *nothing
+        if not bool((d_totals == 1).all()):
+            gradient.mul_(d_totals[:, None, None])
+        return gradient, *nothing
+
+    @staticmethod
+    def jvp(ctx: Any, d_vertices: Tensor, *_: Any) -> tuple[Tensor, None, None]:
+        vertices, normal, height, weights = ctx.saved_tensors
+        d_values = Jvp.apply(vertices, normal, height, d_vertices, *ctx.quantity)
+        return (d_values * weights).sum(dim=-1), None, None
+
+    @staticmethod
+    def vmap(info: Any, in_dims: Sequence[int | None], *args: Any) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
+        outputs = Weighted.apply(*fold(info.batch_size, in_dims, args))
+        return tuple(unfold(info.batch_size, output) for output in outputs), (0, 0, 0)
+
+
+class CompiledValue(Function):
+    """`Value` for torch.compile."""
+
+    @staticmethod
+    def forward(
+        ctx: Any, vertices: Tensor, normal: Tensor, height: Tensor, key: int, quantity: str, options: list[float]
+    ) -> Tensor:
+        ctx.save_for_backward(vertices, normal, height)
+        ctx.quantity = (key, quantity, options)
+        return ops.value(vertices, normal, height, key, quantity, options)
+
+    @staticmethod
+    def backward(ctx: Any, d_out: Tensor) -> tuple[Tensor | None, ...]:
+        return ops.vjp(*ctx.saved_tensors, d_out, *ctx.quantity), None, None, None, None, None
+
+
+class CompiledWeighted(Function):
+    """`Weighted` for torch.compile: totals and values."""
+
+    @staticmethod
+    def forward(
+        ctx: Any,
+        vertices: Tensor,
+        normal: Tensor,
+        height: Tensor,
+        weights: Tensor,
+        key: int,
+        quantity: str,
+        options: list[float],
+    ) -> tuple[Tensor, Tensor]:
+        values, gradient = ops.value_and_vjp(vertices, normal, height, weights, key, quantity, options)
+        ctx.save_for_backward(gradient)
+        ctx.mark_non_differentiable(values)
+        return (values * weights).sum(dim=-1), values
+
+    @staticmethod
+    def backward(ctx: Any, d_totals: Tensor, *_: Any) -> tuple[Tensor | None, ...]:
+        (gradient,) = ctx.saved_tensors
+        return gradient * d_totals[:, None, None], None, None, None, None, None, None

@@ -1,0 +1,139 @@
+"""From the public functions to the path that computes: batch dimensions, dtypes, devices, compiled code.
+
+CPU tensors go to the compiled core, all others to the plain-torch reference.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, NamedTuple
+
+import torch
+from torch import Tensor
+
+from ipman_rs import Ground as NumpyGround
+
+from . import reference
+from .autograd import CompiledValue, CompiledWeighted, Value, Weighted
+from .ground import Ground, as_ground
+
+if TYPE_CHECKING:
+    from ipman_rs import BodyTemplate
+
+_forced = False
+
+
+@contextmanager
+def _reference_path() -> Iterator[None]:
+    """Send CPU tensors along the path of other devices too: for tests and comparisons."""
+    global _forced
+    before, _forced = _forced, True
+    try:
+        yield
+    finally:
+        _forced = before
+
+
+class Bodies(NamedTuple):
+    """Arguments in the shape of the ops: vertices (B, V, 3) in the computing dtype, normal (B, 3), height (B,)."""
+
+    vertices: Tensor
+    normal: Tensor
+    height: Tensor
+    batch_shape: torch.Size
+
+
+_ANY_GROUND = Ground((0.0, 1.0, 0.0), 0.0)
+
+
+def bodies(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround | None) -> Bodies:
+    """Check the arguments and fold the batch dimensions into one.
+
+    Raises:
+        TypeError: vertices is no floating-point tensor.
+        ValueError: vertices does not fit the template, the ground does not broadcast against it, or it requires grad.
+    """
+    if not isinstance(vertices, Tensor) or not vertices.is_floating_point():
+        got = vertices.dtype if isinstance(vertices, Tensor) else type(vertices).__name__
+        raise TypeError(f"vertices: expected a floating-point tensor, got {got}; numpy arrays go to ipman_rs itself")
+    if vertices.ndim < 2 or vertices.shape[-2:] != (template.num_vertices, 3):
+        raise ValueError(
+            f"vertices: expected shape (..., {template.num_vertices}, 3) for this template, got {tuple(vertices.shape)}"
+        )
+    batch_shape = vertices.shape[:-2]
+    plane = _ANY_GROUND if ground is None else as_ground(ground)
+    if plane.normal.requires_grad or plane.height.requires_grad:
+        raise ValueError("ground: a ground that requires grad is not differentiable here; detach its tensors")
+    floating = torch.promote_types(vertices.dtype, torch.float32)
+    if vertices.dtype != floating:
+        vertices = vertices.to(floating)
+    if vertices.ndim != 3:
+        vertices = vertices.reshape(math.prod(batch_shape), *vertices.shape[-2:])
+    try:
+        normal, height = plane.normal.expand(*batch_shape, 3), plane.height.expand(batch_shape)
+    except RuntimeError:
+        raise ValueError(
+            f"ground: normal {tuple(plane.normal.shape)} and height {tuple(plane.height.shape)} do not broadcast to "
+            f"the batch {tuple(batch_shape)}; give one plane, or one a body"
+        ) from None
+    if len(batch_shape) != 1:
+        normal, height = normal.reshape(len(vertices), 3), height.reshape(len(vertices))
+    return Bodies(vertices, normal, height, batch_shape)
+
+
+def evaluate(
+    vertices: Tensor,
+    template: BodyTemplate,
+    ground: Ground | NumpyGround | None,
+    quantity: str,
+    options: Sequence[float],
+    shape: tuple[int, ...],
+) -> Tensor:
+    """`quantity` of vertices (..., V, 3) as (..., *shape), in the dtype of vertices, differentiable in vertices."""
+    batch = bodies(vertices, template, ground)
+    values = values_of(batch, template, quantity, options).reshape((*batch.batch_shape, *shape))
+    return values if values.dtype == vertices.dtype else values.to(vertices.dtype)
+
+
+def values_of(batch: Bodies, template: BodyTemplate, quantity: str, options: Sequence[float]) -> Tensor:
+    """`quantity` of a checked batch: (B, K)."""
+    numbers = [float(option) for option in options]
+    vertices = batch.vertices
+    if _on_reference(vertices):
+        normal, height = batch.normal.to(vertices), batch.height.to(vertices)
+        return reference.evaluate(template, quantity, numbers, vertices, normal, height)
+    normal, height = _for_core(batch)
+    if torch.compiler.is_compiling():
+        return CompiledValue.apply(vertices, normal, height, template._key, quantity, numbers)
+    return Value.apply(vertices, normal, height, template, quantity, numbers)
+
+
+def weighted_values_of(
+    batch: Bodies, template: BodyTemplate, quantity: str, options: Sequence[float], weights: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Σ_k weights (B, K) · values (B,), differentiable, and the values (B, K), detached.
+
+    Where a gradient will be asked for, it is computed in the same pass.
+    """
+    vertices = batch.vertices
+    fused = vertices.requires_grad and torch.is_grad_enabled() and not _on_reference(vertices)
+    if not fused:
+        values = values_of(batch, template, quantity, options)
+        return (values * weights).sum(dim=-1), values.detach()
+    normal, height = _for_core(batch)
+    numbers = [float(option) for option in options]
+    if torch.compiler.is_compiling():
+        return CompiledWeighted.apply(vertices, normal, height, weights, template._key, quantity, numbers)
+    outputs = Weighted.apply(vertices, normal, height, weights, template, quantity, numbers)
+    return outputs[0], outputs[1]
+
+
+def _on_reference(vertices: Tensor) -> bool:
+    return _forced or vertices.device.type != "cpu"
+
+
+def _for_core(batch: Bodies) -> tuple[Tensor, Tensor]:
+    """normal and height as the core takes them, wherever they came from."""
+    return batch.normal.to("cpu", torch.float64), batch.height.to("cpu", torch.float64)

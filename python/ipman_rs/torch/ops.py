@@ -1,0 +1,106 @@
+"""The five verbs of the compiled core as dispatcher ops: torch.ops.ipman_rs.{value, vjp, jvp, vjp_jvp, value_and_vjp}.
+
+vertices (B, V, 3) float32 or float64, normal (B, 3) and height (B,) float64, d_out (B, K) and d_vertices (B, V, 3) in
+the dtype of vertices. A template travels as its process-wide key, because a schema cannot carry an object. These ops
+have no autograd of their own: `autograd.py` wraps them. CPU only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor
+
+from ipman_rs import _core
+from ipman_rs.template import by_key
+
+from .folding import fold, unfold
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+GROUND = "Tensor vertices, Tensor normal, Tensor height"
+QUANTITY = "int template_key, str quantity, float[] options"
+
+SCHEMAS = {
+    "value": f"({GROUND}, {QUANTITY}) -> Tensor",
+    "vjp": f"({GROUND}, Tensor d_out, {QUANTITY}) -> Tensor",
+    "jvp": f"({GROUND}, Tensor d_vertices, {QUANTITY}) -> Tensor",
+    "vjp_jvp": f"({GROUND}, Tensor d_out, Tensor d_vertices, {QUANTITY}) -> Tensor",
+    "value_and_vjp": f"({GROUND}, Tensor d_out, {QUANTITY}) -> (Tensor, Tensor)",
+}
+
+
+def output_size(template_key: int, quantity: str, options: Sequence[float]) -> int:
+    """Numbers a body: K."""
+    return _core.output_size(by_key(template_key)._core, quantity, list(options))
+
+
+def _compiled(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """The CPU implementation of an op: `verb` of the core on the tensors' memory."""
+
+    def implementation(*args: Any) -> Any:
+        *tensors, template_key, quantity, options = args
+        vertices, normal, height, *directions = (_array(tensor) for tensor in tensors)
+        core = by_key(template_key)._core
+        result = verb(core, quantity, options, vertices, normal, height, *directions)
+        if isinstance(result, tuple):
+            return tuple(torch.from_numpy(array) for array in result)
+        return torch.from_numpy(result)
+
+    return implementation
+
+
+def _array(tensor: Tensor) -> NDArray[Any]:
+    """The tensor's memory, copied only if it is not contiguous."""
+    return tensor.contiguous().numpy(force=True)
+
+
+def _fake_output(vertices: Tensor, normal: Tensor, height: Tensor, *rest: Any) -> Tensor:
+    return vertices.new_empty(vertices.shape[0], output_size(*rest[-3:]))
+
+
+def _fake_vertices(vertices: Tensor, *rest: Any) -> Tensor:
+    return vertices.new_empty(vertices.shape)
+
+
+def _fake_both(*args: Any) -> tuple[Tensor, Tensor]:
+    return _fake_output(*args), _fake_vertices(*args)
+
+
+FAKES: dict[str, Callable[..., Any]] = {
+    "value": _fake_output,
+    "vjp": _fake_vertices,
+    "jvp": _fake_output,
+    "vjp_jvp": _fake_vertices,
+    "value_and_vjp": _fake_both,
+}
+
+
+def _batched(op: Callable[..., Any]) -> Callable[..., Any]:
+    """The vmap rule of an op: one call with the mapped axis folded into the batch."""
+
+    def rule(info: Any, in_dims: Sequence[int | None], *args: Any) -> tuple[Any, Any]:
+        result = op(*fold(info.batch_size, in_dims, args))
+        if isinstance(result, tuple):
+            return tuple(unfold(info.batch_size, part) for part in result), (0,) * len(result)
+        return unfold(info.batch_size, result), 0
+
+    return rule
+
+
+_library = torch.library.Library("ipman_rs", "FRAGMENT")
+for _name, _schema in SCHEMAS.items():
+    _library.define(_name + _schema, tags=(torch.Tag.pt2_compliant_tag,))
+    _library.impl(_name, _compiled(getattr(_core, _name)), "CPU")
+    torch.library.register_fake(f"ipman_rs::{_name}", FAKES[_name], lib=_library)
+    _op = getattr(torch.ops.ipman_rs, _name).default
+    torch.library.register_vmap(f"ipman_rs::{_name}", _batched(_op), lib=_library)
+
+value: Callable[..., Tensor] = torch.ops.ipman_rs.value.default
+vjp: Callable[..., Tensor] = torch.ops.ipman_rs.vjp.default
+jvp: Callable[..., Tensor] = torch.ops.ipman_rs.jvp.default
+vjp_jvp: Callable[..., Tensor] = torch.ops.ipman_rs.vjp_jvp.default
+value_and_vjp: Callable[..., tuple[Tensor, Tensor]] = torch.ops.ipman_rs.value_and_vjp.default

@@ -1,0 +1,30 @@
+"""Pressure by height, and its centre (paper §3.2)."""
+
+from __future__ import annotations
+
+from torch import Tensor
+
+from ipman_rs import BodyTemplate
+from ipman_rs import Ground as NumpyGround
+
+from .dispatch import evaluate
+from .ground import Ground
+
+
+def pressure(
+    vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround, alpha: float = 100.0, gamma: float = 10.0
+) -> Tensor:
+    """Relative pressure of each sample: 1 − αh below the ground, e^{−γh} from it upwards: (..., V, 3) -> (..., S)."""
+    return evaluate(vertices, template, ground, "pressure", (alpha, gamma), (template.num_samples,))
+
+
+def center_of_pressure(
+    vertices: Tensor,
+    template: BodyTemplate,
+    ground: Ground | NumpyGround,
+    alpha: float = 100.0,
+    gamma: float = 10.0,
+    epsilon: float = 0.0,
+) -> Tensor:
+    """Σ ρ v / (Σ ρ + ε): vertices (..., V, 3) -> (..., 3), m; finite for hovering bodies when ε = 0."""
+    return evaluate(vertices, template, ground, "center_of_pressure", (alpha, gamma, epsilon), (3,))

@@ -1,0 +1,84 @@
+"""Base of support: hull, containment, and the margin with its gradient."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal, get_args
+
+import torch
+from torch import Tensor
+
+import ipman_rs as ip
+from ipman_rs import BaseOfSupport, BodyTemplate
+from ipman_rs import Ground as NumpyGround
+from ipman_rs.mass import Method
+from ipman_rs.support import Contact
+
+from .choice import chosen, positive
+from .dispatch import evaluate
+from .ground import Ground, as_numpy_ground
+from .mass import COM_METHODS
+
+CONTACTS: tuple[Contact, ...] = get_args(Contact)
+
+
+def support_margin(
+    vertices: Tensor,
+    template: BodyTemplate,
+    ground: Ground | NumpyGround,
+    threshold: float = 0.1,
+    method: Method = "pcom",
+    contact: Contact = "paper",
+) -> Tensor:
+    """Metres from the CoM to the boundary of the base of support, positive inside: vertices (..., V, 3) -> (...).
+
+    −inf, with gradient 0, without contact. The gradient goes to the CoM and to the samples that span the nearest edge.
+    contact: "paper" |h| < τ, or "released" h < τ where ten contacts or fewer count for none.
+    """
+    quantity = f"support_margin.{chosen('contact', contact, CONTACTS)}.{chosen('method', method, COM_METHODS)}"
+    return evaluate(vertices, template, ground, quantity, (positive("threshold", threshold),), ())
+
+
+def base_of_support(
+    vertices: Tensor,
+    template: BodyTemplate,
+    ground: Ground | NumpyGround,
+    threshold: float = 0.1,
+    method: Method = "pcom",
+    contact: Contact = "paper",
+) -> BaseOfSupport:
+    """`ipman_rs.base_of_support` with tensors in its fields, on the device of vertices; `margin` is differentiable."""
+    found = ip.base_of_support(as_array(vertices), template, as_numpy_ground(ground), threshold, method, contact)
+
+    def tensors(value: Any) -> Any:
+        if isinstance(value, list):
+            return [tensors(entry) for entry in value]
+        tensor = torch.as_tensor(value, device=vertices.device)
+        return tensor.to(vertices.dtype) if tensor.is_floating_point() else tensor
+
+    on_device = replace(found, **{name: tensors(value) for name, value in vars(found).items()})
+    return replace(on_device, margin=support_margin(vertices, template, ground, threshold, method, contact))
+
+
+def bose(
+    vertices: Tensor,
+    template: BodyTemplate,
+    ground: Ground | NumpyGround,
+    threshold: float = 0.1,
+    method: Literal["hull", "lp"] = "hull",
+    com_method: Method = "pcom",
+    contact: Contact = "paper",
+) -> Tensor:
+    """Whether the CoM lies over the base of support: vertices (..., V, 3) -> bool (...); not differentiable.
+
+    "hull" is margin >= 0, on any device; "lp" is the paper's linear programme, solved on the CPU.
+    """
+    if chosen("method", method, ("hull", "lp")) == "hull":
+        return support_margin(vertices.detach(), template, ground, threshold, com_method, contact) >= 0
+    inside = ip.bose(as_array(vertices), template, as_numpy_ground(ground), threshold, "lp", com_method, contact)
+    return torch.as_tensor(inside, device=vertices.device)
+
+
+def as_array(vertices: Tensor) -> Any:
+    """Detached, on the CPU, in a dtype numpy has."""
+    return vertices.detach().to(torch.promote_types(vertices.dtype, torch.float32)).numpy(force=True)

@@ -1,0 +1,129 @@
+"""The page of a report: one HTML file with its data, style and viewer inside, which asks the network for nothing."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Sequence
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from . import colors
+from .picture import heat_top
+from .record import plain, status_names
+from .study import Study
+from .timeline import SERIES
+
+# Columns that the page shows for every frame.
+_SHOWN = (
+    "volume", "mass", "com_cop_distance", "area", "margin", "has_contact", "num_contacts", "bose", "stability", "pull",
+    "push", "balance", "lowest",
+)  # fmt: skip
+
+
+def page(studies: Sequence[Study], failures: Sequence[tuple[str, str]] = ()) -> str:
+    """The HTML text. Names and messages are escaped wherever they stand, inside the data too."""
+    from jinja2 import Environment, select_autoescape
+    from markupsafe import Markup
+
+    import ipman_rs as ip
+
+    folder = files("ipman_rs.view") / "page"
+    environment = Environment(autoescape=select_autoescape(default=True, default_for_string=True))
+    data = {
+        "bodies": [_body(study) for study in studies],
+        "heat": _base64(np.round(colors.heat_table() * 255).astype(np.uint8)),
+        "series": [{"key": key, "title": title, "unit": unit, "factor": factor, "color": color}
+                   for key, title, unit, factor, color in SERIES],
+        "colors": {"com": colors.COM, "cop": colors.COP, "support": colors.SUPPORT, "edge": colors.SUPPORT_EDGE},
+        "partColors": list(colors.PART_COLORS),
+    }  # fmt: skip
+    stops = colors.heat_table(9)
+    return environment.from_string((folder / "page.html").read_text(encoding="utf-8")).render(
+        title=studies[0].name if len(studies) == 1 else f"{len(studies)} bodies",
+        version=ip.__version__,
+        studies=studies,
+        failures=failures,
+        data=Markup(script_json(data)),
+        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
+        scene=Markup((folder / "scene.js").read_text(encoding="utf-8")),
+        script=Markup((folder / "page.js").read_text(encoding="utf-8")),
+        gradient=", ".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in stops * 255),
+        colors=data["colors"],
+    )
+
+
+def script_json(value: Any) -> str:
+    """Strict JSON that cannot end the <script> element it stands in."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _body(study: Study) -> dict[str, Any]:
+    keys = study.key_frames
+    vertices = _floor_axes(study, study.vertices[keys])
+    finite = np.isfinite(vertices)
+    low = np.array([vertices[..., k][finite[..., k]].min(initial=np.inf) for k in range(3)])
+    high = np.array([vertices[..., k][finite[..., k]].max(initial=-np.inf) for k in range(3)])
+    low, high = (np.where(np.isfinite(edge), edge, 0.0) for edge in (low, high))
+    step = np.maximum((high - low) / 65535.0, 1e-12)
+    packed = np.round((np.where(finite, vertices, low) - low) / step).astype("<u2")
+    small = study.template.num_vertices <= 65535
+    return {
+        "name": study.name,
+        "source": study.source,
+        "notes": list(study.notes),
+        "method": study.com_method,
+        "preset": study.preset.name,
+        "alpha": study.preset.alpha,
+        "gamma": study.preset.gamma,
+        "top": heat_top(study),
+        "parts": list(study.template.part_names),
+        "labels": [study.label(frame) for frame in range(study.num_frames)],
+        "named": bool(study.labels),
+        "seconds": plain(study.seconds),
+        "keyFrames": plain(keys),
+        "broken": [not bool(finite[k].all()) for k in range(len(keys))],
+        "numVertices": int(study.template.num_vertices),
+        "low": plain(low),
+        "step": plain(step),
+        "vertices": _base64(packed),
+        "faces": _base64(study.template.faces.astype("<u2" if small else "<u4")),
+        "wide": not small,
+        "vertexParts": _base64(_vertex_parts(study)),
+        "polygons": [plain(np.round(_floor_axes(study, study.polygons[frame]), 5)) for frame in keys],
+        "com": _points(study, "center_of_mass"),
+        "cop": _points(study, "center_of_pressure"),
+        "status": [status_names(status) for status in study.numbers["status"]],
+        "numbers": {key: plain(_short(study.numbers[key])) for key in _SHOWN},
+        "partVolumes": plain(_short(study.numbers["part_volumes"][keys])),
+    }
+
+
+def _floor_axes(study: Study, points: np.ndarray) -> np.ndarray:
+    """Points in the page's axes: y up from the ground, whatever is up in the input."""
+    e1, e2 = study.ground.axes()
+    points = np.asarray(points, dtype=np.float64)
+    return np.stack([points @ e1, study.ground.signed_height(points), -(points @ e2)], axis=-1)
+
+
+def _points(study: Study, key: str) -> list[Any]:
+    return plain(np.round(_floor_axes(study, study.numbers[key]), 5))
+
+
+def _short(column: np.ndarray) -> np.ndarray:
+    """Eight digits are more than the page shows."""
+    return np.char.mod("%.8g", column).astype(float) if column.dtype.kind == "f" else column
+
+
+def _vertex_parts(study: Study) -> np.ndarray:
+    """(V,) uint8 colour index of each vertex: the part of one of its faces."""
+    parts = np.zeros(study.template.num_vertices, dtype=np.int64)
+    parts[study.template.faces] = study.template.face_parts[:, None]
+    return (parts % len(colors.PART_COLORS)).astype(np.uint8)
+
+
+def _base64(array: np.ndarray) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

@@ -1,0 +1,97 @@
+"""Write a report: `report.html`, `report.json`, `report.npz` and the pictures, all inside one folder."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from .floor import draw_floor_view
+from .html import page
+from .picture import draw_picture
+from .record import report_record, study_arrays
+from .study import Study
+from .timeline import draw_timeline
+
+
+def write_report(
+    studies: Sequence[Study],
+    directory: Path,
+    failures: Sequence[tuple[str, str]] = (),
+    progress: Callable[[str], None] = lambda written: None,
+) -> Path:
+    """Write the report of one or more studies into ``directory`` and return the path of its page.
+
+    `report.html` and `report.json` cover all studies. `report.npz` and the pictures of a single study lie beside them,
+    those of several studies in a folder each, named after the study. ``failures`` are (file, error) pairs to be told in
+    the report; ``progress`` is called with the name of each file written. Raises OSError where nothing can be written.
+    """
+    directory = Path(directory)
+    directory.mkdir(parents=True, exist_ok=True)
+    record = json.dumps(report_record(studies, failures), allow_nan=False, ensure_ascii=False, indent=1)
+    (directory / "report.json").write_text(record + "\n", encoding="utf-8")
+    progress("report.json")
+    names = safe_names([study.name for study in studies])
+    for study, name in zip(studies, names, strict=True):
+        folder = directory if len(studies) == 1 else directory / name
+        folder.mkdir(exist_ok=True)
+        for written in _write_study(study, folder):
+            progress(written)
+    path = directory / "report.html"
+    path.write_text(page(studies, failures), encoding="utf-8")
+    progress("report.html")
+    return path
+
+
+def count_files(studies: Sequence[Study]) -> int:
+    """How many files `write_report` will write: the length of its progress bar."""
+    return 2 + sum(1 + 2 * len(pictured(study)) + _has_timeline(study) for study in studies)
+
+
+def pictured(study: Study) -> list[int]:
+    """The frames that get pictures: all named ones; of a recording the first, the last, the least stable ones."""
+    if study.labels or study.num_frames == 1:
+        return list(range(study.num_frames))
+    chosen = {0, study.num_frames - 1}
+    for key, worst in (("margin", np.nanargmin), ("com_cop_distance", np.nanargmax)):
+        column = np.where(np.isfinite(study.numbers[key]), study.numbers[key], np.nan)
+        if np.isfinite(column).any():
+            chosen.add(int(worst(column)))
+    return sorted(chosen)
+
+
+def _has_timeline(study: Study) -> bool:
+    return study.num_frames > 1 and not study.labels
+
+
+def _write_study(study: Study, folder: Path) -> Iterator[str]:
+    np.savez_compressed(folder / "report.npz", allow_pickle=False, **study_arrays(study))
+    yield "report.npz"
+    frames = pictured(study)
+    digits = len(str(study.num_frames))
+    labels = safe_names([study.labels[frame] if study.labels else f"{frame:0{digits}d}" for frame in frames])
+    for frame, label in zip(frames, labels, strict=True):
+        end = "" if study.num_frames == 1 else f"_{label}"
+        for draw, kind in ((draw_picture, "perspective"), (draw_floor_view, "floor")):
+            draw(study, frame, folder / f"{kind}{end}.png")
+            yield f"{kind}{end}.png"
+    if _has_timeline(study):
+        draw_timeline(study, folder / "timeline.png")
+        yield "timeline.png"
+
+
+def safe_names(names: Sequence[str]) -> list[str]:
+    """File names from any text: letters, digits, dot, dash and underscore, never hidden, never a path, never twice."""
+    taken: set[str] = set()
+    result = []
+    for name in names:
+        base = re.sub(r"[^\w.-]+", "_", name, flags=re.ASCII).strip("._-")[:80] or "body"
+        candidate, number = base, 2
+        while candidate.lower() in taken:
+            candidate, number = f"{base}_{number}", number + 1
+        taken.add(candidate.lower())
+        result.append(candidate)
+    return result
