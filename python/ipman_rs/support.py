@@ -55,9 +55,8 @@ def base_of_support(
         method: the centre of mass whose margin is taken.
     """
     bodies = Bodies(vertices, template)
-    found = _core.base_of_support(
-        template._core, contact, method, positive("threshold", threshold), *bodies.over(ground)
-    )
+    question = _question(contact, method, "method", threshold)
+    found = _core.base_of_support(template._core, *question, *bodies.over(ground))
     polygons, area, margin, num_contacts = found
     dtype = bodies.vertices.dtype
     return BaseOfSupport(

@@ -27,7 +27,7 @@ class BodyOutput:
     joints: NDArray[np.floating]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BodyModel:
     """A body that shape and pose parameters move. Arrays are float64; V vertices, J joints, B betas, E expressions.
 
@@ -53,6 +53,9 @@ class BodyModel:
     up: str = "y"
 
     part_names = PART_NAMES
+
+    def __repr__(self) -> str:
+        return f"BodyModel({self.name!r}, {self.num_vertices} vertices, {self.num_joints} joints, {self.num_betas} betas)"
 
     @property
     def num_vertices(self) -> int:

@@ -28,7 +28,7 @@ def read(path: Path, name: str) -> NDArray[Any]:
         with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as stream:
             packed = archive.getinfo(f"{name}.npy")
             if packed.file_size > MAX_BYTES:
-                raise ValueError(f"unpacks to {packed.file_size} bytes, more than any body model has ({MAX_BYTES})")
+                raise ValueError(f"unpacks to {packed.file_size} bytes, more than the {MAX_BYTES} that are read")
             reader = npy.read_array_header_1_0 if npy.read_magic(stream)[0] == 1 else npy.read_array_header_2_0
             shape, fortran, dtype = reader(stream)
             if dtype.hasobject:

@@ -24,10 +24,10 @@ pub enum Error {
     )]
     MixedWinding { first: usize, second: usize, a: usize, b: usize },
     #[error(
-        "faces: the surface is inside out (signed volume {volume:.3e} m³ < 0); reverse every face (faces[:, ::-1])"
+        "faces: the surface is inside out (signed volume {volume:.6} m³); reverse every face (faces[:, ::-1])"
     )]
     InsideOut { volume: f64 },
-    #[error("vertices: the template encloses no volume ({volume:.3e} m³): is it a closed body, or a flat sheet?")]
+    #[error("vertices: the template encloses no volume ({volume:.6} m³): is it a closed body, or a flat sheet?")]
     NoVolume { volume: f64 },
     #[error("face_parts: expected {expected} labels, one for each face, got {got}")]
     PartCount { expected: usize, got: usize },

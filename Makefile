@@ -1,0 +1,118 @@
+# On a machine with Rust, Python >= 3.10 and make: `make demo` and `make test` do all their own set-up, in .venv.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+VENV := .venv
+BIN := $(VENV)/bin
+OUT ?= out/demo
+
+# PYTHON=python3.12 make … chooses for a new .venv; otherwise the first of these that is new enough.
+NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 10))
+ifndef PYTHON
+PYTHON := $(shell for python in python3 python3.14 python3.13 python3.12 python3.11 python3.10; do \
+	$$python -c '$(NEW_ENOUGH)' 2>/dev/null && echo $$python && break; done)
+endif
+
+# Cargo and maturin must see our environment, whichever one is active in the shell.
+export VIRTUAL_ENV := $(CURDIR)/$(VENV)
+export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+unexport CONDA_PREFIX PYTHONHOME PYTHONPATH
+MATURIN_DEVELOP = maturin develop --release --locked $$([ -x $(BIN)/uv ] && echo --uv)
+PIP = $$([ -x $(BIN)/uv ] && echo uv pip || echo python -m pip)
+
+# What the compiled module is made of; the folders too, so that a deleted file counts.
+SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard rust-toolchain.toml) \
+	$(shell find rust -type d -o -name '*.rs' -o -name Cargo.toml)
+BINARY := python/ipman_rs/_core.abi3.so
+
+.PHONY: help demo test test-rust test-python lint format wheel bench clean FORCE
+
+help:
+	@echo 'make demo     the named poses of the embedded body, analysed: table, pictures and report in $(OUT)'
+	@echo 'make test     every test, Rust and Python (installs torch and the test tools)'
+	@echo 'make lint     formats and lints checked, nothing changed'
+	@echo 'make format   sources formatted'
+	@echo 'make wheel    one wheel for all Pythons >= 3.10 in dist/, tried alone in a clean environment'
+	@echo 'make bench    microseconds a body, beside plain torch'
+	@echo 'make clean    remove what was built (.venv, target, out, dist)'
+	@echo 'PYTHON=python3.12 make …   chooses the interpreter of a new .venv'
+
+demo: $(VENV)/built
+	ipman demo -o $(OUT)
+	@echo
+	@echo 'The report: $(abspath $(OUT))/report.html   (numbers: report.json and report.npz, pictures: *.png)'
+
+test: test-rust test-python
+	@echo
+	@echo 'All tests passed: Rust (cargo) and Python (pytest).'
+
+test-rust:
+	if cargo nextest --version >/dev/null 2>&1; then cargo nextest run --locked && cargo test --locked --doc; \
+	else cargo test --locked; fi
+
+# One process a core, one thread each: torch would otherwise start its threads in every process.
+test-python: $(VENV)/test-tools $(VENV)/browser | test-rust
+	OMP_NUM_THREADS=1 python -m pytest -n auto $(PYTEST_ARGS)
+
+lint: $(VENV)/test-tools $(VENV)/lint-tools
+	cargo fmt --all --check
+	cargo clippy --locked --workspace --all-targets -- -D warnings
+	ruff check
+	ruff format --check
+	pyright
+	python tools/third_party_notices.py --check
+
+format: $(VENV)/lint-tools
+	cargo fmt --all
+	ruff check --fix
+	ruff format
+
+wheel: $(VENV)/wheel-tools
+	rm -rf dist
+	maturin build --release --locked --out dist $(if $(filter Linux,$(shell uname)),--zig --compatibility manylinux2014)
+	tools/check_wheel.sh dist/*.whl
+
+bench: $(VENV)/test-tools
+	python benchmarks/torch_path.py
+
+clean:
+	rm -rf $(VENV) target out dist $(BINARY)
+
+# Set-up: each stamp stands for a step that need not be done again until what it depends on changes.
+
+$(VENV)/created:
+	@[ -n "$(PYTHON)" ] && $(PYTHON) -c '$(NEW_ENOUGH)' || \
+		{ echo 'Python 3.10 or newer is needed (found: $(or $(PYTHON),none)); name one: PYTHON=python3.12 make …' >&2; exit 1; }
+	@command -v cargo >/dev/null || { echo 'Rust is needed: cargo is not on the PATH' >&2; exit 1; }
+	[ -x $(BIN)/python ] || $(PYTHON) -m venv $(VENV)
+	python -m pip install --quiet --upgrade 'pip>=25.1' 'maturin>=1.9.4,<2'
+	python -m pip install --quiet uv || echo 'uv is not to be had here: going on with pip, which is slower'
+	touch $@
+
+$(VENV)/built: $(SOURCES) $(if $(wildcard $(BINARY)),,FORCE) | $(VENV)/created
+	$(MATURIN_DEVELOP)
+	touch $@
+
+$(VENV)/test-tools: pyproject.toml | $(VENV)/built
+	$(MATURIN_DEVELOP) --extras torch --group test
+	touch $@
+
+$(VENV)/lint-tools: pyproject.toml | $(VENV)/created
+	$(PIP) install --quiet --group lint
+	touch $@
+
+$(VENV)/wheel-tools: pyproject.toml | $(VENV)/created
+	$(PIP) install --quiet --group wheel
+	touch $@
+
+# The report is looked at in a headless Chromium. It is a system package, so only root can have it installed here.
+$(VENV)/browser: | $(VENV)/created
+	if ! command -v chromium-headless-shell chromium chromium-browser google-chrome chrome >/dev/null; then \
+		{ [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && apt-get update -qq && \
+			DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium-headless-shell; } || \
+		echo 'No Chromium here (Debian: apt install chromium-headless-shell): the browser test will be skipped'; fi
+	touch $@
