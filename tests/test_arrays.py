@@ -208,3 +208,13 @@ def test_absurd_sizes_raise_nothing(name, scale, blob, bodies):
             vertices = (bodies * scale).astype(dtype)
         for result in call(name, vertices, blob):
             assert result.shape[0] == 6
+
+
+@pytest.mark.parametrize("lift", [100.0, -1.0, 1e6, -1e6])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@every
+def test_hovering_and_sunk_bodies_are_finite(name, dtype, lift, blob, bodies):
+    """All but the margin of a body without contact, which is minus infinity by definition."""
+    for result in call(name, (bodies + [0.0, lift, 0.0]).astype(dtype), blob):
+        assert not np.isnan(result).any()
+        assert np.isfinite(result).all() or name in {"base_of_support", "support_margin"}

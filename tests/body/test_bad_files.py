@@ -219,7 +219,7 @@ def test_npz_that_claims_more_than_it_carries(tmp_path, arrays):
 def test_zip_bomb(tmp_path, arrays, monkeypatch):
     monkeypatch.setattr(safe_npz, "MAX_BYTES", 1 << 20)
     np.savez_compressed(tmp_path / "bomb.npz", v_template=np.zeros((1 << 20, 3)))
-    refused(tmp_path / "bomb.npz", "unpacks to .* bytes, more than any body model has")
+    refused(tmp_path / "bomb.npz", "unpacks to .* bytes, more than the .* that are read")
 
 
 def test_damaged_npz(tmp_path, arrays):

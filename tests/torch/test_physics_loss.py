@@ -146,7 +146,7 @@ def test_backward_twice_and_second_derivatives(tiny):
 
 
 def test_the_gradient_is_handed_over_without_a_copy(tiny):
-    """A leaf's .grad is the very buffer the core wrote (design.md §5: a copy costs as much as the gradient)."""
+    """A leaf's .grad is the very buffer the core wrote: a copy would cost as much as the gradient."""
     loss = ipt.IntuitivePhysicsLoss(tiny.template)
     vertices = tiny.vertices.clone().requires_grad_()
     total, _ = loss.weighted(vertices, tiny.ground)

@@ -1,4 +1,4 @@
-"""Close each part through shared virtual vertices, and sum signed tetrahedra (design.md §2, paper eq. for vol^P)."""
+"""Close each part through shared virtual vertices, and sum signed tetrahedra: the paper's vol^P."""
 
 from __future__ import annotations
 
