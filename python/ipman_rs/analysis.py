@@ -14,8 +14,9 @@ from ipman_rs.arrays import Bodies
 from ipman_rs.ground import Ground
 from ipman_rs.losses import balance_cost, ground_loss, stability_loss
 from ipman_rs.mass import center_of_mass
+from ipman_rs.plain import plain
 from ipman_rs.pressure import center_of_pressure, pressure
-from ipman_rs.status import Status, body_status, warn_odd_size
+from ipman_rs.status import Status, body_status, status_names, warn_odd_size
 from ipman_rs.support import BaseOfSupport, base_of_support
 from ipman_rs.template import BodyTemplate
 from ipman_rs.volume import mass_properties, part_volumes
@@ -54,10 +55,11 @@ class Analysis:
         Of the pressure only its sum and its largest value are kept.
         """
         values = {name: value for name, value in vars(self).items() if name not in {"pressure", "status"}}
-        values["status"] = _status_names(self.status)
+        values["base_of_support"] = vars(self.base_of_support)
+        values["status"] = status_names(self.status)
         values["pressure_sum"] = self.pressure.sum(axis=-1)
         values["pressure_max"] = self.pressure.max(axis=-1)
-        return json.dumps(_jsonable(values), allow_nan=False)
+        return json.dumps(plain(values), allow_nan=False)
 
 
 def analyze(
@@ -112,23 +114,3 @@ def _warn_units(bodies: Bodies, status: NDArray[np.int64]) -> None:
     odd = np.flatnonzero(status & Status.ODD_SIZE)
     if odd.size:
         warn_odd_size(float(np.ptp(bodies.vertices[odd[0]], axis=0).max()), f"body {odd[0]}")
-
-
-def _status_names(status: Any) -> Any:
-    if np.ndim(status):
-        return [_status_names(one) for one in status]
-    return [flag.name for flag in Status if flag and int(status) & flag]
-
-
-def _jsonable(value: Any) -> Any:
-    if isinstance(value, BaseOfSupport):
-        return _jsonable(vars(value))
-    if isinstance(value, dict):
-        return {name: _jsonable(entry) for name, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_jsonable(entry) for entry in value]
-    if isinstance(value, (np.ndarray, np.generic)):
-        return _jsonable(value.tolist())
-    if isinstance(value, float):
-        return value if np.isfinite(value) else None
-    return value

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from enum import IntFlag
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -50,6 +50,13 @@ def body_status(
     threshold = positive("threshold", threshold)
     choice("contact", contact, Literal["paper", "released"])
     return bodies.unfold(_core.status(template._core, contact, threshold, *bodies.over(ground)))
+
+
+def status_names(status: Any) -> Any:
+    """The names of the bits that are set, such as ["NO_CONTACT"]; nested as the batch."""
+    if np.ndim(status):
+        return [status_names(one) for one in status]
+    return [flag.name for flag in Status if flag and int(status) & flag]
 
 
 def warn_odd_size(size: float, what: str) -> None:

@@ -55,7 +55,9 @@ class BodyModel:
     part_names = PART_NAMES
 
     def __repr__(self) -> str:
-        return f"BodyModel({self.name!r}, {self.num_vertices} vertices, {self.num_joints} joints, {self.num_betas} betas)"
+        return (
+            f"BodyModel({self.name!r}, {self.num_vertices} vertices, {self.num_joints} joints, {self.num_betas} betas)"
+        )
 
     @property
     def num_vertices(self) -> int:

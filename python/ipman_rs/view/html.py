@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from ipman_rs.plain import plain
+from ipman_rs.status import status_names
+
 from . import colors
 from .picture import heat_top
-from .record import plain, status_names
 from .study import Study
 from .timeline import SERIES
 

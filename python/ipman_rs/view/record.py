@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ipman_rs.plain import plain
+from ipman_rs.status import status_names
+
 from .study import Study
 
 UNITS = {
@@ -65,28 +68,6 @@ def frame_record(study: Study, frame: int) -> dict[str, Any]:
         "polygon": plain(study.polygons[frame]),
         "part_volumes": volumes,
     }
-
-
-def status_names(status: Any) -> list[str]:
-    """Names of the bits set in a status, such as ["NO_CONTACT"]; empty when all is well."""
-    import ipman_rs as ip
-
-    return [str(flag.name) for flag in ip.Status if flag and int(status) & int(flag)]
-
-
-def plain(value: Any) -> Any:
-    """Arrays and numpy numbers as lists and Python numbers; None for what JSON cannot say."""
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, dict):
-        return {key: plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
 
 
 def study_arrays(study: Study) -> dict[str, np.ndarray]:
