@@ -1,8 +1,6 @@
-"""Derivatives: which joint saves the balance, and the paper's stability term beside the balance cost (needs torch).
+"""Derivatives: which joint saves the balance; the paper's stability term beside the balance cost (needs torch).
 
-Run:
-
-    python examples/04_balance_and_gradients.py
+Run: python examples/04_balance_and_gradients.py
 """
 
 from __future__ import annotations

@@ -45,7 +45,16 @@ def draw_timeline(study: Study, path: Path) -> None:
         axes.tick_params(colors=colors.MUTED)
         axes.spines[["top", "right"]].set_visible(False)
         axes.margins(x=0.01)
+        axes.set_ylim(*_range(values))
     for axes in figure.axes[-2:]:
         axes.set_xlabel("frame" if study.seconds is None else "seconds", color=colors.MUTED)
     figure.supxlabel("shaded: the CoM is outside its base of support", size=11, color=colors.MUTED)
     save(figure, path)
+
+
+def _range(values: np.ndarray) -> tuple[float, float]:
+    """Limits with room above and below; a curve that hardly moves is shown flat, not as its rounding."""
+    low, high = (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else (0.0, 0.0)
+    middle, half = (low + high) / 2, (high - low) / 2
+    half = max(1.1 * half, 0.02 * abs(middle), 1e-3)
+    return middle - half, middle + half

@@ -213,7 +213,9 @@
     const values = body.numbers[series.key].map((v) => (v === null ? null : v * series.factor));
     const known = values.filter((v) => v !== null);
     let low = Math.min(...bounds(known)), high = Math.max(...bounds(known));
-    if (!(high > low)) { low -= Math.abs(low) * 0.1 + 1e-3; high = low + Math.abs(low) * 0.2 + 2e-3; }
+    // A curve that hardly moves is shown flat, not as its rounding.
+    const middle = (low + high) / 2, reach = Math.max(1.1 * (high - low) / 2, 0.02 * Math.abs(middle), 1e-3);
+    low = middle - reach; high = middle + reach;
     const y = (v) => T + (H - T - B) * (high - v) / (high - low);
     const root = svg("svg", { viewBox: `0 0 ${W} ${H}` });
     const half = (xOf(1) - xOf(0)) / 2;
