@@ -23,9 +23,7 @@ pub enum Error {
         "faces: faces {first} and {second} run along edge ({a}, {b}) in the same direction; orient them alike (trimesh.repair.fix_winding)"
     )]
     MixedWinding { first: usize, second: usize, a: usize, b: usize },
-    #[error(
-        "faces: the surface is inside out (signed volume {volume:.6} m³); reverse every face (faces[:, ::-1])"
-    )]
+    #[error("faces: the surface is inside out (signed volume {volume:.6} m³); reverse every face (faces[:, ::-1])")]
     InsideOut { volume: f64 },
     #[error("vertices: the template encloses no volume ({volume:.6} m³): is it a closed body, or a flat sheet?")]
     NoVolume { volume: f64 },

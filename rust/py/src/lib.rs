@@ -42,7 +42,10 @@ mod threads {
     #[pyfunction]
     pub fn set_num_threads(threads: Bound<'_, PyAny>) -> PyResult<()> {
         match threads.extract() {
-            Ok(number @ 1..=1024) => Ok(ipman::batch::set_num_threads(number)),
+            Ok(number @ 1..=1024) => {
+                ipman::batch::set_num_threads(number);
+                Ok(())
+            }
             _ => Err(PyValueError::new_err(format!("threads: expected 1 to 1024, got {threads}"))),
         }
     }
