@@ -59,26 +59,32 @@ pub struct BalanceCost {
 /// The solved problem.
 pub struct Balance<W> {
     centre: Centre<W>,
-    supports: Vec<Support<W>>,
+    supports: Supports<W>,
     lambda: [W; 2],
     cost: W,
 }
 
-/// A sample as a support: x_i − m on the ground, and log ρ_i = log factor + exponent (up to a common constant).
-struct Support<W> {
-    arm: [W; 2],
-    height: W,
-    factor: W,
-    exponent: W,
+/// The samples as supports: x_i − m on the ground, and log ρ_i = log factor + exponent (up to a common constant).
+struct Supports<W> {
+    arm_x: Vec<W>,
+    arm_y: Vec<W>,
+    height: Vec<W>,
+    factor: Vec<W>,
+    exponent: Vec<W>,
 }
 
-/// F, its gradient and its Hessian (xx, xy, yy) at one λ, and Σ p_i e^(λ·arm) as e^shift · total.
-struct Dual<W> {
+/// p_i e^(λ·(x_i − m)) of each support, all divided by e^shift so that the largest is about 1, and their sum.
+struct Weights<W> {
+    of: Vec<W>,
+    shift: W,
+    total: W,
+}
+
+/// F, its gradient and its Hessian (xx, xy, yy) at one λ.
+struct Objective<W> {
     value: W,
     gradient: [W; 2],
     hessian: [W; 3],
-    shift: W,
-    total: W,
 }
 
 /// Newton steps and halvings together. Balanced bodies need 5 or 6; a body that lies metres outside needs about 40.
@@ -86,54 +92,65 @@ const MAX_STEPS: usize = 100;
 /// Residual in metres at which Newton's last full step reaches rounding.
 const TOLERANCE: f64 = 1e-9;
 
-impl BalanceCost {
-    fn supports<R: Real>(&self, scene: &Scene<R>, centre: &Centre<R::Wide>) -> Vec<Support<R::Wide>> {
-        let target = scene.plane.flatten(centre.point);
-        let zero = R::Wide::zero();
-        let support = |sample| {
+impl<W: Real> Supports<W> {
+    fn new<R: Real<Wide = W>>(scene: &Scene<R>, centre: &Centre<W>, curve: &PressureCurve) -> Self {
+        let count = scene.template.samples.len();
+        let column = || Vec::with_capacity(count);
+        let mut supports =
+            Supports { arm_x: column(), arm_y: column(), height: column(), factor: column(), exponent: column() };
+        let [target_x, target_y] = scene.plane.flatten(centre.point);
+        for sample in 0..count {
             let point = scene.template.samples.wide_point(sample, scene.points);
-            let flat = scene.plane.flatten(point);
+            let [x, y] = scene.plane.flatten(point);
             let height = scene.ground.signed_height(point);
-            Support {
-                arm: [flat[0] - target[0], flat[1] - target[1]],
-                height,
-                factor: height.if_negative(self.curve.density(height, zero), R::Wide::of(1.0)),
-                exponent: height.if_negative(zero, R::Wide::of(-self.curve.gamma) * height),
-            }
-        };
-        (0..scene.template.samples.len()).map(support).collect()
+            supports.arm_x.push(x - target_x);
+            supports.arm_y.push(y - target_y);
+            supports.height.push(height);
+            supports.factor.push(height.if_negative(curve.density(height, W::zero()), W::of(1.0)));
+            supports.exponent.push(height.if_negative(W::zero(), W::of(-curve.gamma) * height));
+        }
+        supports
     }
 
+    fn weights(&self, lambda: [W; 2]) -> Weights<W> {
+        let arms = self.arm_x.iter().zip(&self.arm_y);
+        let mut of: Vec<W> =
+            self.exponent.iter().zip(arms).map(|(&e, (&x, &y))| e + lambda[0] * x + lambda[1] * y).collect();
+        let shift = of.iter().fold(W::of(-1e300), |top, &exponent| top.at_least(exponent));
+        for (weight, &factor) in of.iter_mut().zip(&self.factor) {
+            *weight = factor * (*weight - shift).exp();
+        }
+        let total = of.iter().fold(W::zero(), |sum, &weight| sum + weight);
+        Weights { of, shift, total }
+    }
+}
+
+impl BalanceCost {
     /// F at λ, up to the constant log Σρ.
-    fn dual<W: Real>(&self, supports: &[Support<W>], lambda: [W; 2]) -> Dual<W> {
-        let shift = supports.iter().fold(W::of(-1e300), |top, s| top.at_least(s.exponent_at(lambda)));
-        let mut sums = [W::zero(); 6];
-        for support in supports {
-            let weight = support.weight(lambda, shift);
-            let [x, y] = support.arm;
+    fn objective<W: Real>(&self, supports: &Supports<W>, lambda: [W; 2]) -> Objective<W> {
+        let weights = supports.weights(lambda);
+        let mut sums = [W::zero(); 5];
+        for ((&weight, &x), &y) in weights.of.iter().zip(&supports.arm_x).zip(&supports.arm_y) {
             let (wx, wy) = (weight * x, weight * y);
-            for (sum, term) in sums.iter_mut().zip([weight, wx, wy, wx * x, wx * y, wy * y]) {
+            for (sum, term) in sums.iter_mut().zip([wx, wy, wx * x, wx * y, wy * y]) {
                 *sum = *sum + term;
             }
         }
-        let [total, x, y, xx, xy, yy] = sums;
-        let (x, y) = (x / total, y / total);
+        let [x, y, xx, xy, yy] = sums.map(|sum| sum / weights.total);
         let blur = W::of(self.sigma * self.sigma);
         let half = W::of(0.5) * blur * (lambda[0] * lambda[0] + lambda[1] * lambda[1]);
-        Dual {
-            value: total.ln() + shift + half,
+        Objective {
+            value: weights.total.ln() + weights.shift + half,
             gradient: [x + blur * lambda[0], y + blur * lambda[1]],
-            hessian: [xx / total - x * x + blur, xy / total - x * y, yy / total - y * y + blur],
-            shift,
-            total,
+            hessian: [xx - x * x + blur, xy - x * y, yy - y * y + blur],
         }
     }
 
     /// Newton with backtracking, each lane at its own pace, and one full step at the end, which also carries a dual
     /// number's derivative of λ.
-    fn solve<W: Real>(&self, supports: &[Support<W>]) -> ([W; 2], W) {
+    fn solve<W: Real>(&self, supports: &Supports<W>) -> ([W; 2], W) {
         let mut lambda = [W::zero(); 2];
-        let mut here = self.dual(supports, lambda);
+        let mut here = self.objective(supports, lambda);
         let start = here.value;
         let mut length = W::of(1.0);
         for _ in 0..MAX_STEPS {
@@ -142,7 +159,7 @@ impl BalanceCost {
             }
             let step = here.newton_step();
             let trial: [W; 2] = std::array::from_fn(|k| lambda[k] + length * step[k]);
-            let there = self.dual(supports, trial);
+            let there = self.objective(supports, trial);
             let promised = here.gradient[0] * step[0] + here.gradient[1] * step[1];
             // The slack admits steps whose gain drowns in rounding.
             let slack = W::of(1e-13) * (W::of(1.0) + here.value.abs());
@@ -157,29 +174,19 @@ impl BalanceCost {
         }
         let step = here.newton_step();
         let lambda = std::array::from_fn(|k| lambda[k] + step[k]);
-        (lambda, start - self.dual(supports, lambda).value)
+        (lambda, start - self.objective(supports, lambda).value)
     }
 
     fn solved<R: Real>(&self, scene: &Scene<R>) -> Balance<R::Wide> {
         let centre = self.method.forward(scene);
-        let supports = self.supports(scene, &centre);
+        let supports = Supports::new(scene, &centre, &self.curve);
         let (lambda, cost) = self.solve(&supports);
         // J is a divergence: below zero there is only rounding.
         Balance { centre, supports, lambda, cost: cost.at_least(R::Wide::zero()) }
     }
 }
 
-impl<W: Real> Support<W> {
-    fn exponent_at(&self, lambda: [W; 2]) -> W {
-        self.exponent + lambda[0] * self.arm[0] + lambda[1] * self.arm[1]
-    }
-
-    fn weight(&self, lambda: [W; 2], shift: W) -> W {
-        self.factor * (self.exponent_at(lambda) - shift).exp()
-    }
-}
-
-impl<W: Real> Dual<W> {
+impl<W: Real> Objective<W> {
     /// −H⁻¹ g
     fn newton_step(&self) -> [W; 2] {
         let ([gx, gy], [xx, xy, yy]) = (self.gradient, self.hessian);
@@ -199,12 +206,10 @@ impl<W: Real> Dual<W> {
 
     fn replaced_where_negative(self, test: W, other: Self) -> Self {
         let pick = |a: W, b: W| test.if_negative(b, a);
-        Dual {
+        Objective {
             value: pick(self.value, other.value),
             gradient: std::array::from_fn(|k| pick(self.gradient[k], other.gradient[k])),
             hessian: std::array::from_fn(|k| pick(self.hessian[k], other.hessian[k])),
-            shift: pick(self.shift, other.shift),
-            total: pick(self.total, other.total),
         }
     }
 }
@@ -228,12 +233,13 @@ impl Quantity for BalanceCost {
         let pull = scene.plane.raise(lambda.map(|l| d_cost * l));
         self.method.backward(scene, centre, pull, d_points);
 
-        let zero = [R::Wide::zero(); 2];
-        let (spread, still) = (self.dual(supports, *lambda), self.dual(supports, zero));
-        for (sample, support) in supports.iter().enumerate() {
-            let weight = support.weight(*lambda, spread.shift) / spread.total;
-            let pressure = support.weight(zero, still.shift) / still.total;
-            let log_slope = self.curve.slope(support.height, support.factor) / support.factor;
+        let spread = supports.weights(*lambda);
+        let still = supports.weights([R::Wide::zero(); 2]);
+        for sample in 0..spread.of.len() {
+            let weight = spread.of[sample] / spread.total;
+            let pressure = still.of[sample] / still.total;
+            let factor = supports.factor[sample];
+            let log_slope = self.curve.slope(supports.height[sample], factor) / factor;
             let mut d_point = scale(-weight, pull);
             add_scaled(&mut d_point, -d_cost * (weight - pressure) * log_slope, scene.ground.normal);
             scene.template.samples.point_backward(sample, narrow::<R>(d_point), d_points);

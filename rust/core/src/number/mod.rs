@@ -47,19 +47,23 @@ pub trait Real:
     fn lane(self, lane: usize) -> Self::Scalar;
     fn from_lanes(lane: impl FnMut(usize) -> Self::Scalar) -> Self;
 
+    #[inline(always)]
     fn zero() -> Self {
         Self::of(0.0)
     }
 
+    #[inline(always)]
     fn add_to(self, sum: &mut Self::Wide) {
         *sum = *sum + self.widen();
     }
 
+    #[inline(always)]
     fn abs(self) -> Self {
         self.if_negative(-self, self)
     }
 
     /// e^self.
+    #[inline(always)]
     fn exp(self) -> Self {
         (self * Self::of(std::f64::consts::LOG2_E)).exp2()
     }
