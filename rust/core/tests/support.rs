@@ -60,4 +60,23 @@ proptest! {
             }
         }
     }
+
+    /// A hull without area has no inside, however close the point is: a segment, and slivers of three.
+    #[test]
+    fn thin_hulls_have_no_inside(
+        ends in prop::array::uniform2(prop::array::uniform2(-1.0..1.0_f64)),
+        along in 0.05..0.95_f64,
+        away in prop_oneof![1e-6..1e-2_f64, -1e-2..-1e-6_f64],
+    ) {
+        let [a, b] = ends;
+        let edge = [b[0] - a[0], b[1] - a[1]];
+        let length = edge[0].hypot(edge[1]);
+        prop_assume!(length > 0.01);
+        let at = [a[0] + along * edge[0] - away * edge[1] / length, a[1] + along * edge[1] + away * edge[0] / length];
+        let middle = [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0];
+        for points in [vec![a, b], vec![b, a, b], vec![a, middle, b]] {
+            let signed = margin(&points, at);
+            prop_assert!((signed + away.abs()).abs() < 1e-15, "{} {}", signed, away);
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! The signed margin: metres from a point to the boundary of a convex polygon, positive inside.
 
 use crate::number::Scalar;
+use robust::{Coord, orient2d};
 
 /// Where on the boundary the nearest point lies: within an edge that runs counter-clockwise, or at a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,39 +31,36 @@ impl Nearest<usize> {
     /// For a counter-clockwise polygon of any number of corners; None without corners. Two corners are an edge that is
     /// walked both ways, which puts every point outside it or on it.
     pub fn find(corners: &[[f64; 2]], point: [f64; 2]) -> Option<Self> {
-        let mut best: Option<(f64, Self)> = match corners.len() {
-            0 => return None,
-            1 => return Some(Nearest::Corner(0)),
-            _ => None,
-        };
-        for a in 0..corners.len() {
-            let b = (a + 1) % corners.len();
-            let (foot, distance, left) = to_segment(corners[a], corners[b], point);
-            // Among equals an edge that sees the point on its right decides the sign.
-            let rank = if left < 0.0 { distance * (1.0 - 1e-15) } else { distance };
-            if best.is_none_or(|(least, _)| rank < least) {
-                best = Some((
-                    rank,
-                    match foot {
-                        t if t <= 0.0 => Nearest::Corner(a),
-                        t if t >= 1.0 => Nearest::Corner(b),
-                        _ => Nearest::Edge(a, b),
-                    },
-                ));
-            }
+        if corners.len() < 2 {
+            return corners.first().map(|_| Nearest::Corner(0));
         }
-        Some(best?.1)
+        let edges = (0..corners.len()).map(|a| (a, (a + 1) % corners.len()));
+        // From outside only the edges that turn their right to the point can be nearest. Deciding that exactly, and not
+        // by the distance, keeps the sign of thin hulls: their two sides are equally far.
+        let faces = |&(a, b): &(usize, usize)| orient2d(coord(corners[a]), coord(corners[b]), coord(point)) < 0.0;
+        let outside = edges.clone().any(|edge| faces(&edge));
+        let candidates = edges.filter(|edge| !outside || faces(edge));
+        let feet = candidates.map(|(a, b)| (a, b, to_segment(corners[a], corners[b], point)));
+        let (a, b, (foot, _)) = feet.min_by(|x, y| x.2.1.total_cmp(&y.2.1))?;
+        Some(match foot {
+            t if t <= 0.0 => Nearest::Corner(a),
+            t if t >= 1.0 => Nearest::Corner(b),
+            _ => Nearest::Edge(a, b),
+        })
     }
 }
 
-/// The foot's position along the segment, unclamped; the distance to the segment; and the side (> 0: left).
-fn to_segment(a: [f64; 2], b: [f64; 2], point: [f64; 2]) -> (f64, f64, f64) {
+fn coord([x, y]: [f64; 2]) -> Coord<f64> {
+    Coord { x, y }
+}
+
+/// The foot's position along the segment, unclamped, and the distance to the segment.
+fn to_segment(a: [f64; 2], b: [f64; 2], point: [f64; 2]) -> (f64, f64) {
     let edge = [b[0] - a[0], b[1] - a[1]];
     let arm = [point[0] - a[0], point[1] - a[1]];
     let foot = (arm[0] * edge[0] + arm[1] * edge[1]) / (edge[0] * edge[0] + edge[1] * edge[1]);
     let t = foot.clamp(0.0, 1.0);
-    let distance = f64::hypot(arm[0] - t * edge[0], arm[1] - t * edge[1]);
-    (foot, distance, edge[0] * arm[1] - edge[1] * arm[0])
+    (foot, f64::hypot(arm[0] - t * edge[0], arm[1] - t * edge[1]))
 }
 
 /// A margin and its derivatives: `direction` by the point, −share · `direction` by each end of the nearest edge.
