@@ -22,11 +22,10 @@ pub fn convex_hull(points: &[[f64; 2]]) -> Vec<usize> {
 
 /// One side of the hull: every turn is strictly to the left.
 fn chain(points: &[[f64; 2]], order: impl Iterator<Item = usize>) -> Vec<usize> {
-    let coord = |i: usize| Coord { x: points[i][0], y: points[i][1] };
     let mut chain: Vec<usize> = Vec::new();
     for next in order {
         while let [.., a, b] = chain[..] {
-            if orient2d(coord(a), coord(b), coord(next)) > 0.0 {
+            if turn(points[a], points[b], points[next]) > 0.0 {
                 break;
             }
             chain.pop();
@@ -42,9 +41,15 @@ fn candidates(points: &[[f64; 2]]) -> Vec<usize> {
         |key: fn(&[f64; 2]) -> f64| (0..points.len()).max_by(|&i, &j| key(&points[i]).total_cmp(&key(&points[j])));
     let keys: [fn(&[f64; 2]) -> f64; 4] = [|p| -p[0] - p[1], |p| p[0] - p[1], |p| p[0] + p[1], |p| p[1] - p[0]];
     let Some(corners) = keys.into_iter().map(extreme).collect::<Option<Vec<_>>>() else { return Vec::new() };
-    let coord = |i: usize| Coord { x: points[i][0], y: points[i][1] };
-    let inside = |&i: &usize| (0..4).all(|k| orient2d(coord(corners[k]), coord(corners[(k + 1) % 4]), coord(i)) > 0.0);
+    let corners: Vec<_> = corners.into_iter().map(|i| points[i]).collect();
+    let inside = |&i: &usize| (0..4).all(|k| turn(corners[k], corners[(k + 1) % 4], points[i]) > 0.0);
     (0..points.len()).filter(|i| !inside(i)).collect()
+}
+
+/// Positive where `c` lies to the left of a → b, negative to the right, 0 on the line; the sign is exact.
+pub(super) fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    let [a, b, c] = [a, b, c].map(|[x, y]| Coord { x, y });
+    orient2d(a, b, c)
 }
 
 /// Area of a counter-clockwise polygon.

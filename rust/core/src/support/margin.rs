@@ -1,7 +1,7 @@
 //! The signed margin: metres from a point to the boundary of a convex polygon, positive inside.
 
 use crate::number::Scalar;
-use robust::{Coord, orient2d};
+use crate::support::hull::turn;
 
 /// Where on the boundary the nearest point lies: within an edge that runs counter-clockwise, or at a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +37,7 @@ impl Nearest<usize> {
         let edges = (0..corners.len()).map(|a| (a, (a + 1) % corners.len()));
         // From outside only the edges that turn their right to the point can be nearest. Deciding that exactly, and not
         // by the distance, keeps the sign of thin hulls: their two sides are equally far.
-        let faces = |&(a, b): &(usize, usize)| orient2d(coord(corners[a]), coord(corners[b]), coord(point)) < 0.0;
+        let faces = |&(a, b): &(usize, usize)| turn(corners[a], corners[b], point) < 0.0;
         let outside = edges.clone().any(|edge| faces(&edge));
         let candidates = edges.filter(|edge| !outside || faces(edge));
         let feet = candidates.map(|(a, b)| (a, b, to_segment(corners[a], corners[b], point)));
@@ -48,10 +48,6 @@ impl Nearest<usize> {
             _ => Nearest::Edge(a, b),
         })
     }
-}
-
-fn coord([x, y]: [f64; 2]) -> Coord<f64> {
-    Coord { x, y }
 }
 
 /// The foot's position along the segment, unclamped, and the distance to the segment.
