@@ -6,63 +6,54 @@ use crate::template::Template;
 use ipman::Batch;
 use ipman::number::Scalar;
 use ipman::quantity::{Quantity, Visitor, named};
-use numpy::{Element, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn};
-use numpy::{IntoPyArray, PyUntypedArrayMethods};
+use numpy::{Element, IntoPyArray, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-/// What to compute.
-enum Verb<'a, T> {
+type Reply<'py> = PyResult<Bound<'py, PyAny>>;
+
+/// What to compute, and which upstream arrays (d_out as the values, d_vertices as the vertices) it takes.
+#[derive(Clone, Copy, PartialEq)]
+enum Verb {
     Value,
-    Vjp(&'a [T]),
-    Jvp(&'a [T]),
-    VjpJvp(&'a [T], &'a [T]),
-    ValueAndVjp(&'a [T]),
+    Vjp,
+    Jvp,
+    VjpJvp,
+    ValueAndVjp,
 }
 
-struct Run<'a, T> {
-    batch: Batch<'a, T>,
-    verb: Verb<'a, T>,
-    size: usize,
-}
-
-/// One result, and the gradient where the verb has both.
-type Results<T> = (Vec<T>, Vec<T>);
-
-impl<T: Scalar> Run<'_, T> {
-    fn check(&self, template: &Template) -> ipman::Result<()> {
-        let (out, row) = (self.batch.len() * self.size, self.batch.len() * 3 * template.inner.mesh.num_vertices);
-        let check = |name, expected: usize, got: usize| {
-            let (expected, got) = (format!("{expected} numbers"), got.to_string());
-            if expected == format!("{got} numbers") {
-                Ok(())
-            } else {
-                Err(ipman::Error::Argument { name, expected, got })
-            }
-        };
-        match self.verb {
-            Verb::Value => Ok(()),
-            Verb::Vjp(d_out) | Verb::ValueAndVjp(d_out) => check("d_out", out, d_out.len()),
-            Verb::Jvp(d_vertices) => check("d_vertices", row, d_vertices.len()),
-            Verb::VjpJvp(d_out, d_vertices) => {
-                check("d_out", out, d_out.len())?;
-                check("d_vertices", row, d_vertices.len())
-            }
+impl Verb {
+    fn takes(self) -> &'static [&'static str] {
+        match self {
+            Verb::Value => &[],
+            Verb::Vjp | Verb::ValueAndVjp => &["d_out"],
+            Verb::Jvp => &["d_vertices"],
+            Verb::VjpJvp => &["d_out", "d_vertices"],
         }
     }
 }
 
+struct Run<'a, T> {
+    batch: Batch<'a, T>,
+    verb: Verb,
+    /// As many as the verb takes, in its order.
+    upstream: Vec<&'a [T]>,
+}
+
 impl<T: Scalar> Visitor for Run<'_, T> {
-    type Output = ipman::Result<Results<T>>;
+    /// The numbers of the result, and the gradient where the verb has both.
+    type Output = ipman::Result<(Vec<T>, Vec<T>)>;
 
     fn visit<Q: Quantity>(self, quantity: Q) -> Self::Output {
+        let Run { batch, verb, upstream } = self;
         let alone = |result| (result, Vec::new());
-        match self.verb {
-            Verb::Value => self.batch.value(&quantity).map(alone),
-            Verb::Vjp(d_out) => self.batch.vjp(&quantity, d_out).map(alone),
-            Verb::Jvp(d_vertices) => self.batch.jvp(&quantity, d_vertices).map(alone),
-            Verb::VjpJvp(d_out, d_vertices) => self.batch.vjp_jvp(&quantity, d_out, d_vertices).map(alone),
-            Verb::ValueAndVjp(d_out) => self.batch.value_and_vjp(&quantity, d_out),
+        match verb {
+            Verb::Value => batch.value(&quantity).map(alone),
+            Verb::Vjp => batch.vjp(&quantity, upstream[0]).map(alone),
+            Verb::Jvp => batch.jvp(&quantity, upstream[0]).map(alone),
+            Verb::VjpJvp => batch.vjp_jvp(&quantity, upstream[0], upstream[1]).map(alone),
+            Verb::ValueAndVjp => batch.value_and_vjp(&quantity, upstream[0]),
         }
     }
 }
@@ -101,112 +92,157 @@ pub fn check_vertices(shape: &[usize], template: &Template, num_grounds: usize) 
     Err(PyValueError::new_err(format!("vertices: expected ({num_grounds}, {num_vertices}, 3), got {shape:?}")))
 }
 
-/// Evaluates in the precision of the vertices; `verb` turns the two upstream arrays into what to compute.
-fn evaluate<'py, T: Scalar + Element>(
+/// A quantity by its name and options, over bodies on their grounds.
+struct Question<'a, 'py> {
     py: Python<'py>,
-    template: &Template,
-    (quantity, options): (&str, &[f64]),
-    vertices: &PyReadonlyArray3<'py, T>,
-    grounds: &Grounds<'py>,
-    verb: Verb<'_, T>,
-) -> PyResult<([Bound<'py, PyArray1<T>>; 2], usize)> {
-    let (normals, heights) = grounds.slices()?;
-    check_vertices(vertices.shape(), template, heights.len())?;
-    let vertices = vertices.as_slice()?;
-    let (results, size) = detached(py, |interrupted| {
-        let size = named(&template.inner, quantity, options, Size(template))?;
-        let batch = Batch::new(&template.inner, vertices, normals, heights, interrupted)?;
-        let run = Run { batch, verb, size };
-        run.check(template)?;
-        Ok((named(&template.inner, quantity, options, run)??, size))
-    })?;
-    Ok(([results.0.into_pyarray(py), results.1.into_pyarray(py)], size))
+    template: &'a Template,
+    quantity: &'a str,
+    options: Vec<f64>,
+    grounds: Grounds<'py>,
+}
+
+impl<'py> Question<'_, 'py> {
+    /// Answers in the precision of the vertices.
+    fn answer(&self, verb: Verb, vertices: Vertices<'py>, upstream: &[Bound<'py, PyAny>]) -> Reply<'py> {
+        match vertices {
+            Vertices::Single(vertices) => self.evaluate(verb, &vertices, upstream),
+            Vertices::Double(vertices) => self.evaluate(verb, &vertices, upstream),
+        }
+    }
+
+    fn evaluate<T: Scalar + Element>(
+        &self,
+        verb: Verb,
+        vertices: &PyReadonlyArray3<'py, T>,
+        upstream: &[Bound<'py, PyAny>],
+    ) -> Reply<'py> {
+        let shape = vertices.shape();
+        let (normals, heights) = self.grounds.slices()?;
+        check_vertices(shape, self.template, heights.len())?;
+        let (template, data) = (&self.template.inner, vertices.as_slice()?);
+        let (quantity, options) = (self.quantity, &self.options);
+        let size = named(template, quantity, options, Size(self.template)).map_err(value_error)?;
+
+        let arrays = verb.takes().iter().zip(upstream).map(|(name, array)| same_dtype::<T>(array, name));
+        let arrays = arrays.collect::<PyResult<Vec<_>>>()?;
+        let mut slices = Vec::new();
+        for (name, array) in verb.takes().iter().zip(&arrays) {
+            let expected = if *name == "d_out" { shape[0] * size } else { data.len() };
+            slices.push(checked(flat(array, name)?, name, expected)?);
+        }
+
+        let (first, second) = detached(self.py, |interrupted| {
+            let batch = Batch::new(template, data, normals, heights, interrupted)?;
+            named(template, quantity, options, Run { batch, verb, upstream: slices })?
+        })?;
+        let rows = |numbers: Vec<T>| numbers.into_pyarray(self.py).reshape([shape[0], size]);
+        let gradient = |numbers: Vec<T>| numbers.into_pyarray(self.py).reshape([shape[0], shape[1], 3]);
+        Ok(match verb {
+            Verb::Value | Verb::Jvp => rows(first)?.into_any(),
+            Verb::Vjp | Verb::VjpJvp => gradient(first)?.into_any(),
+            Verb::ValueAndVjp => (rows(first)?, gradient(second)?).into_pyobject(self.py)?.into_any(),
+        })
+    }
 }
 
 /// Upstream arrays must have the vertices' precision.
-fn upstream<'py, T: Element>(array: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+fn same_dtype<'py, T: Element>(array: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
     array.extract().map_err(|_| PyTypeError::new_err(format!("{name}: expected an array of the vertices' dtype")))
 }
 
-/// Writes one verb as a Python function over both precisions. `$upstream` are its arrays besides the vertices,
-/// `$result` picks and shapes what it returns.
-macro_rules! verb {
-    ($(#[$doc:meta])* $name:ident, $verb:ident, [$($upstream:ident),*], $result:expr) => {
-        $(#[$doc])*
-        #[pyfunction]
-        pub fn $name<'py>(
-            py: Python<'py>,
-            template: &Template,
-            quantity: &str,
-            options: Vec<f64>,
-            vertices: Vertices<'py>,
-            normal: PyReadonlyArray2<'py, f64>,
-            height: PyReadonlyArray1<'py, f64>,
-            $($upstream: Bound<'py, PyAny>,)*
-        ) -> PyResult<Bound<'py, PyAny>> {
-            let grounds = Grounds::new(normal, height);
-            verb!(@run f32, Single, py, template, quantity, options, vertices, grounds, $verb, [$($upstream),*], $result);
-            verb!(@run f64, Double, py, template, quantity, options, vertices, grounds, $verb, [$($upstream),*], $result);
-            unreachable!("vertices are single or double")
-        }
-    };
-    (@run $T:ty, $kind:ident, $py:ident, $template:ident, $quantity:ident, $options:ident, $vertices:ident,
-     $grounds:ident, $verb:ident, [$($upstream:ident),*], $result:expr) => {
-        if let Vertices::$kind(vertices) = &$vertices {
-            $(let $upstream = upstream::<$T>(&$upstream, stringify!($upstream))?;)*
-            let verb = verb!(@make $verb, $($upstream),*);
-            let shape = vertices.shape();
-            let ([first, second], size) = evaluate($py, $template, ($quantity, &$options), vertices, &$grounds, verb)?;
-            return $result(shape, size, first.into_any(), second.into_any());
-        }
-    };
-    (@make Value,) => { Verb::Value };
-    (@make $verb:ident, $($upstream:ident),*) => { Verb::$verb($(flat(&$upstream, stringify!($upstream))?),*) };
+fn checked<'a, T>(numbers: &'a [T], name: &str, expected: usize) -> PyResult<&'a [T]> {
+    if numbers.len() == expected {
+        return Ok(numbers);
+    }
+    Err(PyValueError::new_err(format!("{name}: expected {expected} numbers, got {}", numbers.len())))
 }
 
-type Reply<'py> = PyResult<Bound<'py, PyAny>>;
-
-/// (B, K): one row a body.
-fn rows<'py>(shape: &[usize], size: usize, values: Bound<'py, PyAny>, _: Bound<'py, PyAny>) -> Reply<'py> {
-    values.call_method1("reshape", (shape[0], size))
+fn value_error(error: ipman::Error) -> PyErr {
+    PyValueError::new_err(error.to_string())
 }
 
-/// (B, V, 3)
-fn gradient<'py>(shape: &[usize], _: usize, values: Bound<'py, PyAny>, _: Bound<'py, PyAny>) -> Reply<'py> {
-    values.call_method1("reshape", (shape[0], shape[1], shape[2]))
+/// The quantity of each body, (B, K).
+#[pyfunction]
+pub fn value<'py>(
+    py: Python<'py>,
+    template: &Template,
+    quantity: &str,
+    options: Vec<f64>,
+    vertices: Vertices<'py>,
+    normal: PyReadonlyArray2<'py, f64>,
+    height: PyReadonlyArray1<'py, f64>,
+) -> Reply<'py> {
+    let question = Question { py, template, quantity, options, grounds: Grounds::new(normal, height) };
+    question.answer(Verb::Value, vertices, &[])
 }
 
-/// (B, K) and (B, V, 3)
-fn both<'py>(shape: &[usize], size: usize, values: Bound<'py, PyAny>, d_vertices: Bound<'py, PyAny>) -> Reply<'py> {
-    let py = values.py();
-    let d_vertices = gradient(shape, size, d_vertices, py.None().into_bound(py))?;
-    Ok((rows(shape, size, values, py.None().into_bound(py))?, d_vertices).into_pyobject(py)?.into_any())
+/// The gradient of Σ d_out · value by the vertices, (B, V, 3); d_out (B, K).
+#[pyfunction]
+pub fn vjp<'py>(
+    py: Python<'py>,
+    template: &Template,
+    quantity: &str,
+    options: Vec<f64>,
+    vertices: Vertices<'py>,
+    normal: PyReadonlyArray2<'py, f64>,
+    height: PyReadonlyArray1<'py, f64>,
+    d_out: Bound<'py, PyAny>,
+) -> Reply<'py> {
+    let question = Question { py, template, quantity, options, grounds: Grounds::new(normal, height) };
+    question.answer(Verb::Vjp, vertices, &[d_out])
 }
 
-verb!(
-    /// The quantity of each body, (B, K).
-    value, Value, [], rows
-);
-verb!(
-    /// The gradient of Σ d_out · value by the vertices, (B, V, 3); d_out (B, K).
-    vjp, Vjp, [d_out], gradient
-);
-verb!(
-    /// The derivative of the value along d_vertices (B, V, 3), (B, K).
-    jvp, Jvp, [d_vertices], rows
-);
-verb!(
-    /// The derivative of vjp(d_out) along d_vertices, a Hessian-vector product, (B, V, 3).
-    vjp_jvp, VjpJvp, [d_out, d_vertices], gradient
-);
-verb!(
-    /// The value (B, K) and the gradient of Σ d_out · value (B, V, 3), in one pass.
-    value_and_vjp, ValueAndVjp, [d_out], both
-);
+/// The derivative of the value along d_vertices (B, V, 3), (B, K).
+#[pyfunction]
+pub fn jvp<'py>(
+    py: Python<'py>,
+    template: &Template,
+    quantity: &str,
+    options: Vec<f64>,
+    vertices: Vertices<'py>,
+    normal: PyReadonlyArray2<'py, f64>,
+    height: PyReadonlyArray1<'py, f64>,
+    d_vertices: Bound<'py, PyAny>,
+) -> Reply<'py> {
+    let question = Question { py, template, quantity, options, grounds: Grounds::new(normal, height) };
+    question.answer(Verb::Jvp, vertices, &[d_vertices])
+}
+
+/// The derivative of vjp(d_out) along d_vertices, a Hessian-vector product, (B, V, 3).
+#[pyfunction]
+pub fn vjp_jvp<'py>(
+    py: Python<'py>,
+    template: &Template,
+    quantity: &str,
+    options: Vec<f64>,
+    vertices: Vertices<'py>,
+    normal: PyReadonlyArray2<'py, f64>,
+    height: PyReadonlyArray1<'py, f64>,
+    d_out: Bound<'py, PyAny>,
+    d_vertices: Bound<'py, PyAny>,
+) -> Reply<'py> {
+    let question = Question { py, template, quantity, options, grounds: Grounds::new(normal, height) };
+    question.answer(Verb::VjpJvp, vertices, &[d_out, d_vertices])
+}
+
+/// The value (B, K) and the gradient of Σ d_out · value (B, V, 3), in one pass.
+#[pyfunction]
+pub fn value_and_vjp<'py>(
+    py: Python<'py>,
+    template: &Template,
+    quantity: &str,
+    options: Vec<f64>,
+    vertices: Vertices<'py>,
+    normal: PyReadonlyArray2<'py, f64>,
+    height: PyReadonlyArray1<'py, f64>,
+    d_out: Bound<'py, PyAny>,
+) -> Reply<'py> {
+    let question = Question { py, template, quantity, options, grounds: Grounds::new(normal, height) };
+    question.answer(Verb::ValueAndVjp, vertices, &[d_out])
+}
 
 /// How many numbers the quantity has for one body.
 #[pyfunction]
 pub fn output_size(template: &Template, quantity: &str, options: Vec<f64>) -> PyResult<usize> {
-    let size = named(&template.inner, quantity, &options, Size(template));
-    size.map_err(|error| PyValueError::new_err(error.to_string()))
+    named(&template.inner, quantity, &options, Size(template)).map_err(value_error)
 }
