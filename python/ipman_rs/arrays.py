@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,37 +32,6 @@ def _holds(value: Any, kind: type) -> bool:
     while isinstance(value, (list, tuple)) and value:
         value = value[0]
     return isinstance(value, kind)
-
-
-def number(name: str, value: float) -> float:
-    """A finite real number, as a float."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise TypeError(f"{name}: expected a number, got {value!r}")
-    if not np.isfinite(value):
-        raise ValueError(f"{name}: expected a finite number, got {value!r}")
-    return float(value)
-
-
-def positive(name: str, value: float, unit: str = "metres") -> float:
-    """A finite number above zero."""
-    if not number(name, value) > 0.0:
-        raise ValueError(f"{name}: expected positive {unit}, got {value!r}")
-    return float(value)
-
-
-def not_negative(name: str, value: float) -> float:
-    """A finite number, zero or above."""
-    if not number(name, value) >= 0.0:
-        raise ValueError(f"{name}: expected zero or more, got {value!r}")
-    return float(value)
-
-
-def choice(name: str, value: str, words: Any) -> str:
-    """One of the words of a `Literal`."""
-    options = get_args(words)
-    if value not in options:
-        raise ValueError(f"{name}: expected one of {', '.join(options)}, got {value!r}")
-    return value
 
 
 def single_or_double(array: NDArray[Any]) -> NDArray[Any]:

@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.arrays import Bodies, choice, not_negative, number, positive
+from ipman_rs.arrays import Bodies
+from ipman_rs.checks import choice, not_negative, number, positive
 from ipman_rs.ground import Ground
 from ipman_rs.mass import Method
 from ipman_rs.template import BodyTemplate

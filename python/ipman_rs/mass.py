@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.arrays import Bodies, choice
+from ipman_rs.arrays import Bodies
+from ipman_rs.checks import choice
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 

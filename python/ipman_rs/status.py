@@ -44,7 +44,8 @@ def body_status(
 ) -> NDArray[np.int64]:
     """The `Status` bits of each body, (...,). vertices (..., V, 3) m; contact is |h| < `threshold` metres."""
     from ipman_rs import _core
-    from ipman_rs.arrays import Bodies, choice, positive
+    from ipman_rs.arrays import Bodies
+    from ipman_rs.checks import choice, positive
 
     bodies = Bodies(vertices, template)
     threshold = positive("threshold", threshold)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs import _core
-from ipman_rs.arrays import Bodies, choice, positive
+from ipman_rs.arrays import Bodies
+from ipman_rs.checks import choice, positive
 from ipman_rs.ground import Ground
 from ipman_rs.mass import Method
 from ipman_rs.template import BodyTemplate

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from typing import get_args
-
 from torch import Tensor
 
 from ipman_rs import BodyTemplate
 from ipman_rs import Ground as NumpyGround
+from ipman_rs.checks import choice, positive
 from ipman_rs.losses import Curve, Points, Wrap
 from ipman_rs.mass import Method
 
-from .choice import chosen, positive
 from .dispatch import evaluate
 from .ground import Ground
-from .mass import COM_METHODS
-
-POINTS: tuple[Points, ...] = get_args(Points)
-CURVES: tuple[Curve, ...] = get_args(Curve)
-WRAPS: tuple[Wrap, ...] = get_args(Wrap)
 
 
 def stability_loss(
@@ -31,7 +24,7 @@ def stability_loss(
     method: Method = "pcom",
 ) -> Tensor:
     """‖g(CoM) − g(CoP)‖: vertices (..., V, 3) -> (...), m; gradient 0 where they coincide."""
-    quantity = f"stability_loss.{chosen('method', method, COM_METHODS)}"
+    quantity = f"stability_loss.{choice('method', method, Method)}"
     return evaluate(vertices, template, ground, quantity, (alpha, gamma, epsilon), ())
 
 
@@ -50,7 +43,7 @@ def ground_loss(
 
     points: "samples" or "vertices"; curve: "tanh_squared" (tanh x)² or "tanh_of_square" tanh(x²).
     """
-    quantity = f"ground_loss.{chosen('points', points, POINTS)}.{chosen('curve', curve, CURVES)}"
+    quantity = f"ground_loss.{choice('points', points, Points)}.{choice('curve', curve, Curve)}"
     options = (alpha1, positive("alpha2", alpha2), beta1, positive("beta2", beta2))
     pull, push = evaluate(vertices, template, ground, quantity, options, (2,)).unbind(dim=-1)
     return pull, push
@@ -70,5 +63,5 @@ def balance_cost(
 
     wrap: "log" log(1 + J), "saturate" J/(1 + J), or "none". A term of this project, not the paper's.
     """
-    quantity = f"balance_cost.{chosen('wrap', wrap, WRAPS)}.{chosen('method', method, COM_METHODS)}"
+    quantity = f"balance_cost.{choice('wrap', wrap, Wrap)}.{choice('method', method, Method)}"
     return evaluate(vertices, template, ground, quantity, (alpha, gamma, positive("sigma", sigma)), ())

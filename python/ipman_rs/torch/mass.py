@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import get_args
-
 from torch import Tensor
 
 from ipman_rs import BodyTemplate
+from ipman_rs.checks import choice
 from ipman_rs.mass import Method
 
-from .choice import chosen
 from .dispatch import evaluate
-
-COM_METHODS: tuple[Method, ...] = get_args(Method)
 
 
 def center_of_mass(vertices: Tensor, template: BodyTemplate, method: Method = "pcom") -> Tensor:
@@ -23,4 +19,4 @@ def center_of_mass(vertices: Tensor, template: BodyTemplate, method: Method = "p
     Raises:
         ValueError: unknown method.
     """
-    return evaluate(vertices, template, None, f"center_of_mass.{chosen('method', method, COM_METHODS)}", (), (3,))
+    return evaluate(vertices, template, None, f"center_of_mass.{choice('method', method, Method)}", (), (3,))

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, get_args
+from typing import Literal
 
 import torch
 from torch import Tensor, nn
 
 from ipman_rs import BodyTemplate, presets
 from ipman_rs import Ground as NumpyGround
+from ipman_rs.checks import choice
 from ipman_rs.losses import Curve, Points, Wrap
 from ipman_rs.mass import Method
 
-from .choice import chosen
 from .dispatch import Bodies, bodies, values_of, weighted_values_of
 from .ground import Ground
-from .losses import CURVES, POINTS, WRAPS
-from .mass import COM_METHODS
 
 Reduction = Literal["mean", "sum", "none"]
-REDUCTIONS: tuple[Reduction, ...] = get_args(Reduction)
 
 
 class IntuitivePhysicsLoss(nn.Module):
@@ -52,11 +49,11 @@ class IntuitivePhysicsLoss(nn.Module):
     ) -> None:
         super().__init__()
         numbers = presets.get(preset)
-        modes = f"{chosen('method', method, COM_METHODS)}.{chosen('points', points, POINTS)}"
-        modes = f"{modes}.{chosen('curve', curve, CURVES)}"
+        modes = f"{choice('method', method, Method)}.{choice('points', points, Points)}"
+        modes = f"{modes}.{choice('curve', curve, Curve)}"
         if numbers.stability == "balance":
             self.terms = ("balance", "pull", "push")
-            self._quantity = f"terms.balance.{chosen('wrap', wrap, WRAPS)}.{modes}"
+            self._quantity = f"terms.balance.{choice('wrap', wrap, Wrap)}.{modes}"
             first = (numbers.alpha, numbers.balance_gamma, numbers.sigma)
         else:
             self.terms = ("stability", "pull", "push")
@@ -73,7 +70,7 @@ class IntuitivePhysicsLoss(nn.Module):
         self.weights = {term: float(given.get(term, numbers.weights[term])) for term in self.terms}
         self.template = template
         self.preset = preset
-        self.reduction = chosen("reduction", reduction, REDUCTIONS)
+        self.reduction = choice("reduction", reduction, Reduction)
 
     def extra_repr(self) -> str:
         return f"preset={self.preset!r}, reduction={self.reduction!r}, weights={self.weights}"

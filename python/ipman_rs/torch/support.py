@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Literal, get_args
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -11,15 +11,12 @@ from torch import Tensor
 import ipman_rs as ip
 from ipman_rs import BaseOfSupport, BodyTemplate
 from ipman_rs import Ground as NumpyGround
+from ipman_rs.checks import choice, positive
 from ipman_rs.mass import Method
-from ipman_rs.support import Contact
+from ipman_rs.support import Contact, Solver
 
-from .choice import chosen, positive
 from .dispatch import evaluate
 from .ground import Ground, as_numpy_ground
-from .mass import COM_METHODS
-
-CONTACTS: tuple[Contact, ...] = get_args(Contact)
 
 
 def support_margin(
@@ -35,7 +32,7 @@ def support_margin(
     −inf, with gradient 0, without contact. The gradient goes to the CoM and to the samples that span the nearest edge.
     contact: "paper" |h| < τ, or "released" h < τ where ten contacts or fewer count for none.
     """
-    quantity = f"support_margin.{chosen('contact', contact, CONTACTS)}.{chosen('method', method, COM_METHODS)}"
+    quantity = f"support_margin.{choice('contact', contact, Contact)}.{choice('method', method, Method)}"
     return evaluate(vertices, template, ground, quantity, (positive("threshold", threshold),), ())
 
 
@@ -65,7 +62,7 @@ def bose(
     template: BodyTemplate,
     ground: Ground | NumpyGround,
     threshold: float = 0.1,
-    method: Literal["hull", "lp"] = "hull",
+    method: Solver = "hull",
     com_method: Method = "pcom",
     contact: Contact = "paper",
 ) -> Tensor:
@@ -73,7 +70,7 @@ def bose(
 
     "hull" is margin >= 0, on any device; "lp" is the paper's linear programme, solved on the CPU.
     """
-    if chosen("method", method, ("hull", "lp")) == "hull":
+    if choice("method", method, Solver) == "hull":
         return support_margin(vertices.detach(), template, ground, threshold, com_method, contact) >= 0
     inside = ip.bose(as_array(vertices), template, as_numpy_ground(ground), threshold, "lp", com_method, contact)
     return torch.as_tensor(inside, device=vertices.device)
