@@ -24,7 +24,7 @@ pub fn detached<O: Send>(
     match result {
         Ok(Ok(output)) => Ok(output),
         Ok(Err(ipman::Error::Interrupted)) => Err(signal.unwrap_or_else(|| PyKeyboardInterrupt::new_err(()))),
-        Ok(Err(error)) => Err(PyValueError::new_err(error.to_string())),
+        Ok(Err(error)) => Err(value_error(error)),
         Err(panic) => {
             let text = panic.downcast_ref::<String>().cloned();
             let text = text.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()));
@@ -32,4 +32,8 @@ pub fn detached<O: Send>(
             Err(PyRuntimeError::new_err(format!("ipman_rs failed internally ({text}); please report this as a bug")))
         }
     }
+}
+
+pub fn value_error(error: ipman::Error) -> PyErr {
+    PyValueError::new_err(error.to_string())
 }

@@ -1,7 +1,8 @@
 //! The five verbs that every quantity has: value, vjp, jvp, vjp_jvp, value_and_vjp.
 
 use crate::array::{Vertices, flat};
-use crate::error::detached;
+use crate::bodies::{Grounds, on_batch};
+use crate::error::value_error;
 use crate::template::Template;
 use ipman::Batch;
 use ipman::number::Scalar;
@@ -35,7 +36,7 @@ impl Verb {
 }
 
 struct Run<'a, T> {
-    batch: Batch<'a, T>,
+    batch: &'a Batch<'a, T>,
     verb: Verb,
     /// As many as the verb takes, in its order.
     upstream: Vec<&'a [T]>,
@@ -67,31 +68,6 @@ impl Visitor for Size<'_> {
     }
 }
 
-/// Where the bodies stand: the ground's normals (B, 3) and heights (B,).
-pub struct Grounds<'py> {
-    normal: PyReadonlyArray2<'py, f64>,
-    height: PyReadonlyArray1<'py, f64>,
-}
-
-impl<'py> Grounds<'py> {
-    pub fn new(normal: PyReadonlyArray2<'py, f64>, height: PyReadonlyArray1<'py, f64>) -> Self {
-        Grounds { normal, height }
-    }
-
-    pub fn slices(&self) -> PyResult<(&[f64], &[f64])> {
-        Ok((self.normal.as_slice()?, self.height.as_slice()?))
-    }
-}
-
-/// Checks (B, V, 3) against the template and the grounds; the core only knows flat lengths.
-pub fn check_vertices(shape: &[usize], template: &Template, num_grounds: usize) -> PyResult<()> {
-    let num_vertices = template.inner.mesh.num_vertices;
-    if shape == [num_grounds, num_vertices, 3] {
-        return Ok(());
-    }
-    Err(PyValueError::new_err(format!("vertices: expected ({num_grounds}, {num_vertices}, 3), got {shape:?}")))
-}
-
 /// A quantity by its name and options, over bodies on their grounds.
 struct Question<'a, 'py> {
     py: Python<'py>,
@@ -117,9 +93,7 @@ impl<'py> Question<'_, 'py> {
         upstream: &[Bound<'py, PyAny>],
     ) -> Reply<'py> {
         let shape = vertices.shape();
-        let (normals, heights) = self.grounds.slices()?;
-        check_vertices(shape, self.template, heights.len())?;
-        let (template, data) = (&self.template.inner, vertices.as_slice()?);
+        let template = &self.template.inner;
         let (quantity, options) = (self.quantity, &self.options);
         let size = named(template, quantity, options, Size(self.template)).map_err(value_error)?;
 
@@ -127,12 +101,11 @@ impl<'py> Question<'_, 'py> {
         let arrays = arrays.collect::<PyResult<Vec<_>>>()?;
         let mut slices = Vec::new();
         for (name, array) in verb.takes().iter().zip(&arrays) {
-            let expected = if *name == "d_out" { shape[0] * size } else { data.len() };
+            let expected = if *name == "d_out" { shape[0] * size } else { vertices.len() };
             slices.push(checked(flat(array, name)?, name, expected)?);
         }
 
-        let (first, second) = detached(self.py, |interrupted| {
-            let batch = Batch::new(template, data, normals, heights, interrupted)?;
+        let (first, second) = on_batch(self.py, self.template, vertices, &self.grounds, |batch| {
             named(template, quantity, options, Run { batch, verb, upstream: slices })?
         })?;
         let rows = |numbers: Vec<T>| numbers.into_pyarray(self.py).reshape([shape[0], size]);
@@ -155,10 +128,6 @@ fn checked<'a, T>(numbers: &'a [T], name: &str, expected: usize) -> PyResult<&'a
         return Ok(numbers);
     }
     Err(PyValueError::new_err(format!("{name}: expected {expected} numbers, got {}", numbers.len())))
-}
-
-fn value_error(error: ipman::Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
 }
 
 /// The quantity of each body, (B, K).

@@ -1,6 +1,7 @@
 //! `ipman_rs._core`: the crate `ipman` for Python. It translates arrays and errors and knows no formula.
 
 mod array;
+mod bodies;
 mod error;
 mod evaluate;
 mod support;

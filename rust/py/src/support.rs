@@ -1,15 +1,13 @@
 //! What is known of a body's base of support and its state: results without a gradient.
 
 use crate::array::Vertices;
-use crate::error::detached;
-use crate::evaluate::{Grounds, check_vertices};
+use crate::bodies::{Grounds, on_batch};
+use crate::error::value_error;
 use crate::template::Template;
 use ipman::Batch;
 use ipman::mass::Method;
-use ipman::number::Scalar;
 use ipman::support::{Contact, ContactRule};
-use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
-use numpy::{PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 /// The bodies and the rule of contact, in the words of Python.
@@ -27,30 +25,18 @@ impl Question<'_, '_> {
         double: impl FnOnce(&Batch<'_, f64>) -> ipman::Result<O> + Send,
     ) -> PyResult<O> {
         match vertices {
-            Vertices::Single(vertices) => self.run(&vertices, single),
-            Vertices::Double(vertices) => self.run(&vertices, double),
+            Vertices::Single(vertices) => on_batch(self.py, self.template, &vertices, &self.grounds, single),
+            Vertices::Double(vertices) => on_batch(self.py, self.template, &vertices, &self.grounds, double),
         }
-    }
-
-    fn run<T: Scalar + Element, O: Send>(
-        &self,
-        vertices: &PyReadonlyArray3<'_, T>,
-        f: impl FnOnce(&Batch<'_, T>) -> ipman::Result<O> + Send,
-    ) -> PyResult<O> {
-        let (normals, heights) = self.grounds.slices()?;
-        check_vertices(vertices.shape(), self.template, heights.len())?;
-        let (vertices, template) = (vertices.as_slice()?, &self.template.inner);
-        detached(self.py, |interrupted| f(&Batch::new(template, vertices, normals, heights, interrupted)?))
     }
 }
 
 fn contact(rule: &str, threshold: f64) -> PyResult<Contact> {
-    let rule = ContactRule::named(rule).map_err(|error| pyo3::exceptions::PyValueError::new_err(error.to_string()))?;
-    Ok(Contact { rule, threshold })
+    Ok(Contact { rule: ContactRule::named(rule).map_err(value_error)?, threshold })
 }
 
 fn method(name: &str) -> PyResult<Method> {
-    Method::named(name).map_err(|error| pyo3::exceptions::PyValueError::new_err(error.to_string()))
+    Method::named(name).map_err(value_error)
 }
 
 type Supports<'py> =

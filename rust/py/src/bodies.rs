@@ -1,0 +1,41 @@
+//! Numpy's bodies on their grounds, as a batch of the core.
+
+use crate::error::detached;
+use crate::template::Template;
+use ipman::Batch;
+use ipman::number::Scalar;
+use numpy::{Element, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// Where the bodies stand: the ground's normals (B, 3) and heights (B,).
+pub struct Grounds<'py> {
+    normal: PyReadonlyArray2<'py, f64>,
+    height: PyReadonlyArray1<'py, f64>,
+}
+
+impl<'py> Grounds<'py> {
+    pub fn new(normal: PyReadonlyArray2<'py, f64>, height: PyReadonlyArray1<'py, f64>) -> Self {
+        Grounds { normal, height }
+    }
+}
+
+/// Checks the vertices (B, V, 3) against the template and the grounds, for the core only knows flat lengths, and runs
+/// `work` on the batch without the GIL.
+pub fn on_batch<T: Scalar + Element, O: Send>(
+    py: Python<'_>,
+    template: &Template,
+    vertices: &PyReadonlyArray3<'_, T>,
+    grounds: &Grounds<'_>,
+    work: impl FnOnce(&Batch<'_, T>) -> ipman::Result<O> + Send,
+) -> PyResult<O> {
+    let (normals, heights) = (grounds.normal.as_slice()?, grounds.height.as_slice()?);
+    let (num_bodies, num_vertices) = (heights.len(), template.inner.mesh.num_vertices);
+    let shape = vertices.shape();
+    if shape != [num_bodies, num_vertices, 3] {
+        let message = format!("vertices: expected ({num_bodies}, {num_vertices}, 3), got {shape:?}");
+        return Err(PyValueError::new_err(message));
+    }
+    let (vertices, template) = (vertices.as_slice()?, &template.inner);
+    detached(py, |interrupted| work(&Batch::new(template, vertices, normals, heights, interrupted)?))
+}
