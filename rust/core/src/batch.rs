@@ -1,38 +1,35 @@
-//! Batches: many bodies of one template, over threads. The only file that knows threads.
+//! Batches: many bodies of one template, over the lanes of a number and over threads.
 //!
-//! Every body is computed from start to end by one thread, so its bits depend neither on the number of threads nor on
-//! its neighbours. The pool belongs to the process that made it: after a fork the child makes its own.
+//! Every body is computed from start to end in one lane by one thread, and all numbers of a CPU level round alike, so its
+//! bits depend neither on the number of threads nor on its neighbours nor on its place.
 
 use crate::error::{Error, Result, status};
 use crate::ground::Ground;
 use crate::mass::Method;
+use crate::number::gate::{Level, Work};
 use crate::number::vector::{Vec3, sub};
-use crate::number::{Dual, Real, Scalar};
+use crate::number::{Data, Dual, Real, Scalar};
 use crate::quantity::Quantity;
 use crate::scene::{self, Scene};
 use crate::support::{BaseOfSupport, Contact};
 use crate::template::Template;
-use crate::volume::signed_volumes;
-use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use crate::threads;
+use crate::volume::SignedVolumes;
 
 /// `num_bodies` poses of one template, each over its ground.
 pub struct Batch<'a, T> {
     template: &'a Template,
     vertices: &'a [T],
     grounds: Vec<Ground<f64>>,
+    level: Level,
     /// Asked now and then from the calling thread; true gives up with [`Error::Interrupted`].
     interrupted: &'a (dyn Fn() -> bool + Sync + 'a),
 }
 
 /// Work on one body costs at least this many vertices' worth before a second thread pays.
 const INLINE_VERTICES: usize = 2_000;
-/// Bodies between two questions for an interruption, for each thread.
-const WAVE: usize = 8;
 
-impl<'a, T: Scalar> Batch<'a, T> {
+impl<'a, T: Data> Batch<'a, T> {
     /// `vertices` holds B·V·3 coordinates, `normals` B·3, `heights` B.
     pub fn new(
         template: &'a Template,
@@ -61,7 +58,13 @@ impl<'a, T: Scalar> Batch<'a, T> {
             })
         };
         let grounds = (0..num_bodies).map(ground).collect::<Result<Vec<_>>>()?;
-        Ok(Batch { template, vertices, grounds, interrupted })
+        Ok(Batch { template, vertices, grounds, level: Level::current()?, interrupted })
+    }
+
+    /// The same batch at another CPU level of this machine.
+    pub fn at_level(self, level: Level) -> Self {
+        assert!(Level::available().contains(&level), "this machine has no {}", level.name());
+        Batch { level, ..self }
     }
 
     pub fn len(&self) -> usize {
@@ -72,64 +75,106 @@ impl<'a, T: Scalar> Batch<'a, T> {
         self.grounds.is_empty()
     }
 
-    /// B·K numbers.
-    pub fn value<Q: Quantity>(&self, quantity: &Q) -> Result<Vec<T>> {
+    /// The quantity of each body: B·K numbers.
+    pub fn value_into<Q: Quantity>(&self, quantity: &Q, out: &mut [T]) -> Result<()> {
         let size = quantity.len(self.template);
-        let mut out = vec![T::zero(); self.len() * size];
-        self.each([(&mut out, size)], |body, [out]| {
-            self.run(body, out, |scene, out| drop(quantity.forward(scene, out)));
-        })?;
-        Ok(out)
+        self.each([(out, size)], |group, [out]| {
+            self.on_lanes(group, Forward { quantity, size, out });
+        })
     }
 
-    /// The gradient of Σ d_out · value: B·V·3 numbers.
-    pub fn vjp<Q: Quantity>(&self, quantity: &Q, d_out: &[T]) -> Result<Vec<T>> {
-        Ok(self.value_and_vjp(quantity, d_out)?.1)
-    }
-
-    /// Both in one pass.
-    pub fn value_and_vjp<Q: Quantity>(&self, quantity: &Q, d_out: &[T]) -> Result<(Vec<T>, Vec<T>)> {
+    /// The quantity, and the gradient of Σ d_out · value by the vertices: B·V·3 numbers, in one pass.
+    pub fn value_and_vjp_into<Q: Quantity>(
+        &self,
+        quantity: &Q,
+        d_out: &[T],
+        out: &mut [T],
+        d_vertices: &mut [T],
+    ) -> Result<()> {
         let (size, row) = (quantity.len(self.template), 3 * self.template.mesh.num_vertices);
-        let mut out = vec![T::zero(); self.len() * size];
-        let mut d_vertices = vec![T::zero(); self.len() * row];
-        self.each([(&mut out, size), (&mut d_vertices, row)], |body, [out, d_vertices]| {
-            let d_out = &d_out[body * size..][..size];
-            self.run(body, out, |scene, out| {
-                let d_points = gradient(quantity, scene, d_out, out);
-                hand_out(&d_points, d_out, d_vertices, |d| d);
-            });
-        })?;
-        Ok((out, d_vertices))
+        self.each([(out, size), (d_vertices, row)], |group, [out, d_vertices]| {
+            let d_out = group.bodies.iter().map(|&body| &d_out[body * size..][..size]).collect();
+            let work = ForwardAndBackward { template: self.template, quantity, size, d_out, out, d_vertices };
+            self.on_lanes(group, work);
+        })
+    }
+
+    /// The gradient of Σ d_out · value alone.
+    pub fn vjp_into<Q: Quantity>(&self, quantity: &Q, d_out: &[T], d_vertices: &mut [T]) -> Result<()> {
+        let mut out = vec![T::zero(); d_out.len()];
+        self.value_and_vjp_into(quantity, d_out, &mut out, d_vertices)
     }
 
     /// The derivative of the value along `d_vertices`: B·K numbers.
-    pub fn jvp<Q: Quantity>(&self, quantity: &Q, d_vertices: &[T]) -> Result<Vec<T>> {
+    pub fn jvp_into<Q: Quantity>(&self, quantity: &Q, d_vertices: &[T], out: &mut [T]) -> Result<()> {
         let size = quantity.len(self.template);
-        let mut out = vec![T::zero(); self.len() * size];
-        self.each([(&mut out, size)], |body, [out]| {
-            self.run_dual(body, d_vertices, |scene| {
+        self.each_body((out, size), |body, out| {
+            out.fill(T::zero());
+            self.on_dual(body, d_vertices, |scene| {
                 let mut value = vec![Dual::zero(); size];
                 quantity.forward(scene, &mut value);
                 for (out, value) in out.iter_mut().zip(value) {
                     *out = finite_or_zero(T::of(value.slope));
                 }
             });
-        })?;
-        Ok(out)
+        })
     }
 
     /// The derivative of `vjp(d_out)` along `d_vertices`, a Hessian-vector product: B·V·3 numbers.
-    pub fn vjp_jvp<Q: Quantity>(&self, quantity: &Q, d_out: &[T], d_vertices: &[T]) -> Result<Vec<T>> {
+    pub fn vjp_jvp_into<Q: Quantity>(&self, quantity: &Q, d_out: &[T], d_vertices: &[T], out: &mut [T]) -> Result<()> {
         let (size, row) = (quantity.len(self.template), 3 * self.template.mesh.num_vertices);
-        let mut out = vec![T::zero(); self.len() * row];
-        self.each([(&mut out, row)], |body, [out]| {
-            self.run_dual(body, d_vertices, |scene| {
+        self.each_body((out, row), |body, out| {
+            out.fill(T::zero());
+            self.on_dual(body, d_vertices, |scene| {
                 let d_out: Vec<_> = d_out[body * size..][..size].iter().map(|d| Dual::of(d.value())).collect();
-                let d_points = gradient(quantity, scene, &d_out, &mut vec![Dual::zero(); size]);
-                hand_out(&d_points, &d_out, out, |d| T::of(d.slope));
+                let mut d_points = vec![[Dual::zero(); 3]; scene.points.len()];
+                quantity.forward_and_backward(scene, &d_out, &mut vec![Dual::zero(); size], &mut d_points);
+                scene.template.closing.backward(&mut d_points);
+                for (out, d) in out.iter_mut().zip(d_points.as_flattened()) {
+                    *out = T::of(d.slope);
+                }
+                zero_if_undefined(out, d_out.iter().all(|d| d.value.is_finite()));
             });
-        })?;
-        Ok(out)
+        })
+    }
+
+    /// [`Batch::value_into`] a new vector.
+    pub fn value<Q: Quantity>(&self, quantity: &Q) -> Result<Vec<T>> {
+        let mut out = self.rows(quantity.len(self.template));
+        self.value_into(quantity, &mut out).map(|()| out)
+    }
+
+    /// [`Batch::value_and_vjp_into`] new vectors.
+    pub fn value_and_vjp<Q: Quantity>(&self, quantity: &Q, d_out: &[T]) -> Result<(Vec<T>, Vec<T>)> {
+        let (mut out, mut d_vertices) = (self.rows(quantity.len(self.template)), self.rows(self.row()));
+        self.value_and_vjp_into(quantity, d_out, &mut out, &mut d_vertices).map(|()| (out, d_vertices))
+    }
+
+    /// [`Batch::vjp_into`] a new vector.
+    pub fn vjp<Q: Quantity>(&self, quantity: &Q, d_out: &[T]) -> Result<Vec<T>> {
+        let mut d_vertices = self.rows(self.row());
+        self.vjp_into(quantity, d_out, &mut d_vertices).map(|()| d_vertices)
+    }
+
+    /// [`Batch::jvp_into`] a new vector.
+    pub fn jvp<Q: Quantity>(&self, quantity: &Q, d_vertices: &[T]) -> Result<Vec<T>> {
+        let mut out = self.rows(quantity.len(self.template));
+        self.jvp_into(quantity, d_vertices, &mut out).map(|()| out)
+    }
+
+    /// [`Batch::vjp_jvp_into`] a new vector.
+    pub fn vjp_jvp<Q: Quantity>(&self, quantity: &Q, d_out: &[T], d_vertices: &[T]) -> Result<Vec<T>> {
+        let mut out = self.rows(self.row());
+        self.vjp_jvp_into(quantity, d_out, d_vertices, &mut out).map(|()| out)
+    }
+
+    fn rows(&self, size: usize) -> Vec<T> {
+        vec![T::zero(); self.len() * size]
+    }
+
+    /// Coordinates of one body.
+    fn row(&self) -> usize {
+        3 * self.template.mesh.num_vertices
     }
 
     /// The base of support of each body.
@@ -147,7 +192,7 @@ impl<'a, T: Scalar> Batch<'a, T> {
     /// The bits of [`status`].
     pub fn status(&self, contact: &Contact) -> Result<Vec<u32>> {
         self.map(status::NON_FINITE, |scene| {
-            let volumes = signed_volumes(&scene.template.closing, scene.points);
+            let volumes = SignedVolumes::forward(&scene.template.closing, scene.points).of_parts;
             let support = BaseOfSupport::new(scene, contact, Method::VertexMean);
             let size = extent(&scene.points[..scene.template.mesh.num_vertices]);
             let bits = [
@@ -163,40 +208,30 @@ impl<'a, T: Scalar> Batch<'a, T> {
     /// One result a body, in double precision; `bad` for a body that is not finite.
     fn map<O: Clone + Send + Sync>(&self, bad: O, f: impl Fn(&Scene<f64>) -> O + Sync) -> Result<Vec<O>> {
         let mut out = vec![bad; self.len()];
-        self.each([(&mut out, 1)], |body, [out]| {
+        self.each_body((&mut out, 1), |body, out| {
             if let Some(origin) = self.origin(body) {
-                let points = self.points(body, |x, o| Real::of(x.value() - o), origin);
-                out[0] = f(&Scene::new(self.template, &points, &self.grounds[body], origin));
+                let points = self.points(body, |x, o| x.value() - o, origin);
+                out[0] = f(&Scene::new(self.template, &points, &[self.grounds[body]], &[origin]));
             }
         })?;
         Ok(out)
     }
 
-    /// Shows one body to `f`; a body that is not finite gets NaN, and its gradient stays zero.
-    fn run(&self, body: usize, out: &mut [T], f: impl FnOnce(&Scene<T>, &mut [T])) {
-        match self.origin(body) {
-            Some(origin) => {
-                let points = self.points(body, |x, o| x - T::of(o), origin);
-                f(&Scene::new(self.template, &points, &self.grounds[body], origin), out);
-            }
-            None => out.fill(T::of(f64::NAN)),
-        }
-    }
-
-    /// Shows one body to `f` as dual numbers along `d_vertices`.
-    fn run_dual(&self, body: usize, d_vertices: &[T], f: impl FnOnce(&Scene<Dual>)) {
+    /// Shows one body to `f` as dual numbers along `d_vertices`, if it is finite.
+    fn on_dual(&self, body: usize, d_vertices: &[T], f: impl FnOnce(&Scene<Dual>)) {
         let Some(origin) = self.origin(body) else { return };
         let row = 3 * self.template.mesh.num_vertices;
         let mut slopes = d_vertices[body * row..][..row].iter();
         let dual = |x: T, o: f64| Dual::new(x.value() - o, slopes.next().expect("as long as the vertices").value());
         let points = self.points(body, dual, origin);
-        f(&Scene::new(self.template, &points, &self.grounds[body], origin));
+        f(&Scene::new(self.template, &points, &[self.grounds[body]], &[origin]));
     }
 
     /// The body's local origin, if all its vertices are finite.
     fn origin(&self, body: usize) -> Option<Vec3<f64>> {
         let vertices = self.vertices_of(body);
-        let finite = vertices.iter().all(|x| x.value().is_finite());
+        let broken = |piece: &[T]| piece.iter().fold(false, |broken, x| broken | !x.value().is_finite());
+        let finite = !vertices.chunks(1024).any(broken);
         finite.then(|| scene::origin(std::array::from_fn(|k| vertices[k].value())))
     }
 
@@ -215,51 +250,165 @@ impl<'a, T: Scalar> Batch<'a, T> {
         points
     }
 
-    /// Runs `f` on every body with its rows of the outputs.
-    fn each<O: Send, const N: usize>(
+    /// Runs `f` on groups of finite bodies, with their rows of the outputs, which are NaN and then zero for the others.
+    fn each<const N: usize>(
         &self,
-        outputs: [(&mut Vec<O>, usize); N],
-        f: impl Fn(usize, [&mut [O]; N]) + Sync,
+        outputs: [(&mut [T], usize); N],
+        f: impl Fn(&Group, [Vec<&mut [T]>; N]) + Sync,
     ) -> Result<()> {
-        let mut rows: Vec<[&mut [O]; N]> = Vec::with_capacity(self.len());
         let mut rest = outputs.map(|(data, size)| data.chunks_exact_mut(size));
-        for _ in 0..self.len() {
-            rows.push(rest.each_mut().map(|chunks| chunks.next().expect("one row a body")));
-        }
-        let mut rows: Vec<_> = rows.into_iter().enumerate().collect();
-        let threads = if self.len() * self.template.mesh.num_vertices < INLINE_VERTICES { 1 } else { num_threads() };
-        while !rows.is_empty() {
-            if (self.interrupted)() {
-                return Err(Error::Interrupted);
-            }
-            let wave: Vec<_> = rows.drain(..rows.len().min(WAVE * threads)).collect();
-            if threads == 1 || wave.len() == 1 {
-                wave.into_iter().for_each(|(body, rows)| f(body, rows));
-            } else {
-                pool().install(|| wave.into_par_iter().for_each(|(body, rows)| f(body, rows)));
+        let (mut bodies, mut rows) = (Vec::new(), Vec::new());
+        for body in 0..self.len() {
+            let mut row = rest.each_mut().map(|chunks| chunks.next().expect("one row a body"));
+            match self.origin(body) {
+                Some(origin) => {
+                    bodies.push((body, origin));
+                    rows.push(row);
+                }
+                None => row.iter_mut().enumerate().for_each(|(k, row)| row.fill(T::of([f64::NAN, 0.0][k]))),
             }
         }
-        Ok(())
+        let mut items = Vec::new();
+        let mut rows = rows.into_iter();
+        for group in Group::of(&bodies, self.level, T::widths(self.level)) {
+            let mut own: [Vec<&mut [T]>; N] = std::array::from_fn(|_| Vec::with_capacity(group.width));
+            for row in rows.by_ref().take(group.bodies.len()) {
+                own.iter_mut().zip(row).for_each(|(own, row)| own.push(row));
+            }
+            items.push((group, own));
+        }
+        threads::each(items, self.pays_threads(), self.interrupted, &|(group, rows)| f(&group, rows))
+    }
+
+    /// Runs `f` on every body with its row of the output.
+    fn each_body<O: Send>(&self, output: (&mut [O], usize), f: impl Fn(usize, &mut [O]) + Sync) -> Result<()> {
+        let rows: Vec<_> = output.0.chunks_exact_mut(output.1).enumerate().collect();
+        threads::each(rows, self.pays_threads(), self.interrupted, &|(body, row)| f(body, row))
+    }
+
+    fn pays_threads(&self) -> bool {
+        self.len() * self.template.mesh.num_vertices >= INLINE_VERTICES
+    }
+
+    /// Shows a group of bodies, one a lane, to `work`.
+    fn on_lanes<W: OnLanes<T>>(&self, group: &Group, work: W) {
+        T::enter(group.level, group.width, ReadBodies { batch: self, group, work });
     }
 }
 
-/// Forward and backward of one body; the gradient by all points, then folded onto the mesh's vertices.
-fn gradient<R: Real, Q: Quantity>(quantity: &Q, scene: &Scene<R>, d_out: &[R], out: &mut [R]) -> Vec<Vec3<R>> {
-    let saved = quantity.forward(scene, out);
-    let mut d_points = vec![[R::zero(); 3]; scene.points.len()];
-    quantity.backward(scene, &saved, d_out, &mut d_points);
-    scene.template.closing.backward(&mut d_points);
-    d_points
+/// Finite bodies that are computed side by side, by their index, and their local origins.
+struct Group {
+    level: Level,
+    width: usize,
+    bodies: Vec<usize>,
+    origins: Vec<Vec3<f64>>,
 }
 
-/// Writes the vertices' gradient. One that is not finite, though the upstream gradient is, belongs to a body on which
-/// the quantity is undefined (no volume, coordinates out of range): it becomes zero.
-fn hand_out<S: Scalar, T: Scalar>(d_points: &[Vec3<S>], d_out: &[S], d_vertices: &mut [T], number: impl Fn(S) -> T) {
-    for (out, d) in d_vertices.iter_mut().zip(d_points.iter().flatten()) {
-        *out = number(*d);
+impl Group {
+    /// Groups as wide as pays: a group that is half empty takes as long as a full one.
+    fn of(bodies: &[(usize, Vec3<f64>)], level: Level, widths: &[usize]) -> Vec<Group> {
+        let mut groups = Vec::new();
+        let mut rest = bodies;
+        for &width in widths {
+            while 2 * rest.len() > width {
+                let (group, others) = rest.split_at(width.min(rest.len()));
+                rest = others;
+                let (bodies, origins) = group.iter().copied().unzip();
+                groups.push(Group { level, width, bodies, origins });
+            }
+        }
+        groups
     }
-    if d_out.iter().all(|d| d.value().is_finite()) && !d_vertices.iter().all(|d| d.value().is_finite()) {
-        d_vertices.fill(T::zero());
+
+    /// The body of each lane; lanes that are left over repeat the last body.
+    fn lanes(&self) -> impl Iterator<Item = usize> {
+        (0..self.width).map(|lane| lane.min(self.bodies.len() - 1))
+    }
+}
+
+/// What is done with bodies on lanes.
+trait OnLanes<T> {
+    fn run<R: Real<Data = T>>(self, scene: &Scene<R>);
+}
+
+/// Turns the bodies of a group into lanes.
+struct ReadBodies<'a, T, W> {
+    batch: &'a Batch<'a, T>,
+    group: &'a Group,
+    work: W,
+}
+
+impl<T: Data, W: OnLanes<T>> Work<T> for ReadBodies<'_, T, W> {
+    type Output = ();
+
+    fn run<R: Real<Data = T>>(self) {
+        let ReadBodies { batch, group, work } = self;
+        let template = batch.template;
+        let (mut rows, mut local, mut grounds, mut origins) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for lane in group.lanes() {
+            let origin = group.origins[lane];
+            rows.push(batch.vertices_of(group.bodies[lane]));
+            local.push(origin.map(T::of));
+            grounds.push(batch.grounds[group.bodies[lane]]);
+            origins.push(origin);
+        }
+        let mut points = Vec::with_capacity(template.closing.num_points());
+        points.resize(template.mesh.num_vertices, [R::zero(); 3]);
+        R::read_rows(&rows, &local, points.as_flattened_mut());
+        template.closing.forward(&mut points);
+        work.run(&Scene::new(template, &points, &grounds, &origins));
+    }
+}
+
+struct Forward<'a, T, Q> {
+    quantity: &'a Q,
+    size: usize,
+    out: Vec<&'a mut [T]>,
+}
+
+impl<T: Data, Q: Quantity> OnLanes<T> for Forward<'_, T, Q> {
+    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
+        let mut out = vec![R::zero(); self.size];
+        self.quantity.forward(scene, &mut out);
+        R::write_rows(&out, &mut self.out);
+    }
+}
+
+struct ForwardAndBackward<'a, T, Q> {
+    template: &'a Template,
+    quantity: &'a Q,
+    size: usize,
+    d_out: Vec<&'a [T]>,
+    out: Vec<&'a mut [T]>,
+    d_vertices: Vec<&'a mut [T]>,
+}
+
+impl<T: Data, Q: Quantity> OnLanes<T> for ForwardAndBackward<'_, T, Q> {
+    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
+        let last = self.d_out.len() - 1;
+        let mut d_out = Vec::with_capacity(self.size);
+        for k in 0..self.size {
+            d_out.push(R::from_lanes(|lane| R::Scalar::read(self.d_out[lane.min(last)][k])));
+        }
+        let mut out = vec![R::zero(); self.size];
+        let mut d_points = vec![[R::zero(); 3]; scene.points.len()];
+        self.quantity.forward_and_backward(scene, &d_out, &mut out, &mut d_points);
+        self.template.closing.backward(&mut d_points);
+        R::write_rows(&out, &mut self.out);
+        let d_vertices = &d_points[..self.template.mesh.num_vertices];
+        R::write_rows(d_vertices.as_flattened(), &mut self.d_vertices);
+        for (row, d_out) in self.d_vertices.iter_mut().zip(&self.d_out) {
+            zero_if_undefined(row, d_out.iter().all(|d| d.value().is_finite()));
+        }
+    }
+}
+
+/// A gradient that is not finite, though the upstream gradient is, belongs to a body on which the quantity is undefined
+/// (no volume, coordinates out of range): it becomes zero.
+fn zero_if_undefined<T: Scalar>(gradient: &mut [T], upstream_is_finite: bool) {
+    let broken = |piece: &[T]| piece.iter().fold(false, |broken, x| broken | !x.value().is_finite());
+    if upstream_is_finite && gradient.chunks(1024).any(broken) {
+        gradient.fill(T::zero());
     }
 }
 
@@ -273,41 +422,4 @@ fn extent(vertices: &[Vec3<f64>]) -> f64 {
         vertices.iter().fold(vertices[0], |best, v| std::array::from_fn(|k| pick(best[k], v[k])))
     };
     sub(bound(f64::max), bound(f64::min)).into_iter().fold(0.0, f64::max)
-}
-
-static NUM_THREADS: AtomicUsize = AtomicUsize::new(0);
-
-/// The threads that batches use: [`set_num_threads`], else `RAYON_NUM_THREADS`, else the machine's cores.
-pub fn num_threads() -> usize {
-    match NUM_THREADS.load(Ordering::Relaxed) {
-        0 => {
-            let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.trim().parse().ok());
-            let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
-            let threads = asked.filter(|&n: &usize| n > 0).unwrap_or_else(cores);
-            NUM_THREADS.store(threads, Ordering::Relaxed);
-            threads
-        }
-        threads => threads,
-    }
-}
-
-pub fn set_num_threads(threads: usize) {
-    NUM_THREADS.store(threads.clamp(1, 1024), Ordering::Relaxed);
-}
-
-/// The pool of this process with the wanted number of threads. Pools are leaked: a forked child must not even drop its
-/// parent's.
-fn pool() -> &'static ThreadPool {
-    static POOL: Mutex<Option<(u32, usize, &'static ThreadPool)>> = Mutex::new(None);
-    let wanted = (std::process::id(), num_threads());
-    let mut pool = POOL.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    match *pool {
-        Some((process, threads, pool)) if (process, threads) == wanted => pool,
-        _ => {
-            let made = ThreadPoolBuilder::new().num_threads(wanted.1).thread_name(|i| format!("ipman-{i}")).build();
-            let made = Box::leak(Box::new(made.expect("the system refuses new threads")));
-            *pool = Some((wanted.0, wanted.1, made));
-            made
-        }
-    }
 }

@@ -9,8 +9,9 @@
 //! no later room needs to know which of them were added.
 
 use crate::mesh::Mesh;
-use crate::number::Real;
 use crate::number::vector::{Vec3, add, narrow, scale, widen, zero};
+use crate::number::{Real, Room};
+use crate::rings::Rings;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -23,6 +24,8 @@ pub struct Closing {
     pub faces: Vec<[u32; 3]>,
     /// Where each part's faces and caps lie in `faces`.
     pub parts: Vec<Range<usize>>,
+    /// The rings of each part's points.
+    pub rings: Vec<Rings>,
 }
 
 impl Closing {
@@ -39,11 +42,13 @@ impl Closing {
         }
         let mut faces = Vec::new();
         let mut parts = Vec::new();
+        let mut rings = Vec::new();
         for part in by_part {
+            rings.push(Rings::new(&part));
             parts.push(faces.len()..faces.len() + part.len());
             faces.extend(part);
         }
-        Closing { num_vertices: mesh.num_vertices, components, faces, parts }
+        Closing { num_vertices: mesh.num_vertices, components, faces, parts, rings }
     }
 
     /// Number of vertices of the closed body: the mesh's and the virtual ones.
@@ -54,7 +59,24 @@ impl Closing {
     /// Appends the virtual vertices to the mesh's.
     pub fn forward<R: Real>(&self, vertices: &mut Vec<Vec3<R>>) {
         debug_assert_eq!(vertices.len(), self.num_vertices);
-        for component in &self.components {
+        R::apart::<Forward, _>((self, vertices));
+    }
+
+    /// Hands the virtual vertices' gradients to the vertices they are means of.
+    pub fn backward<R: Real>(&self, d_points: &mut [Vec3<R>]) {
+        R::apart::<Backward, _>((self, d_points));
+    }
+}
+
+/// [`Closing::forward`]
+struct Forward;
+
+impl<R: Real> Room<(&Closing, &mut Vec<Vec3<R>>)> for Forward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((closing, vertices): (&Closing, &mut Vec<Vec3<R>>)) {
+        for component in &closing.components {
             let mut sum = zero::<R::Wide>();
             for &vertex in component {
                 sum = add(sum, widen(vertices[vertex as usize]));
@@ -62,11 +84,18 @@ impl Closing {
             vertices.push(narrow::<R>(scale(R::Wide::of(1.0 / component.len() as f64), sum)));
         }
     }
+}
 
-    /// Hands the virtual vertices' gradients to the vertices they are means of.
-    pub fn backward<R: Real>(&self, d_points: &mut [Vec3<R>]) {
-        let (d_vertices, d_centres) = d_points.split_at_mut(self.num_vertices);
-        for (component, d_centre) in self.components.iter().zip(d_centres) {
+/// [`Closing::backward`]
+struct Backward;
+
+impl<R: Real> Room<(&Closing, &mut [Vec3<R>])> for Backward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((closing, d_points): (&Closing, &mut [Vec3<R>])) {
+        let (d_vertices, d_centres) = d_points.split_at_mut(closing.num_vertices);
+        for (component, d_centre) in closing.components.iter().zip(d_centres) {
             let share = scale(R::of(1.0 / component.len() as f64), *d_centre);
             for &vertex in component {
                 d_vertices[vertex as usize] = add(d_vertices[vertex as usize], share);

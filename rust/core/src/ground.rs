@@ -1,7 +1,7 @@
 //! The ground: a plane with a unit normal n at a height along it. h(u) = n·u − height, g(u) = u − h(u) n.
 
 use crate::error::{Error, Result};
-use crate::number::vector::{Vec3, add, add_scaled, cross, dot, of, scale, sub};
+use crate::number::vector::{Vec3, add, add_scaled, cross, dot, scale, sub};
 use crate::number::{Real, Scalar};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,10 +44,6 @@ impl Ground<f64> {
         Ground { normal: self.normal, height: self.height - dot(self.normal, origin) }
     }
 
-    pub fn cast<R: Real>(&self) -> Ground<R> {
-        Ground { normal: of(self.normal), height: R::of(self.height) }
-    }
-
     /// Two unit vectors in the plane; (e1, e2, n) is right-handed. e1 lies along x unless the normal does.
     pub fn axes(&self) -> [Vec3<f64>; 2] {
         let n = self.normal;
@@ -66,6 +62,7 @@ impl<R: Real> Ground<R> {
     }
 
     /// g(u), the point's foot on the ground.
+    #[inline(always)]
     pub fn project(&self, point: Vec3<R>) -> Vec3<R> {
         let mut foot = point;
         add_scaled(&mut foot, -self.signed_height(point), self.normal);
@@ -73,6 +70,7 @@ impl<R: Real> Ground<R> {
     }
 
     /// The part of a vector that lies in the plane.
+    #[inline(always)]
     pub fn along(&self, vector: Vec3<R>) -> Vec3<R> {
         sub(vector, scale(dot(self.normal, vector), self.normal))
     }
@@ -81,24 +79,23 @@ impl<R: Real> Ground<R> {
 /// Coordinates within the plane: x = (e1·u, e2·u).
 #[derive(Clone, Copy)]
 pub struct Plane<R> {
-    axes: [Vec3<R>; 2],
+    pub axes: [Vec3<R>; 2],
 }
 
 impl<R: Real> Plane<R> {
-    pub fn of(axes: [Vec3<f64>; 2]) -> Self {
-        Plane { axes: axes.map(of) }
-    }
-
+    #[inline(always)]
     pub fn flatten(&self, point: Vec3<R>) -> [R; 2] {
-        self.axes.map(|axis| dot(axis, point))
+        [dot(self.axes[0], point), dot(self.axes[1], point)]
     }
 
     /// The vector in space whose plane coordinates are `flat`: also the adjoint of [`Plane::flatten`].
+    #[inline(always)]
     pub fn raise(&self, flat: [R; 2]) -> Vec3<R> {
         add(scale(flat[0], self.axes[0]), scale(flat[1], self.axes[1]))
     }
 }
 
+#[inline(always)]
 pub fn values<S: Scalar>(flat: [S; 2]) -> [f64; 2] {
     flat.map(S::value)
 }

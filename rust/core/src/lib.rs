@@ -4,7 +4,7 @@
 
 /// What can be wrong with a call, and with one body of a batch.
 pub mod error;
-/// The numbers that rooms compute with: f32, f64, dual numbers.
+/// The numbers that rooms compute with: f32, f64, lanes of them, dual numbers; the gates to the CPU's levels.
 pub mod number;
 
 /// The ground plane: signed height h(u), projection g(u).
@@ -13,6 +13,8 @@ pub mod ground;
 pub mod mesh;
 /// Close: interfaces between parts get shared virtual vertices and caps.
 pub mod closing;
+/// Around each point of a closed part its neighbours: area vectors, the volume's gradient.
+pub mod rings;
 /// Fill: signed tetrahedra of each closed part; exact mass properties.
 pub mod volume;
 /// Triangle point picking, W and Wᵀ, and the passes over the points.
@@ -32,8 +34,10 @@ pub mod template;
 pub mod scene;
 /// What a differentiable room offers, and the list of all.
 pub mod quantity;
-/// Many bodies over threads.
+/// Many bodies over lanes and threads.
 pub mod batch;
+/// How many threads, and the pool.
+pub mod threads;
 
 pub use batch::Batch;
 pub use error::{Error, Result};

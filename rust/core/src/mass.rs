@@ -1,12 +1,12 @@
 //! The centre of mass: the paper's pCoM, the alternatives of its supplement, and the exact integral.
 
 use crate::error::Result;
-use crate::number::Real;
 use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, scale, sub, widen};
+use crate::number::{Real, Room};
 use crate::quantity::{Quantity, unknown_choice};
 use crate::scene::Scene;
 use crate::template::Template;
-use crate::volume::{Moments, absolute, part_moments, part_moments_backward, signed_volumes, signed_volumes_backward};
+use crate::volume::{Moments, SignedVolumes, absolute, part_moments, part_moments_backward};
 
 /// How a body's mass is spread.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,8 +38,30 @@ impl Method {
         }
     }
 
-    pub fn forward<R: Real>(self, scene: &Scene<R>) -> Centre<R::Wide> {
-        match self {
+    pub fn forward<R: Real>(self, scene: &Scene<R>) -> Centre<R> {
+        R::apart::<Forward, _>((self, scene))
+    }
+
+    pub fn backward<R: Real>(
+        self,
+        scene: &Scene<R>,
+        centre: &Centre<R>,
+        d_centre: Vec3<R::Wide>,
+        d_points: &mut [Vec3<R>],
+    ) {
+        R::apart::<Backward, _>((self, scene, centre, d_centre, d_points));
+    }
+}
+
+/// [`Method::forward`]
+struct Forward;
+
+impl<R: Real> Room<(Method, &Scene<'_, R>)> for Forward {
+    type Output = Centre<R>;
+
+    #[inline(always)]
+    fn enter((method, scene): (Method, &Scene<R>)) -> Centre<R> {
+        match method {
             Method::Pcom => pcom(scene),
             Method::VertexMean => vertex_mean(scene),
             Method::SampleMean => sample_mean(scene),
@@ -47,15 +69,19 @@ impl Method {
             Method::Exact => exact(scene),
         }
     }
+}
 
-    pub fn backward<R: Real>(
-        self,
-        scene: &Scene<R>,
-        centre: &Centre<R::Wide>,
-        d_centre: Vec3<R::Wide>,
-        d_points: &mut [Vec3<R>],
-    ) {
-        match self {
+/// [`Method::backward`]
+struct Backward;
+
+impl<R: Real> Room<(Method, &Scene<'_, R>, &Centre<R>, Vec3<R::Wide>, &mut [Vec3<R>])> for Backward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter(
+        (method, scene, centre, d_centre, d_points): (Method, &Scene<R>, &Centre<R>, Vec3<R::Wide>, &mut [Vec3<R>]),
+    ) -> () {
+        match method {
             Method::Pcom => pcom_backward(scene, centre, d_centre, d_points),
             Method::VertexMean => vertex_mean_backward(scene, d_centre, d_points),
             Method::SampleMean => sample_mean_backward(scene, d_centre, d_points),
@@ -66,57 +92,75 @@ impl Method {
 }
 
 /// A centre of mass in local coordinates, with what its backward needs.
-pub struct Centre<W> {
-    pub point: Vec3<W>,
+pub struct Centre<R: Real> {
+    pub point: Vec3<R::Wide>,
     /// The total weight: sample volumes, area or volume.
-    total: W,
-    /// pCoM: each part's volume, its sign, and the sum of its samples.
-    parts: Vec<(W, W, Vec3<W>)>,
+    total: R::Wide,
+    /// pCoM only.
+    parts: Option<Parts<R>>,
 }
 
-impl<W: Real> Centre<W> {
-    fn plain(moment: Vec3<W>, total: W) -> Self {
-        Centre { point: moment.map(|x| x / total), total, parts: Vec::new() }
+/// The parts' volumes, and of each the absolute value, its sign, and the sum of its samples.
+struct Parts<R: Real> {
+    signed: SignedVolumes<R>,
+    of_parts: Vec<(R::Wide, R::Wide, Vec3<R::Wide>)>,
+}
+
+impl<R: Real> Centre<R> {
+    #[inline(always)]
+    fn plain(moment: Vec3<R::Wide>, total: R::Wide) -> Self {
+        Centre { point: [moment[0] / total, moment[1] / total, moment[2] / total], total, parts: None }
     }
 }
 
-fn pcom<R: Real>(scene: &Scene<R>) -> Centre<R::Wide> {
-    let (volumes, signs) = absolute(&signed_volumes(&scene.template.closing, scene.points));
+#[inline(always)]
+fn pcom<R: Real>(scene: &Scene<R>) -> Centre<R> {
+    let signed = SignedVolumes::forward(&scene.template.closing, scene.points);
+    let (volumes, signs) = absolute(&signed.of_parts);
     let mut total = R::Wide::zero();
     let mut moment = [R::Wide::zero(); 3];
-    let mut parts = Vec::with_capacity(volumes.len());
+    let mut of_parts = Vec::with_capacity(volumes.len());
     for ((row, volume), sign) in scene.template.samples.part_sums.iter().zip(volumes).zip(signs) {
         let sum = row.forward(scene.points);
-        total = total + volume * R::Wide::of(row.count as f64);
+        total = volume.mul_add(R::Wide::of(row.count as f64), total);
         add_scaled(&mut moment, volume, sum);
-        parts.push((volume, sign, sum));
+        of_parts.push((volume, sign, sum));
     }
-    Centre { parts, ..Centre::plain(moment, total) }
+    Centre { parts: Some(Parts { signed, of_parts }), ..Centre::plain(moment, total) }
 }
 
 /// ∂m̄/∂c_p = vol_p / Σ vol n and ∂m̄/∂vol_p = (c_p − n_p m̄) / Σ vol n, c_p the sum of the part's n_p samples.
-fn pcom_backward<R: Real>(
-    scene: &Scene<R>,
-    centre: &Centre<R::Wide>,
-    d_centre: Vec3<R::Wide>,
-    d_points: &mut [Vec3<R>],
-) {
-    let d_moment = d_centre.map(|d| d / centre.total);
-    let mut d_volumes = Vec::with_capacity(centre.parts.len());
-    for (row, &(volume, sign, sum)) in scene.template.samples.part_sums.iter().zip(&centre.parts) {
+#[inline(always)]
+fn pcom_backward<R: Real>(scene: &Scene<R>, centre: &Centre<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
+    let Some(Parts { signed, of_parts }) = &centre.parts else { unreachable!("pcom keeps its parts") };
+    let d_moment = [d_centre[0] / centre.total, d_centre[1] / centre.total, d_centre[2] / centre.total];
+    let mut d_volumes = Vec::with_capacity(of_parts.len());
+    for (row, &(volume, sign, sum)) in scene.template.samples.part_sums.iter().zip(of_parts) {
         let arm = sub(sum, scale(R::Wide::of(row.count as f64), centre.point));
         d_volumes.push(sign * dot(d_moment, arm));
         row.backward(scale(volume, d_moment), d_points);
     }
-    signed_volumes_backward(&scene.template.closing, scene.points, &d_volumes, d_points);
+    signed.backward(&scene.template.closing, &d_volumes, d_points);
 }
 
-fn vertex_mean<R: Real>(scene: &Scene<R>) -> Centre<R::Wide> {
+/// Numbers of points that are summed in their own precision before the sum goes on in double precision.
+const BLOCK: usize = 16;
+
+#[inline(always)]
+fn vertex_mean<R: Real>(scene: &Scene<R>) -> Centre<R> {
     let vertices = &scene.points[..scene.template.mesh.num_vertices];
-    let moment = vertices.iter().fold([R::Wide::zero(); 3], |sum, v| add(sum, widen(*v)));
+    let mut moment = [R::Wide::zero(); 3];
+    for block in vertices.chunks(BLOCK) {
+        let mut partial = [R::zero(); 3];
+        for &vertex in block {
+            partial = add(partial, vertex);
+        }
+        moment = add(moment, widen(partial));
+    }
     Centre::plain(moment, R::Wide::of(vertices.len() as f64))
 }
 
+#[inline(always)]
 fn vertex_mean_backward<R: Real>(scene: &Scene<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
     let num_vertices = scene.template.mesh.num_vertices;
     let share = narrow::<R>(scale(R::Wide::of(1.0 / num_vertices as f64), d_centre));
@@ -125,12 +169,17 @@ fn vertex_mean_backward<R: Real>(scene: &Scene<R>, d_centre: Vec3<R::Wide>, d_po
     }
 }
 
-fn sample_mean<R: Real>(scene: &Scene<R>) -> Centre<R::Wide> {
+#[inline(always)]
+fn sample_mean<R: Real>(scene: &Scene<R>) -> Centre<R> {
     let samples = &scene.template.samples;
-    let moment = samples.part_sums.iter().fold([R::Wide::zero(); 3], |sum, row| add(sum, row.forward(scene.points)));
+    let mut moment = [R::Wide::zero(); 3];
+    for row in &samples.part_sums {
+        moment = add(moment, row.forward(scene.points));
+    }
     Centre::plain(moment, R::Wide::of(samples.len() as f64))
 }
 
+#[inline(always)]
 fn sample_mean_backward<R: Real>(scene: &Scene<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
     let samples = &scene.template.samples;
     let share = scale(R::Wide::of(1.0 / samples.len() as f64), d_centre);
@@ -140,35 +189,45 @@ fn sample_mean_backward<R: Real>(scene: &Scene<R>, d_centre: Vec3<R::Wide>, d_po
 }
 
 /// Twice the area vector of a triangle, its length, and three times its centroid.
+#[inline(always)]
 fn triangle<R: Real>(corners: [Vec3<R>; 3]) -> (Vec3<R>, R, Vec3<R>) {
     let [a, b, c] = corners;
     let normal = cross(sub(b, a), sub(c, a));
     (normal, dot(normal, normal).sqrt(), add(add(a, b), c))
 }
 
-fn face_area<R: Real>(scene: &Scene<R>) -> Centre<R::Wide> {
+#[inline(always)]
+fn face_area<R: Real>(scene: &Scene<R>) -> Centre<R> {
     let mut total = R::Wide::zero();
     let mut moment = [R::Wide::zero(); 3];
-    for face in &scene.template.mesh.faces {
-        let (_, doubled, tripled) = triangle(face.map(|index| scene.points[index as usize]));
-        doubled.add_to(&mut total);
-        moment = add(moment, widen(scale(doubled, tripled)));
+    for block in scene.template.mesh.faces.chunks(BLOCK) {
+        let (mut area, mut partial) = (R::zero(), [R::zero(); 3]);
+        for &[a, b, c] in block {
+            let point = |index: u32| scene.points[index as usize];
+            let (_, doubled, tripled) = triangle([point(a), point(b), point(c)]);
+            area = area + doubled;
+            add_scaled(&mut partial, doubled, tripled);
+        }
+        area.add_to(&mut total);
+        moment = add(moment, widen(partial));
     }
     Centre::plain(scale(R::Wide::of(1.0 / 3.0), moment), total)
 }
 
 /// With A = |N|/2: ∂A/∂a = (b − c) × N/|N| / 2, and each corner is a third of the centroid.
+#[inline(always)]
 fn face_area_backward<R: Real>(
     scene: &Scene<R>,
-    centre: &Centre<R::Wide>,
+    centre: &Centre<R>,
     d_centre: Vec3<R::Wide>,
     d_points: &mut [Vec3<R>],
 ) {
-    let d_moment = narrow::<R>(d_centre.map(|d| d / centre.total));
+    let d_moment = narrow::<R>([d_centre[0] / centre.total, d_centre[1] / centre.total, d_centre[2] / centre.total]);
     let centre = narrow::<R>(centre.point);
     let third = R::of(1.0 / 3.0);
     for face in &scene.template.mesh.faces {
-        let [a, b, c] = face.map(|index| scene.points[index as usize]);
+        let point = |k: usize| scene.points[face[k] as usize];
+        let [a, b, c] = [point(0), point(1), point(2)];
         let (normal, doubled, tripled) = triangle([a, b, c]);
         let unit = scale(R::of(1.0) / doubled.at_least(R::of(1e-30)), normal);
         let d_doubled = dot(d_moment, sub(scale(third, tripled), centre));
@@ -180,7 +239,8 @@ fn face_area_backward<R: Real>(
     }
 }
 
-fn exact<R: Real>(scene: &Scene<R>) -> Centre<R::Wide> {
+#[inline(always)]
+fn exact<R: Real>(scene: &Scene<R>) -> Centre<R> {
     let mut whole = Moments::zero();
     for part in part_moments(&scene.template.closing, scene.points) {
         whole.add_scaled(R::Wide::of(1.0), &part);
@@ -188,13 +248,9 @@ fn exact<R: Real>(scene: &Scene<R>) -> Centre<R::Wide> {
     Centre::plain(whole.first, whole.volume)
 }
 
-fn exact_backward<R: Real>(
-    scene: &Scene<R>,
-    centre: &Centre<R::Wide>,
-    d_centre: Vec3<R::Wide>,
-    d_points: &mut [Vec3<R>],
-) {
-    let first = d_centre.map(|d| d / centre.total);
+#[inline(always)]
+fn exact_backward<R: Real>(scene: &Scene<R>, centre: &Centre<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
+    let first = [d_centre[0] / centre.total, d_centre[1] / centre.total, d_centre[2] / centre.total];
     let d_whole = Moments { volume: -dot(first, centre.point), first, ..Moments::zero() };
     let d_parts = vec![d_whole; scene.template.mesh.num_parts];
     part_moments_backward(&scene.template.closing, scene.points, &d_parts, d_points);
@@ -206,19 +262,19 @@ pub struct CenterOfMass {
 }
 
 impl Quantity for CenterOfMass {
-    type Saved<R: Real> = Centre<R::Wide>;
+    type Saved<R: Real> = Centre<R>;
 
     fn len(&self, _: &Template) -> usize {
         3
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Centre<R::Wide> {
+    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Centre<R> {
         let centre = self.method.forward(scene);
         scene.put(centre.point, out);
         centre
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, centre: &Centre<R::Wide>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+    fn backward<R: Real>(&self, scene: &Scene<R>, centre: &Centre<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
         self.method.backward(scene, centre, widen([d_out[0], d_out[1], d_out[2]]), d_points);
     }
 }

@@ -1,9 +1,9 @@
 //! Pressure: from the height above the ground to pressure to the centre of pressure.
 
-use crate::number::Real;
-use crate::number::vector::{Vec3, dot, narrow, scale, sub, widen};
+use crate::number::vector::{Vec3, add_scaled, dot, narrow, scale, widen};
+use crate::number::{Real, Room};
 use crate::quantity::Quantity;
-use crate::sampling::{CHUNK, Chunk, Pass, Points};
+use crate::sampling::{CHUNK, Place, Points, Row, Walk, sum_row};
 use crate::scene::Scene;
 use crate::template::Template;
 
@@ -20,7 +20,7 @@ impl PressureCurve {
     /// ρ(h), divided by e^(−γ shift) where h ≥ 0: with `shift` > 0 nothing may lie below the ground.
     #[inline(always)]
     pub fn density<R: Real>(&self, height: R, shift: R) -> R {
-        let below = R::of(1.0) - R::of(self.alpha) * height;
+        let below = R::of(-self.alpha).mul_add(height, R::of(1.0));
         let above = (R::of(-self.gamma * std::f64::consts::LOG2_E) * (height - shift)).exp2();
         height.if_negative(below, above)
     }
@@ -37,27 +37,6 @@ pub struct Pressure {
     pub curve: PressureCurve,
 }
 
-struct PressurePass<'a, R> {
-    curve: PressureCurve,
-    out: &'a mut [R],
-    d_out: &'a [R],
-}
-
-impl<R: Real> Pass<R> for PressurePass<'_, R> {
-    fn read(&mut self, chunk: &Chunk<R>) {
-        for (i, out) in self.out[chunk.start..chunk.start + chunk.len].iter_mut().enumerate() {
-            *out = self.curve.density(chunk.height[i], R::zero());
-        }
-    }
-
-    fn hand_back(&self, chunk: &Chunk<R>, d_chunk: &mut Chunk<R>) {
-        for (i, &d_out) in self.d_out[chunk.start..chunk.start + chunk.len].iter().enumerate() {
-            let density = self.curve.density(chunk.height[i], R::zero());
-            d_chunk.height[i] = self.curve.slope(chunk.height[i], density) * d_out;
-        }
-    }
-}
-
 impl Quantity for Pressure {
     type Saved<R: Real> = ();
 
@@ -66,11 +45,51 @@ impl Quantity for Pressure {
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) {
-        Points::Samples.read(scene, &mut PressurePass { curve: self.curve, out, d_out: &[] });
+        R::apart::<PressureForward, _>((self.curve, &scene.template.samples.walk, scene.heights(), out));
     }
 
     fn backward<R: Real>(&self, scene: &Scene<R>, _: &(), d_out: &[R], d_points: &mut [Vec3<R>]) {
-        Points::Samples.hand_back(scene, &PressurePass { curve: self.curve, out: &mut [], d_out }, d_points);
+        let walk = &scene.template.samples.walk;
+        let d_heights = R::apart::<PressureBackward, _>((self.curve, walk, scene.heights(), d_out));
+        scene.heights_backward(&d_heights, d_points);
+    }
+}
+
+struct PressureForward;
+
+impl<R: Real> Room<(PressureCurve, &Walk, Vec<R>, &mut [R])> for PressureForward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((curve, walk, heights, out): (PressureCurve, &Walk, Vec<R>, &mut [R])) {
+        let mut row = [R::zero(); CHUNK];
+        for chunk in &walk.chunks {
+            walk.interpolate(chunk, &heights, &mut row);
+            for (&sample, &height) in walk.order[chunk.samples.clone()].iter().zip(&row) {
+                out[sample as usize] = curve.density(height, R::zero());
+            }
+        }
+    }
+}
+
+struct PressureBackward;
+
+impl<R: Real> Room<(PressureCurve, &Walk, Vec<R>, &[R])> for PressureBackward {
+    type Output = Vec<R>;
+
+    #[inline(always)]
+    fn enter((curve, walk, heights, d_out): (PressureCurve, &Walk, Vec<R>, &[R])) -> Vec<R> {
+        let mut d_heights = vec![R::zero(); heights.len()];
+        let mut row = [R::zero(); CHUNK];
+        for chunk in &walk.chunks {
+            walk.interpolate(chunk, &heights, &mut row);
+            for (&sample, height) in walk.order[chunk.samples.clone()].iter().zip(&mut row) {
+                let slope = curve.slope(*height, curve.density(*height, R::zero()));
+                *height = slope * d_out[sample as usize];
+            }
+            walk.scatter(chunk, &row, &mut d_heights);
+        }
+        d_heights
     }
 }
 
@@ -82,108 +101,205 @@ pub struct CenterOfPressure {
     pub epsilon: f64,
 }
 
-/// The pass that sums ρ and ρv.
+/// The sums over the samples as they are looked at.
 ///
-/// Where every point is above the ground, ρ is divided by e^(−γ · lowest height), which leaves the ratio unchanged and
-/// keeps a hovering body's sums from underflowing. The lowest height is found on the way: when a lower point comes,
-/// the sums so far are scaled. A positive epsilon forbids the shift, for it is an absolute amount.
-pub struct CopPass<R: Real> {
+/// Where every vertex is above the ground, ρ is divided by e^(−γ · lowest height), which leaves the ratio unchanged and
+/// keeps a hovering body's sums from underflowing. A positive epsilon forbids that, for it is an absolute amount.
+pub struct LoadSums<R: Real> {
     of: CenterOfPressure,
     shift: R,
     total: R::Wide,
-    moment: Vec3<R::Wide>,
-    /// s̄ in local coordinates, once the pass is over.
+    /// q = Wᵀρ: the load that each vertex bears, so that Σ ρ_i v_i = Σ_v q_v v.
+    loads: Vec<R>,
+}
+
+/// s̄ in local coordinates, with what its backward needs.
+pub struct Cop<R: Real> {
     pub point: Vec3<R::Wide>,
-    /// The gradient by s̄ to hand back.
-    d_point: Vec3<R::Wide>,
+    of: CenterOfPressure,
+    shift: R,
+    total: R::Wide,
+    loads: Vec<R>,
+}
+
+/// Numbers of vertices that are summed in the points' own precision before the sum goes on in double precision.
+const BLOCK: usize = 16;
+
+impl<R: Real> LoadSums<R> {
+    pub fn new(of: CenterOfPressure, heights: &[R]) -> Self {
+        let shift = if of.epsilon > 0.0 { R::zero() } else { R::apart::<LowestAbove, _>((heights,)) };
+        LoadSums { of, shift, total: R::Wide::zero(), loads: vec![R::zero(); heights.len()] }
+    }
+
+    pub fn read(&mut self, place: &Place, heights: &Row<R>) {
+        let mut density = [R::zero(); CHUNK];
+        R::apart::<Densities, _>((self.of.curve, self.shift, heights, place.len(), &mut density, &mut self.total));
+        place.hand_back(&density, &mut self.loads);
+    }
+
+    /// s̄ from the sums. Epsilon pulls towards the world's origin, which lies at −origin here.
+    pub fn finish(self, scene: &Scene<R>) -> Cop<R> {
+        let LoadSums { of, shift, total, loads } = self;
+        let epsilon = R::Wide::of(of.epsilon);
+        let mut moment = scale(-epsilon, scene.origin);
+        R::apart::<Moment, _>((scene.points, loads.as_slice(), &mut moment));
+        let total = total + epsilon;
+        Cop { point: [moment[0] / total, moment[1] / total, moment[2] / total], of, shift, total, loads }
+    }
+}
+
+/// The lowest height, or 0 if that is below the ground.
+struct LowestAbove;
+
+impl<R: Real> Room<(&[R],)> for LowestAbove {
+    type Output = R;
+
+    #[inline(always)]
+    fn enter((heights,): (&[R],)) -> R {
+        let mut lowest = R::of(1e30);
+        for &height in heights {
+            lowest = lowest.at_most(height);
+        }
+        lowest.at_least(R::zero())
+    }
+}
+
+/// ρ of a row of heights, and their sum.
+struct Densities;
+
+impl<R: Real> Room<(PressureCurve, R, &Row<R>, usize, &mut Row<R>, &mut R::Wide)> for Densities {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter(
+        (curve, shift, heights, len, density, total): (PressureCurve, R, &Row<R>, usize, &mut Row<R>, &mut R::Wide),
+    ) {
+        for (density, &height) in density.iter_mut().zip(heights) {
+            *density = curve.density(height, shift);
+        }
+        sum_row(density, len).add_to(total);
+    }
+}
+
+/// Σ_v q_v v
+struct Moment;
+
+impl<R: Real> Room<(&[Vec3<R>], &[R], &mut Vec3<R::Wide>)> for Moment {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((points, loads, moment): (&[Vec3<R>], &[R], &mut Vec3<R::Wide>)) {
+        for (points, loads) in points.chunks(BLOCK).zip(loads.chunks(BLOCK)) {
+            let mut partial = [R::zero(); 3];
+            for (&point, &load) in points.iter().zip(loads) {
+                add_scaled(&mut partial, load, point);
+            }
+            for k in 0..3 {
+                partial[k].add_to(&mut moment[k]);
+            }
+        }
+    }
+}
+
+impl<R: Real> Cop<R> {
+    /// ∂s̄/∂v_i = ρ_i / Σρ, handed to the points, and ∂s̄/∂ρ_i = (v_i − s̄) / Σρ, added to the gradient by the vertices'
+    /// heights: `Scene::heights_backward` takes it on.
+    pub fn backward(
+        &self,
+        scene: &Scene<R>,
+        heights: &[R],
+        d_point: Vec3<R::Wide>,
+        d_heights: &mut [R],
+        d_points: &mut [Vec3<R>],
+    ) {
+        let d_wide = [d_point[0] / self.total, d_point[1] / self.total, d_point[2] / self.total];
+        let (d, lever) = (narrow::<R>(d_wide), R::narrow(dot(d_wide, self.point)));
+        let arms = R::apart::<Arms, _>((&scene.points[..heights.len()], d, lever));
+        let (mut row, mut arm) = ([R::zero(); CHUNK], [R::zero(); CHUNK]);
+        for place in Points::Samples.places(scene.template) {
+            place.read(heights, &mut row);
+            place.read(&arms, &mut arm);
+            R::apart::<SlopesByArms, _>((self.of.curve, self.shift, &arm, &mut row));
+            place.hand_back(&row, d_heights);
+        }
+        R::apart::<LoadsBackward, _>((self.loads.as_slice(), d, d_points));
+    }
+}
+
+/// d·v − lever of each vertex: what a unit of load there does to d·s̄.
+struct Arms;
+
+impl<R: Real> Room<(&[Vec3<R>], Vec3<R>, R)> for Arms {
+    type Output = Vec<R>;
+
+    #[inline(always)]
+    fn enter((vertices, d, lever): (&[Vec3<R>], Vec3<R>, R)) -> Vec<R> {
+        let mut arms = Vec::with_capacity(vertices.len());
+        for &vertex in vertices {
+            arms.push(dot(d, vertex) - lever);
+        }
+        arms
+    }
+}
+
+/// From heights to dρ/dh · arm.
+struct SlopesByArms;
+
+impl<R: Real> Room<(PressureCurve, R, &Row<R>, &mut Row<R>)> for SlopesByArms {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((curve, shift, arms, row): (PressureCurve, R, &Row<R>, &mut Row<R>)) {
+        for (height, &arm) in row.iter_mut().zip(arms) {
+            *height = curve.slope(*height, curve.density(*height, shift)) * arm;
+        }
+    }
+}
+
+struct LoadsBackward;
+
+impl<R: Real> Room<(&[R], Vec3<R>, &mut [Vec3<R>])> for LoadsBackward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((loads, d, d_points): (&[R], Vec3<R>, &mut [Vec3<R>])) {
+        for (d_point, &load) in d_points.iter_mut().zip(loads) {
+            add_scaled(d_point, load, d);
+        }
+    }
 }
 
 impl CenterOfPressure {
-    pub fn pass<R: Real>(&self) -> CopPass<R> {
-        let zero = [R::Wide::zero(); 3];
-        let shift = R::of(if self.epsilon > 0.0 { 0.0 } else { 1e30 });
-        CopPass { of: *self, shift, total: R::Wide::zero(), moment: zero, point: zero, d_point: zero }
-    }
-}
-
-impl<R: Real> CopPass<R> {
-    /// s̄ from the sums. Epsilon pulls towards the world's origin, which lies at −origin here.
-    pub fn finish(&mut self, scene: &Scene<R>) {
-        let epsilon = R::Wide::of(self.of.epsilon);
-        self.total = self.total + epsilon;
-        let moment = sub(self.moment, scale(epsilon, scene.origin));
-        self.point = moment.map(|x| x / self.total);
-    }
-
-    /// The finished pass, ready to hand back the gradient by s̄.
-    pub fn handing_back(&self, d_point: Vec3<R::Wide>) -> Self {
-        CopPass { d_point, ..*self }
-    }
-
-    fn lower_shift(&mut self, chunk: &Chunk<R>) {
-        let lowest = chunk.height[1..chunk.len].iter().fold(chunk.height[0], |low, &h| low.at_most(h));
-        let shift = self.shift.at_most(lowest.at_least(R::zero()));
-        let factor = (R::of(-self.of.curve.gamma) * (self.shift - shift)).exp().widen();
-        self.shift = shift;
-        self.total = self.total * factor;
-        self.moment = scale(factor, self.moment);
-    }
-}
-
-impl<R: Real> Pass<R> for CopPass<R> {
-    fn read(&mut self, chunk: &Chunk<R>) {
-        self.lower_shift(chunk);
-        let mut density = [R::zero(); CHUNK];
-        for (density, &height) in density.iter_mut().zip(&chunk.height) {
-            *density = self.of.curve.density(height, self.shift);
+    pub fn locate<R: Real>(&self, scene: &Scene<R>, heights: &[R]) -> Cop<R> {
+        let mut sums = LoadSums::new(*self, heights);
+        let mut row = [R::zero(); CHUNK];
+        for place in Points::Samples.places(scene.template) {
+            place.read(heights, &mut row);
+            sums.read(&place, &row);
         }
-        let mut sums = [R::zero(); 4];
-        for (i, &density) in density[..chunk.len].iter().enumerate() {
-            sums[0] = sums[0] + density;
-            for k in 0..3 {
-                sums[1 + k] = sums[1 + k] + density * chunk.position[k][i];
-            }
-        }
-        sums[0].add_to(&mut self.total);
-        for k in 0..3 {
-            sums[1 + k].add_to(&mut self.moment[k]);
-        }
-    }
-
-    /// ∂s̄/∂v_i = ρ_i / Σρ and ∂s̄/∂ρ_i = (v_i − s̄) / Σρ.
-    fn hand_back(&self, chunk: &Chunk<R>, d_chunk: &mut Chunk<R>) {
-        let d_wide = self.d_point.map(|d| d / self.total);
-        let lever = R::narrow(dot(d_wide, self.point));
-        let d = narrow::<R>(d_wide);
-        for i in 0..CHUNK {
-            let height = chunk.height[i];
-            let density = self.of.curve.density(height, self.shift);
-            let arm = dot(d, chunk.point(i)) - lever;
-            for k in 0..3 {
-                d_chunk.position[k][i] = d_chunk.position[k][i] + density * d[k];
-            }
-            d_chunk.height[i] = d_chunk.height[i] + self.of.curve.slope(height, density) * arm;
-        }
+        sums.finish(scene)
     }
 }
 
 impl Quantity for CenterOfPressure {
-    type Saved<R: Real> = CopPass<R>;
+    /// s̄ and the vertices' heights.
+    type Saved<R: Real> = (Cop<R>, Vec<R>);
 
     fn len(&self, _: &Template) -> usize {
         3
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> CopPass<R> {
-        let mut pass = self.pass();
-        Points::Samples.read(scene, &mut pass);
-        pass.finish(scene);
-        scene.put(pass.point, out);
-        pass
+    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
+        let heights = scene.heights();
+        let cop = self.locate(scene, &heights);
+        scene.put(cop.point, out);
+        (cop, heights)
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, pass: &CopPass<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        let pass = pass.handing_back(widen([d_out[0], d_out[1], d_out[2]]));
-        Points::Samples.hand_back(scene, &pass, d_points);
+    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+        let (cop, heights) = saved;
+        let mut d_heights = vec![R::zero(); heights.len()];
+        cop.backward(scene, heights, widen([d_out[0], d_out[1], d_out[2]]), &mut d_heights, d_points);
+        scene.heights_backward(&d_heights, d_points);
     }
 }

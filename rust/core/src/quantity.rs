@@ -27,6 +27,12 @@ pub trait Quantity: Send + Sync {
 
     /// Adds Σ d_out · ∂out/∂points to `d_points`, the virtual vertices' included.
     fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]);
+
+    /// Both, for a quantity that can share work between them.
+    fn forward_and_backward<R: Real>(&self, scene: &Scene<R>, d_out: &[R], out: &mut [R], d_points: &mut [Vec3<R>]) {
+        let saved = self.forward(scene, out);
+        self.backward(scene, &saved, d_out, d_points);
+    }
 }
 
 /// Calls back with the quantity of that name and these options: the place where a new one is registered.

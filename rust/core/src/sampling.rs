@@ -1,21 +1,20 @@
 //! Sampling: N_U points on the surface that move with it, and the passes over them.
 //!
 //! Triangle point picking, area-weighted on the template: the points are fixed barycentric weights on fixed faces, so a
-//! posed body's samples are W V with a sparse W of three weights a row, and gradients return by Wᵀ. A pass interpolates
-//! [`CHUNK`] points at a time, together with their heights, and shows them to the rooms that need them.
+//! posed body's samples are W V with a sparse W of three weights a row, and gradients return by Wᵀ. Rooms need little
+//! more of a sample than a number or two, such as its height: these are interpolated from the vertices' numbers
+//! ([`Walk`]), and what a room finds for each sample is added to the vertices by the same weights.
 
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::number::Real;
-use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, scale, sub, widen};
+use crate::number::vector::{Vec3, add_scaled, cross, dot, narrow, sub, widen};
+use crate::number::{Data, Real, Room};
 use crate::quantity::{Quantity, unknown_choice};
 use crate::scene::Scene;
 use crate::template::Template;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-
-/// Points that a pass handles at once: short enough for single-precision partial sums.
-pub const CHUNK: usize = 64;
+use std::ops::Range;
 
 const MAX_SAMPLES: usize = 10_000_000;
 
@@ -30,6 +29,25 @@ pub struct Samples {
     pub parts: Vec<u32>,
     /// Σ of the samples of each part as a sparse row over the vertices.
     pub part_sums: Vec<PartSum>,
+    pub walk: Walk,
+}
+
+/// Constants that are kept in both precisions, so that no loop has to convert them.
+#[derive(Clone, Debug, Default)]
+pub struct Weights {
+    single: Vec<f32>,
+    double: Vec<f64>,
+}
+
+impl Weights {
+    pub fn new(double: Vec<f64>) -> Self {
+        Weights { single: double.iter().map(|&weight| weight as f32).collect(), double }
+    }
+
+    #[inline(always)]
+    pub fn get<R: Real>(&self, index: usize) -> R {
+        R::splat(R::Data::pick(&self.single, &self.double)[index])
+    }
 }
 
 /// Σ_{i in part} (W V)_i = Σ weight · vertex.
@@ -37,7 +55,7 @@ pub struct Samples {
 pub struct PartSum {
     pub count: usize,
     pub vertices: Vec<u32>,
-    pub weights: Vec<f64>,
+    weights: Weights,
 }
 
 impl Samples {
@@ -51,7 +69,8 @@ impl Samples {
         let corners: Vec<_> = faces.iter().map(|&face| mesh.faces[face as usize]).collect();
         let parts: Vec<_> = faces.iter().map(|&face| mesh.face_parts[face as usize]).collect();
         let part_sums = part_sums(mesh, &parts, &corners, &barycentric);
-        Ok(Samples { faces, corners, barycentric, parts, part_sums })
+        let walk = Walk::new(&faces, &corners, &barycentric);
+        Ok(Samples { faces, corners, barycentric, parts, part_sums, walk })
     }
 
     pub fn len(&self) -> usize {
@@ -69,8 +88,11 @@ impl Samples {
     }
 
     /// (W V)_i in double precision, for decisions and for inner solvers.
+    #[inline(always)]
     pub fn wide_point<R: Real>(&self, sample: usize, vertices: &[Vec3<R>]) -> Vec3<R::Wide> {
-        blend(self.corners[sample].map(|corner| widen(vertices[corner as usize])), self.barycentric[sample])
+        let [a, b, c] = self.corners[sample];
+        let corner = |index: u32| widen(vertices[index as usize]);
+        blend([corner(a), corner(b), corner(c)], self.barycentric[sample])
     }
 
     /// Adds the sample's gradient to its face's vertices: a row of Wᵀ.
@@ -84,9 +106,10 @@ impl Samples {
 
 /// The weighted corners, from the first along the edges: the weights' rounding then scales with the face, not the body.
 #[inline(always)]
-fn blend<R: Real>([a, b, c]: [Vec3<R>; 3], weights: [f64; 3]) -> Vec3<R> {
-    let [_, v, w] = weights.map(R::of);
-    std::array::from_fn(|k| a[k] + (v * (b[k] - a[k]) + w * (c[k] - a[k])))
+fn blend<R: Real>([a, b, c]: [Vec3<R>; 3], [_, v, w]: [f64; 3]) -> Vec3<R> {
+    let (v, w) = (R::of(v), R::of(w));
+    let along = |k: usize| w.mul_add(c[k] - a[k], v.mul_add(b[k] - a[k], a[k]));
+    [along(0), along(1), along(2)]
 }
 
 fn areas(mesh: &Mesh, vertices: &[Vec3<f64>]) -> Vec<f64> {
@@ -143,46 +166,191 @@ fn part_sums(mesh: &Mesh, parts: &[u32], corners: &[[u32; 3]], barycentric: &[[f
         }
         touched.sort_unstable();
         touched.dedup();
-        sum.weights = touched.iter().map(|&vertex| std::mem::take(&mut weight_of[vertex as usize])).collect();
+        sum.weights =
+            Weights::new(touched.iter().map(|&vertex| std::mem::take(&mut weight_of[vertex as usize])).collect());
         sum.vertices = touched;
     }
     sums
 }
 
-/// The points that a pass runs over.
+/// The order in which passes visit the samples: faces with equally many samples one after the other, so that the loops
+/// over a face's samples have lengths that the compiler knows.
+#[derive(Clone, Debug, Default)]
+pub struct Walk {
+    /// Each sample's place in the public order.
+    pub order: Vec<u32>,
+    pub chunks: Vec<Chunk>,
+    /// The vertices of each group of samples that share a face.
+    corners: Vec<[u32; 3]>,
+    /// Three a sample.
+    weights: Weights,
+}
+
+/// Consecutive samples of the walk, whole groups of one size.
+#[derive(Clone, Debug)]
+pub struct Chunk {
+    pub samples: Range<usize>,
+    groups: Range<usize>,
+}
+
+/// Samples that a pass handles at once: short enough for single-precision partial sums.
+pub const CHUNK: usize = 64;
+
+/// A number for each sample of a chunk. What lies behind the chunk's end is finite and must not be summed.
+pub type Row<R> = [R; CHUNK];
+
+/// Samples of a face that are visited together; a face with more has several groups.
+const GROUP: usize = 8;
+
+impl Walk {
+    fn new(faces: &[u32], corners: &[[u32; 3]], barycentric: &[[f64; 3]]) -> Self {
+        let samples: Vec<u32> = (0..faces.len() as u32).collect();
+        let same_face = |a: &u32, b: &u32| faces[*a as usize] == faces[*b as usize];
+        let mut groups: Vec<&[u32]> = samples.chunk_by(same_face).flat_map(|face| face.chunks(GROUP)).collect();
+        groups.sort_by_key(|group| group.len());
+        let mut walk = Walk::default();
+        for run in groups.chunk_by(|a, b| a.len() == b.len()) {
+            for chunk in run.chunks(CHUNK / run[0].len()) {
+                let (first_sample, first_group) = (walk.order.len(), walk.corners.len());
+                for group in chunk {
+                    walk.order.extend_from_slice(group);
+                    walk.corners.push(corners[group[0] as usize]);
+                }
+                let (samples, groups) = (first_sample..walk.order.len(), first_group..walk.corners.len());
+                walk.chunks.push(Chunk { samples, groups });
+            }
+        }
+        walk.weights = Weights::new(walk.order.iter().flat_map(|&sample| barycentric[sample as usize]).collect());
+        walk
+    }
+
+    /// (W x)_i for the samples of a chunk: the vertices' numbers x interpolated.
+    pub fn interpolate<R: Real>(&self, chunk: &Chunk, vertices: &[R], row: &mut Row<R>) {
+        match chunk.group_size() {
+            1 => R::apart::<Interpolate<1>, _>((self, chunk, vertices, row)),
+            2 => R::apart::<Interpolate<2>, _>((self, chunk, vertices, row)),
+            3 => R::apart::<Interpolate<3>, _>((self, chunk, vertices, row)),
+            4 => R::apart::<Interpolate<4>, _>((self, chunk, vertices, row)),
+            5 => R::apart::<Interpolate<5>, _>((self, chunk, vertices, row)),
+            6 => R::apart::<Interpolate<6>, _>((self, chunk, vertices, row)),
+            7 => R::apart::<Interpolate<7>, _>((self, chunk, vertices, row)),
+            _ => R::apart::<Interpolate<8>, _>((self, chunk, vertices, row)),
+        }
+    }
+
+    /// Adds (Wᵀ y)_v of a chunk's samples to the vertices' numbers.
+    pub fn scatter<R: Real>(&self, chunk: &Chunk, row: &Row<R>, vertices: &mut [R]) {
+        match chunk.group_size() {
+            1 => R::apart::<Scatter<1>, _>((self, chunk, row, vertices)),
+            2 => R::apart::<Scatter<2>, _>((self, chunk, row, vertices)),
+            3 => R::apart::<Scatter<3>, _>((self, chunk, row, vertices)),
+            4 => R::apart::<Scatter<4>, _>((self, chunk, row, vertices)),
+            5 => R::apart::<Scatter<5>, _>((self, chunk, row, vertices)),
+            6 => R::apart::<Scatter<6>, _>((self, chunk, row, vertices)),
+            7 => R::apart::<Scatter<7>, _>((self, chunk, row, vertices)),
+            _ => R::apart::<Scatter<8>, _>((self, chunk, row, vertices)),
+        }
+    }
+}
+
+/// [`Walk::interpolate`] for groups of N samples.
+struct Interpolate<const N: usize>;
+
+impl<R: Real, const N: usize> Room<(&Walk, &Chunk, &[R], &mut Row<R>)> for Interpolate<N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((walk, chunk, vertices, row): (&Walk, &Chunk, &[R], &mut Row<R>)) -> () {
+        let weights = walk.weights.of_samples::<R, N>(chunk);
+        let rows = row.as_chunks_mut::<N>().0;
+        for ((&[a, b, c], weights), row) in walk.corners[chunk.groups.clone()].iter().zip(weights).zip(rows) {
+            let start = vertices[a as usize];
+            let (to_b, to_c) = (vertices[b as usize] - start, vertices[c as usize] - start);
+            for (number, &[_, v, w]) in row.iter_mut().zip(weights) {
+                *number = R::splat(w).mul_add(to_c, R::splat(v).mul_add(to_b, start));
+            }
+        }
+    }
+}
+
+/// [`Walk::scatter`] for groups of N samples.
+struct Scatter<const N: usize>;
+
+impl<R: Real, const N: usize> Room<(&Walk, &Chunk, &Row<R>, &mut [R])> for Scatter<N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((walk, chunk, row, vertices): (&Walk, &Chunk, &Row<R>, &mut [R])) -> () {
+        let weights = walk.weights.of_samples::<R, N>(chunk);
+        let rows = row.as_chunks::<N>().0;
+        for ((&[a, b, c], weights), row) in walk.corners[chunk.groups.clone()].iter().zip(weights).zip(rows) {
+            let mut shares = [R::zero(); 3];
+            for (&number, weights) in row.iter().zip(weights) {
+                for corner in 0..3 {
+                    shares[corner] = R::splat(weights[corner]).mul_add(number, shares[corner]);
+                }
+            }
+            vertices[a as usize] = vertices[a as usize] + shares[0];
+            vertices[b as usize] = vertices[b as usize] + shares[1];
+            vertices[c as usize] = vertices[c as usize] + shares[2];
+        }
+    }
+}
+
+impl Chunk {
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.samples.is_empty()
+    }
+
+    #[inline(always)]
+    fn group_size(&self) -> usize {
+        self.samples.len() / self.groups.len()
+    }
+}
+
+impl Weights {
+    /// The weights of a chunk's samples, by group.
+    #[inline(always)]
+    fn of_samples<R: Real, const N: usize>(&self, chunk: &Chunk) -> &[[[R::Data; 3]; N]] {
+        let weights = &R::Data::pick(&self.single, &self.double)[3 * chunk.samples.start..3 * chunk.samples.end];
+        weights.as_chunks::<3>().0.as_chunks::<N>().0
+    }
+}
+
+/// Σ of a row's first `len` numbers, as eight running sums: one body alone sums in the same order as in a lane, and yet
+/// its sums vectorise.
+#[inline(always)]
+pub fn sum_row<R: Real>(row: &Row<R>, len: usize) -> R {
+    const SUMS: usize = 8;
+    let mut sums = [R::zero(); SUMS];
+    let (whole, rest) = row[..len].as_chunks::<SUMS>();
+    for numbers in whole {
+        for k in 0..SUMS {
+            sums[k] = sums[k] + numbers[k];
+        }
+    }
+    for (k, &number) in rest.iter().enumerate() {
+        sums[k] = sums[k] + number;
+    }
+    ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
+}
+
+/// The points that a loss looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Points {
     Samples,
     Vertices,
 }
 
-/// Up to [`CHUNK`] consecutive points with their heights above the ground, or their gradients. Rooms may compute on the
-/// places from `len` on (they hold old points), so that their loops have a fixed length, but must not sum over them.
-pub struct Chunk<R> {
-    /// The first point's index.
-    pub start: usize,
-    pub len: usize,
-    pub position: [[R; CHUNK]; 3],
-    pub height: [R; CHUNK],
-}
-
-/// A room that looks at every point once, and hands gradients back at a second look.
-pub trait Pass<R: Real> {
-    fn read(&mut self, chunk: &Chunk<R>);
-    /// Adds to `d_chunk`'s positions and heights.
-    fn hand_back(&self, chunk: &Chunk<R>, d_chunk: &mut Chunk<R>);
-}
-
-/// Two rooms in one pass.
-impl<R: Real, A: Pass<R>, B: Pass<R>> Pass<R> for (&mut A, &mut B) {
-    fn read(&mut self, chunk: &Chunk<R>) {
-        self.0.read(chunk);
-        self.1.read(chunk);
-    }
-    fn hand_back(&self, chunk: &Chunk<R>, d_chunk: &mut Chunk<R>) {
-        self.0.hand_back(chunk, d_chunk);
-        self.1.hand_back(chunk, d_chunk);
-    }
+/// Up to [`CHUNK`] points that are looked at together.
+pub enum Place<'a> {
+    Samples(&'a Walk, &'a Chunk),
+    Vertices(Range<usize>),
 }
 
 impl Points {
@@ -201,63 +369,52 @@ impl Points {
         }
     }
 
-    /// Shows every point to the room.
-    pub fn read<R: Real>(self, scene: &Scene<R>, room: &mut impl Pass<R>) {
-        let mut chunk = Chunk::empty();
-        for start in (0..self.count(scene.template)).step_by(CHUNK) {
-            self.load(scene, start, &mut chunk);
-            room.read(&chunk);
-        }
-    }
-
-    /// Shows every point again and adds the gradients that the room hands back.
-    pub fn hand_back<R: Real>(self, scene: &Scene<R>, room: &impl Pass<R>, d_points: &mut [Vec3<R>]) {
-        let normal = scene.narrow_ground().normal;
-        let (mut chunk, mut d_chunk) = (Chunk::empty(), Chunk::empty());
-        for start in (0..self.count(scene.template)).step_by(CHUNK) {
-            self.load(scene, start, &mut chunk);
-            d_chunk.clear();
-            room.hand_back(&chunk, &mut d_chunk);
-            for i in 0..chunk.len {
-                let mut d_point = d_chunk.point(i);
-                add_scaled(&mut d_point, d_chunk.height[i], normal);
-                match self {
-                    Points::Samples => scene.template.samples.point_backward(start + i, d_point, d_points),
-                    Points::Vertices => d_points[start + i] = add(d_points[start + i], d_point),
-                }
+    /// All points, in the order of the sums over them.
+    pub fn places(self, template: &Template) -> Vec<Place<'_>> {
+        let walk = &template.samples.walk;
+        let count = template.mesh.num_vertices;
+        match self {
+            Points::Samples => walk.chunks.iter().map(|chunk| Place::Samples(walk, chunk)).collect(),
+            Points::Vertices => {
+                (0..count).step_by(CHUNK).map(|start| Place::Vertices(start..count.min(start + CHUNK))).collect()
             }
-        }
-    }
-
-    fn load<R: Real>(self, scene: &Scene<R>, start: usize, chunk: &mut Chunk<R>) {
-        let ground = scene.narrow_ground();
-        chunk.start = start;
-        chunk.len = CHUNK.min(self.count(scene.template) - start);
-        for i in 0..chunk.len {
-            let point = match self {
-                Points::Samples => scene.template.samples.point(start + i, scene.points),
-                Points::Vertices => scene.points[start + i],
-            };
-            for k in 0..3 {
-                chunk.position[k][i] = point[k];
-            }
-            chunk.height[i] = ground.signed_height(point);
         }
     }
 }
 
-impl<R: Real> Chunk<R> {
-    fn empty() -> Self {
-        Chunk { start: 0, len: 0, position: [[R::zero(); CHUNK]; 3], height: [R::zero(); CHUNK] }
-    }
-
+impl Place<'_> {
     #[inline(always)]
-    pub fn point(&self, i: usize) -> Vec3<R> {
-        [self.position[0][i], self.position[1][i], self.position[2][i]]
+    pub fn len(&self) -> usize {
+        match self {
+            Place::Samples(_, chunk) => chunk.len(),
+            Place::Vertices(range) => range.len(),
+        }
     }
 
-    fn clear(&mut self) {
-        self.position.iter_mut().chain([&mut self.height]).for_each(|axis| axis.fill(R::zero()));
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The vertices' numbers at these points.
+    #[inline(always)]
+    pub fn read<R: Real>(&self, vertices: &[R], row: &mut Row<R>) {
+        match self {
+            Place::Samples(walk, chunk) => walk.interpolate(chunk, vertices, row),
+            Place::Vertices(range) => row[..range.len()].copy_from_slice(&vertices[range.clone()]),
+        }
+    }
+
+    /// Adds the points' numbers to the vertices', by the transposed weights.
+    #[inline(always)]
+    pub fn hand_back<R: Real>(&self, row: &Row<R>, vertices: &mut [R]) {
+        match self {
+            Place::Samples(walk, chunk) => walk.scatter(chunk, row, vertices),
+            Place::Vertices(range) => {
+                for (vertex, &number) in vertices[range.clone()].iter_mut().zip(row) {
+                    *vertex = *vertex + number;
+                }
+            }
+        }
     }
 }
 
@@ -272,32 +429,65 @@ impl Quantity for SampleSurface {
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) {
-        for (sample, out) in out.chunks_exact_mut(3).enumerate() {
-            scene.put(widen(scene.template.samples.point(sample, scene.points)), out);
-        }
+        R::apart::<SurfaceForward, _>((scene, out));
     }
 
     fn backward<R: Real>(&self, scene: &Scene<R>, _: &(), d_out: &[R], d_points: &mut [Vec3<R>]) {
-        for (sample, d) in d_out.chunks_exact(3).enumerate() {
-            scene.template.samples.point_backward(sample, [d[0], d[1], d[2]], d_points);
+        R::apart::<SurfaceBackward, _>((&scene.template.samples, d_out, d_points));
+    }
+}
+
+struct SurfaceForward;
+
+impl<R: Real> Room<(&Scene<'_, R>, &mut [R])> for SurfaceForward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((scene, out): (&Scene<'_, R>, &mut [R])) {
+        for (sample, out) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            scene.put(widen(scene.template.samples.point(sample, scene.points)), out);
         }
     }
 }
 
+struct SurfaceBackward;
+
+impl<R: Real> Room<(&Samples, &[R], &mut [Vec3<R>])> for SurfaceBackward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((samples, d_out, d_points): (&Samples, &[R], &mut [Vec3<R>])) {
+        for (sample, &d_point) in d_out.as_chunks::<3>().0.iter().enumerate() {
+            samples.point_backward(sample, d_point, d_points);
+        }
+    }
+}
+
+/// Numbers of vertices that are summed in the points' own precision before the sum goes on in double precision.
+const BLOCK: usize = 16;
+
 impl PartSum {
     /// The sum of the part's sample positions.
+    #[inline(always)]
     pub fn forward<R: Real>(&self, vertices: &[Vec3<R>]) -> Vec3<R::Wide> {
         let mut sum = [R::Wide::zero(); 3];
-        for (&vertex, &weight) in self.vertices.iter().zip(&self.weights) {
-            sum = add(sum, widen(scale(R::of(weight), vertices[vertex as usize])));
+        for (block, indices) in self.vertices.chunks(BLOCK).enumerate() {
+            let mut partial = [R::zero(); 3];
+            for (i, &vertex) in indices.iter().enumerate() {
+                add_scaled(&mut partial, self.weights.get(block * BLOCK + i), vertices[vertex as usize]);
+            }
+            for k in 0..3 {
+                partial[k].add_to(&mut sum[k]);
+            }
         }
         sum
     }
 
+    #[inline(always)]
     pub fn backward<R: Real>(&self, d_sum: Vec3<R::Wide>, d_vertices: &mut [Vec3<R>]) {
         let d_sum = narrow::<R>(d_sum);
-        for (&vertex, &weight) in self.vertices.iter().zip(&self.weights) {
-            add_scaled(&mut d_vertices[vertex as usize], R::of(weight), d_sum);
+        for (i, &vertex) in self.vertices.iter().enumerate() {
+            add_scaled(&mut d_vertices[vertex as usize], self.weights.get(i), d_sum);
         }
     }
 }

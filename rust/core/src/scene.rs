@@ -1,11 +1,11 @@
-//! A scene: one closed body over its ground, in coordinates local to the body.
+//! A scene: one closed body a lane over its ground, in coordinates local to the body.
 //!
 //! The origin is near the first vertex ([`origin`]). Far from the world's origin this keeps single precision; positions
 //! that leave a room get the origin back.
 
 use crate::ground::{Ground, Plane};
-use crate::number::Real;
-use crate::number::vector::{Vec3, add, of};
+use crate::number::vector::{Vec3, add, add_scaled};
+use crate::number::{Real, Room, Scalar};
 use crate::template::Template;
 
 pub struct Scene<'a, R: Real> {
@@ -20,25 +20,74 @@ pub struct Scene<'a, R: Real> {
 }
 
 impl<'a, R: Real> Scene<'a, R> {
-    pub fn new(template: &'a Template, points: &'a [Vec3<R>], ground: &Ground<f64>, origin: Vec3<f64>) -> Self {
+    /// `grounds` and `origins` have one entry a lane.
+    pub fn new(template: &'a Template, points: &'a [Vec3<R>], grounds: &[Ground<f64>], origins: &[Vec3<f64>]) -> Self {
+        let number = |value: &dyn Fn(usize) -> f64| R::Wide::from_lanes(|lane| Real::of(value(lane)));
+        let local: Vec<_> = grounds.iter().zip(origins).map(|(ground, &origin)| ground.seen_from(origin)).collect();
+        let axes: Vec<_> = local.iter().map(Ground::axes).collect();
+        let vector = |of: &dyn Fn(usize) -> Vec3<f64>| std::array::from_fn(|k| number(&|lane| of(lane)[k]));
         Scene {
             template,
             points,
-            ground: ground.seen_from(origin).cast(),
-            plane: Plane::of(ground.axes()),
-            origin: of(origin),
+            ground: Ground { normal: vector(&|lane| local[lane].normal), height: number(&|lane| local[lane].height) },
+            plane: Plane { axes: [vector(&|lane| axes[lane][0]), vector(&|lane| axes[lane][1])] },
+            origin: vector(&|lane| origins[lane]),
         }
     }
 
     /// The ground in the precision of the points.
+    #[inline(always)]
     pub fn narrow_ground(&self) -> Ground<R> {
-        Ground { normal: self.ground.normal.map(R::narrow), height: R::narrow(self.ground.height) }
+        let [x, y, z] = self.ground.normal;
+        Ground { normal: [R::narrow(x), R::narrow(y), R::narrow(z)], height: R::narrow(self.ground.height) }
+    }
+
+    /// h of each vertex of the mesh: that of any point of a face is interpolated from them.
+    pub fn heights(&self) -> Vec<R> {
+        let vertices = &self.points[..self.template.mesh.num_vertices];
+        R::apart::<Heights, _>((self.narrow_ground(), vertices))
+    }
+
+    /// Adds the gradient by the vertices' heights to that by their positions.
+    pub fn heights_backward(&self, d_heights: &[R], d_points: &mut [Vec3<R>]) {
+        R::apart::<HeightsBackward, _>((self.narrow_ground().normal, d_heights, d_points));
     }
 
     /// Writes a local position as a position in the world.
+    #[inline(always)]
     pub fn put(&self, point: Vec3<R::Wide>, out: &mut [R]) {
         for (out, x) in out.iter_mut().zip(add(point, self.origin)) {
             *out = R::narrow(x);
+        }
+    }
+}
+
+/// [`Scene::heights`]
+struct Heights;
+
+impl<R: Real> Room<(Ground<R>, &[Vec3<R>])> for Heights {
+    type Output = Vec<R>;
+
+    #[inline(always)]
+    fn enter((ground, vertices): (Ground<R>, &[Vec3<R>])) -> Vec<R> {
+        let mut heights = Vec::with_capacity(vertices.len());
+        for &vertex in vertices {
+            heights.push(ground.signed_height(vertex));
+        }
+        heights
+    }
+}
+
+/// [`Scene::heights_backward`]
+struct HeightsBackward;
+
+impl<R: Real> Room<(Vec3<R>, &[R], &mut [Vec3<R>])> for HeightsBackward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((normal, d_heights, d_points): (Vec3<R>, &[R], &mut [Vec3<R>])) {
+        for (d_point, &d_height) in d_points.iter_mut().zip(d_heights) {
+            add_scaled(d_point, d_height, normal);
         }
     }
 }
@@ -51,4 +100,9 @@ const GRID: f64 = 4.0;
 /// edges of hands and faces.
 pub fn origin(first_vertex: Vec3<f64>) -> Vec3<f64> {
     first_vertex.map(|x| GRID * (x / GRID).trunc())
+}
+
+/// The lane's part of a vector.
+pub fn lane<R: Real>(vector: [R; 2], lane: usize) -> [f64; 2] {
+    vector.map(|x| x.lane(lane).value())
 }

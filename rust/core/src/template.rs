@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::number::vector::{Vec3, sub};
 use crate::sampling::Samples;
-use crate::volume::signed_volumes;
+use crate::volume::SignedVolumes;
 
 #[derive(Clone, Debug)]
 pub struct Template {
@@ -37,7 +37,7 @@ impl Template {
 fn check_volume(closing: &Closing, vertices: &[Vec3<f64>]) -> Result<()> {
     let mut points: Vec<_> = vertices.iter().map(|&v| sub(v, vertices[0])).collect();
     closing.forward(&mut points);
-    let volume: f64 = signed_volumes(closing, &points).iter().sum();
+    let volume: f64 = SignedVolumes::forward(closing, &points).of_parts.iter().sum();
     let extent = points.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
     // Rounding alone leaves about 1e-16 of the bounding cube.
     if volume.abs() <= 1e-12 * extent.powi(3) {

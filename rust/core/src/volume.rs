@@ -2,55 +2,86 @@
 //! properties of the solid they fill.
 //!
 //! A closed part's volume does not depend on the origin; the coordinates are local to the body ([`crate::scene`]), which
-//! is the paper's "translate".
+//! is the paper's "translate". The volumes alone are summed by rings around the points, which is the same sum in another
+//! order and hands the gradient over on the way.
 
 use crate::closing::Closing;
-use crate::number::Real;
-use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, scale, sub, widen};
+use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, widen};
+use crate::number::{Real, Room};
 use crate::quantity::Quantity;
+use crate::rings::Rings;
 use crate::scene::Scene;
 use crate::template::Template;
 
-/// Twice the area vector of a face, from its edges: they keep single precision where products of positions cancel.
-fn area_vector<R: Real>(a: Vec3<R>, b: Vec3<R>, c: Vec3<R>) -> Vec3<R> {
-    cross(sub(b, a), sub(c, a))
+/// Signed volume of each part, m³, and what its gradient is made of.
+pub struct SignedVolumes<R: Real> {
+    pub of_parts: Vec<R::Wide>,
+    /// Twice the area vector of each ring, part after part.
+    doubled: Vec<Vec3<R>>,
 }
 
-/// Signed volume of each part, m³: vol^P = Σ a·(b × c) / 6 = Σ a·N / 6 over the part's faces and caps, N = (b−a) × (c−a).
-pub fn signed_volumes<R: Real>(closing: &Closing, points: &[Vec3<R>]) -> Vec<R::Wide> {
-    let sixth = R::Wide::of(1.0 / 6.0);
-    let volume = |part: &std::ops::Range<usize>| {
-        let mut sum = R::Wide::zero();
-        for face in &closing.faces[part.clone()] {
-            let [a, b, c] = face.map(|index| points[index as usize]);
-            dot(a, area_vector(a, b, c)).add_to(&mut sum);
+impl<R: Real> SignedVolumes<R> {
+    /// vol^P = Σ_v v·A_v / 9 over the rings of the part ([`crate::rings`]).
+    pub fn forward(closing: &Closing, points: &[Vec3<R>]) -> Self {
+        R::apart::<Forward, _>((closing, points))
+    }
+
+    /// Adds Σ_p d_volumes[p] ∂vol_p/∂points, where ∂vol/∂v = A_v / 3.
+    pub fn backward(&self, closing: &Closing, d_volumes: &[R::Wide], d_points: &mut [Vec3<R>]) {
+        R::apart::<Backward, _>((self, closing, d_volumes, d_points));
+    }
+}
+
+/// [`SignedVolumes::forward`]
+struct Forward;
+
+impl<R: Real> Room<(&Closing, &[Vec3<R>])> for Forward {
+    type Output = SignedVolumes<R>;
+
+    #[inline(always)]
+    fn enter((closing, points): (&Closing, &[Vec3<R>])) -> SignedVolumes<R> {
+        let mut of_parts = Vec::with_capacity(closing.rings.len());
+        let mut all_doubled = vec![[R::zero(); 3]; closing.rings.iter().map(Rings::len).sum()];
+        let mut rest = all_doubled.as_mut_slice();
+        for rings in &closing.rings {
+            let (doubled, others) = rest.split_at_mut(rings.len());
+            rest = others;
+            let mut sum = R::Wide::zero();
+            for block in rings.blocks() {
+                let doubled = &mut doubled[block.rings.clone()];
+                rings.area_vectors(block, points, doubled);
+                let mut partial = R::zero();
+                for (&point, &doubled) in rings.points[block.rings.clone()].iter().zip(doubled.iter()) {
+                    partial = partial + dot(points[point as usize], doubled);
+                }
+                partial.add_to(&mut sum);
+            }
+            of_parts.push(sum * R::Wide::of(1.0 / 18.0));
         }
-        sum * sixth
-    };
-    closing.parts.iter().map(volume).collect()
+        SignedVolumes { of_parts, doubled: all_doubled }
+    }
 }
 
-/// Adds Σ_p d_volumes[p] ∂vol_p/∂points. A corner's derivative is the cross product of the other two, over 6; around a
-/// vertex of a closed part these add up to the faces' N/6, so every corner gets N/6.
-pub fn signed_volumes_backward<R: Real>(
-    closing: &Closing,
-    points: &[Vec3<R>],
-    d_volumes: &[R::Wide],
-    d_points: &mut [Vec3<R>],
-) {
-    for (part, &d_volume) in closing.parts.iter().zip(d_volumes) {
-        let factor = R::narrow(d_volume * R::Wide::of(1.0 / 6.0));
-        for face in &closing.faces[part.clone()] {
-            let [a, b, c] = face.map(|index| points[index as usize]);
-            let d_corner = scale(factor, area_vector(a, b, c));
-            for &index in face {
-                d_points[index as usize] = add(d_points[index as usize], d_corner);
+/// [`SignedVolumes::backward`]
+struct Backward;
+
+impl<R: Real> Room<(&SignedVolumes<R>, &Closing, &[R::Wide], &mut [Vec3<R>])> for Backward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((signed, closing, d_volumes, d_points): (&SignedVolumes<R>, &Closing, &[R::Wide], &mut [Vec3<R>])) -> () {
+        let mut all_doubled = signed.doubled.iter();
+        for (rings, &d_volume) in closing.rings.iter().zip(d_volumes) {
+            let factor = R::narrow(d_volume * R::Wide::of(1.0 / 6.0));
+            for (&point, &doubled) in rings.points.iter().zip(&mut all_doubled) {
+                add_scaled(&mut d_points[point as usize], factor, doubled);
             }
         }
     }
 }
 
 /// The volumes' absolute values, and the signs that lead back.
+#[inline(always)]
 pub fn absolute<W: Real>(signed: &[W]) -> (Vec<W>, Vec<W>) {
     let sign = |v: &W| v.if_negative(W::of(-1.0), W::of(1.0));
     (signed.iter().map(|v| v.abs()).collect(), signed.iter().map(sign).collect())
@@ -60,24 +91,26 @@ pub fn absolute<W: Real>(signed: &[W]) -> (Vec<W>, Vec<W>) {
 pub struct PartVolumes;
 
 impl Quantity for PartVolumes {
-    /// The sign of each part's volume.
-    type Saved<R: Real> = Vec<R::Wide>;
+    /// The volumes before the absolute value, and the sign of each.
+    type Saved<R: Real> = (SignedVolumes<R>, Vec<R::Wide>);
 
     fn len(&self, template: &Template) -> usize {
         template.mesh.num_parts
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Vec<R::Wide> {
-        let (volumes, signs) = absolute(&signed_volumes(&scene.template.closing, scene.points));
+    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
+        let signed = SignedVolumes::forward(&scene.template.closing, scene.points);
+        let (volumes, signs) = absolute(&signed.of_parts);
         for (out, volume) in out.iter_mut().zip(volumes) {
             *out = R::narrow(volume);
         }
-        signs
+        (signed, signs)
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, signs: &Vec<R::Wide>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+        let (signed, signs) = saved;
         let d_volumes: Vec<R::Wide> = d_out.iter().zip(signs).map(|(d, &sign)| d.widen() * sign).collect();
-        signed_volumes_backward(&scene.template.closing, scene.points, &d_volumes, d_points);
+        signed.backward(&scene.template.closing, &d_volumes, d_points);
     }
 }
 
@@ -92,10 +125,12 @@ pub struct Moments<W> {
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
 impl<W: Real> Moments<W> {
+    #[inline(always)]
     pub fn zero() -> Self {
         Moments { volume: W::zero(), first: [W::zero(); 3], second: [W::zero(); 6] }
     }
 
+    #[inline(always)]
     pub fn add_scaled(&mut self, factor: W, other: &Self) {
         self.volume = self.volume + factor * other.volume;
         for k in 0..3 {
@@ -107,6 +142,7 @@ impl<W: Real> Moments<W> {
     }
 
     /// With d = a·(b×c) and s = a+b+c: ∫1 = d/6, ∫x = d s/24, ∫xxᵀ = d (aaᵀ+bbᵀ+ccᵀ+ssᵀ)/120.
+    #[inline(always)]
     fn add_tetrahedron(&mut self, a: Vec3<W>, b: Vec3<W>, c: Vec3<W>) {
         let d = dot(a, cross(b, c));
         let s: Vec3<W> = std::array::from_fn(|k| a[k] + b[k] + c[k]);
@@ -119,6 +155,7 @@ impl<W: Real> Moments<W> {
     }
 
     /// The derivatives of Σ d_moments · moments for one tetrahedron, at its corners a, b, c.
+    #[inline(always)]
     fn tetrahedron_backward(d_moments: &Self, corners: [Vec3<W>; 3]) -> [Vec3<W>; 3] {
         let [a, b, c] = corners;
         let s: Vec3<W> = std::array::from_fn(|k| a[k] + b[k] + c[k]);
@@ -154,15 +191,28 @@ impl<W: Real> Moments<W> {
 
 /// The moments of each closed part, about the scene's origin.
 pub fn part_moments<R: Real>(closing: &Closing, points: &[Vec3<R>]) -> Vec<Moments<R::Wide>> {
-    let moments = |part: &std::ops::Range<usize>| {
-        let mut sum = Moments::zero();
-        for face in &closing.faces[part.clone()] {
-            let [a, b, c] = face.map(|index| widen(points[index as usize]));
-            sum.add_tetrahedron(a, b, c);
+    R::apart::<MomentsForward, _>((closing, points))
+}
+
+/// [`part_moments`]
+struct MomentsForward;
+
+impl<R: Real> Room<(&Closing, &[Vec3<R>])> for MomentsForward {
+    type Output = Vec<Moments<R::Wide>>;
+
+    #[inline(always)]
+    fn enter((closing, points): (&Closing, &[Vec3<R>])) -> Vec<Moments<R::Wide>> {
+        let points = widen_all(points);
+        let mut all = Vec::with_capacity(closing.parts.len());
+        for part in &closing.parts {
+            let mut sum = Moments::zero();
+            for &[a, b, c] in &closing.faces[part.clone()] {
+                sum.add_tetrahedron(points[a as usize], points[b as usize], points[c as usize]);
+            }
+            all.push(sum);
         }
-        sum
-    };
-    closing.parts.iter().map(moments).collect()
+        all
+    }
 }
 
 pub fn part_moments_backward<R: Real>(
@@ -171,15 +221,43 @@ pub fn part_moments_backward<R: Real>(
     d_moments: &[Moments<R::Wide>],
     d_points: &mut [Vec3<R>],
 ) {
-    for (part, d_part) in closing.parts.iter().zip(d_moments) {
-        for face in &closing.faces[part.clone()] {
-            let corners = face.map(|index| widen(points[index as usize]));
-            for (index, d_corner) in face.iter().zip(Moments::tetrahedron_backward(d_part, corners)) {
-                let d_point = &mut d_points[*index as usize];
-                *d_point = add(*d_point, narrow::<R>(d_corner));
+    R::apart::<MomentsBackward, _>((closing, points, d_moments, d_points));
+}
+
+/// [`part_moments_backward`]
+struct MomentsBackward;
+
+impl<R: Real> Room<(&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>])> for MomentsBackward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter(
+        (closing, points, d_moments, d_points): (&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>]),
+    ) -> () {
+        let points = widen_all(points);
+        let mut d_wide = vec![[R::Wide::zero(); 3]; points.len()];
+        for (part, d_part) in closing.parts.iter().zip(d_moments) {
+            for &[a, b, c] in &closing.faces[part.clone()] {
+                let corners = [points[a as usize], points[b as usize], points[c as usize]];
+                let d_corners = Moments::tetrahedron_backward(d_part, corners);
+                for (index, d_corner) in [a, b, c].into_iter().zip(d_corners) {
+                    d_wide[index as usize] = add(d_wide[index as usize], d_corner);
+                }
             }
         }
+        for (d_point, &d) in d_points.iter_mut().zip(&d_wide) {
+            *d_point = add(*d_point, narrow::<R>(d));
+        }
     }
+}
+
+#[inline(always)]
+fn widen_all<R: Real>(points: &[Vec3<R>]) -> Vec<Vec3<R::Wide>> {
+    let mut wide = Vec::with_capacity(points.len());
+    for &point in points {
+        wide.push(widen(point));
+    }
+    wide
 }
 
 /// Exact volume (m³), mass (kg), centre (m) and inertia about the centre (kg m²) of the body and of each part.
@@ -192,12 +270,14 @@ pub struct MassProperties {
 impl MassProperties {
     pub const ROW: usize = 14;
 
+    #[inline(always)]
     fn density(&self, part: usize) -> f64 {
         self.densities[if self.densities.len() == 1 { 0 } else { part }]
     }
 }
 
 /// mass, centre and inertia from the density-weighted moments.
+#[inline(always)]
 fn row<W: Real>(volume: W, weighted: &Moments<W>, origin: Vec3<W>, out: &mut [W]) {
     let mass = weighted.volume;
     let centre: Vec3<W> = weighted.first.map(|x| x / mass);
@@ -215,6 +295,7 @@ fn row<W: Real>(volume: W, weighted: &Moments<W>, origin: Vec3<W>, out: &mut [W]
 }
 
 /// The gradient of [`row`] by the weighted moments.
+#[inline(always)]
 fn row_backward<W: Real>(weighted: &Moments<W>, d_out: &[W]) -> Moments<W> {
     let mass = weighted.volume;
     let centre: Vec3<W> = weighted.first.map(|x| x / mass);
@@ -280,6 +361,7 @@ impl Quantity for MassProperties {
 
 impl MassProperties {
     /// Volume and density-weighted moments: the whole body's first, then each part's.
+    #[inline(always)]
     fn weigh<W: Real>(&self, parts: &[Moments<W>]) -> (Vec<W>, Vec<Moments<W>>) {
         let mut volumes = vec![W::zero()];
         let mut weighted = vec![Moments::zero()];

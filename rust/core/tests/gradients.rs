@@ -3,7 +3,7 @@
 
 mod common;
 
-use ipman::number::Scalar;
+use ipman::number::Data;
 use ipman::quantity::{Quantity, Visitor, named};
 use ipman::{Batch, Template};
 use proptest::prelude::*;
@@ -17,7 +17,7 @@ enum Verb<'a, T> {
 
 struct Run<'a, T>(Batch<'a, T>, Verb<'a, T>);
 
-impl<T: Scalar> Visitor for Run<'_, T> {
+impl<T: Data> Visitor for Run<'_, T> {
     type Output = Vec<T>;
     fn visit<Q: Quantity>(self, quantity: Q) -> Vec<T> {
         match self.1 {
@@ -30,7 +30,7 @@ impl<T: Scalar> Visitor for Run<'_, T> {
     }
 }
 
-fn run<T: Scalar>(template: &Template, (name, options): &(String, Vec<f64>), vertices: &[T], verb: Verb<T>) -> Vec<T> {
+fn run<T: Data>(template: &Template, (name, options): &(String, Vec<f64>), vertices: &[T], verb: Verb<T>) -> Vec<T> {
     let never = || false;
     let batch = Batch::new(template, vertices, &[0.1, 1.0, -0.05], &[0.012], &never).unwrap();
     named(template, name, options, Run(batch, verb)).unwrap()

@@ -3,7 +3,7 @@
 use crate::error::detached;
 use crate::template::Template;
 use ipman::Batch;
-use ipman::number::Scalar;
+use ipman::number::Data;
 use numpy::{Element, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -22,7 +22,7 @@ impl<'py> Grounds<'py> {
 
 /// Checks the vertices (B, V, 3) against the template and the grounds, for the core only knows flat lengths, and runs
 /// `work` on the batch without the GIL.
-pub fn on_batch<T: Scalar + Element, O: Send>(
+pub fn on_batch<T: Data + Element, O: Send>(
     py: Python<'_>,
     template: &Template,
     vertices: &PyReadonlyArray3<'_, T>,

@@ -5,12 +5,13 @@ use crate::bodies::{Grounds, on_batch};
 use crate::error::value_error;
 use crate::template::Template;
 use ipman::Batch;
-use ipman::number::Scalar;
+use ipman::number::Data;
 use ipman::quantity::{Quantity, Visitor, named};
-use numpy::{Element, IntoPyArray, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 type Reply<'py> = PyResult<Bound<'py, PyAny>>;
 
@@ -40,21 +41,23 @@ struct Run<'a, T> {
     verb: Verb,
     /// As many as the verb takes, in its order.
     upstream: Vec<&'a [T]>,
+    /// As many as the verb gives, in its order.
+    outputs: Vec<&'a mut [T]>,
 }
 
-impl<T: Scalar> Visitor for Run<'_, T> {
-    /// The numbers of the result, and the gradient where the verb has both.
-    type Output = ipman::Result<(Vec<T>, Vec<T>)>;
+impl<T: Data> Visitor for Run<'_, T> {
+    type Output = ipman::Result<()>;
 
     fn visit<Q: Quantity>(self, quantity: Q) -> Self::Output {
-        let Run { batch, verb, upstream } = self;
-        let alone = |result| (result, Vec::new());
+        let Run { batch, verb, upstream, mut outputs } = self;
+        let mut outputs = outputs.iter_mut();
+        let mut next = || outputs.next().expect("as many as the verb gives");
         match verb {
-            Verb::Value => batch.value(&quantity).map(alone),
-            Verb::Vjp => batch.vjp(&quantity, upstream[0]).map(alone),
-            Verb::Jvp => batch.jvp(&quantity, upstream[0]).map(alone),
-            Verb::VjpJvp => batch.vjp_jvp(&quantity, upstream[0], upstream[1]).map(alone),
-            Verb::ValueAndVjp => batch.value_and_vjp(&quantity, upstream[0]),
+            Verb::Value => batch.value_into(&quantity, next()),
+            Verb::Vjp => batch.vjp_into(&quantity, upstream[0], next()),
+            Verb::Jvp => batch.jvp_into(&quantity, upstream[0], next()),
+            Verb::VjpJvp => batch.vjp_jvp_into(&quantity, upstream[0], upstream[1], next()),
+            Verb::ValueAndVjp => batch.value_and_vjp_into(&quantity, upstream[0], next(), next()),
         }
     }
 }
@@ -86,7 +89,7 @@ impl<'py> Question<'_, 'py> {
         }
     }
 
-    fn evaluate<T: Scalar + Element>(
+    fn evaluate<T: Data + Element>(
         &self,
         verb: Verb,
         vertices: &PyReadonlyArray3<'py, T>,
@@ -105,17 +108,28 @@ impl<'py> Question<'_, 'py> {
             slices.push(checked(flat(array, name)?, name, expected)?);
         }
 
-        let (first, second) = on_batch(self.py, self.template, vertices, &self.grounds, |batch| {
-            named(template, quantity, options, Run { batch, verb, upstream: slices })?
+        let (rows, gradient) = ([shape[0], size], [shape[0], shape[1], 3]);
+        let outputs: Vec<Bound<'py, PyArrayDyn<T>>> = match verb {
+            Verb::Value | Verb::Jvp => vec![unwritten(self.py, &rows)],
+            Verb::Vjp | Verb::VjpJvp => vec![unwritten(self.py, &gradient)],
+            Verb::ValueAndVjp => vec![unwritten(self.py, &rows), unwritten(self.py, &gradient)],
+        };
+        let mut written: Vec<_> = outputs.iter().map(|array| array.readwrite()).collect();
+        let written = written.iter_mut().map(|array| array.as_slice_mut()).collect::<Result<Vec<_>, _>>()?;
+        on_batch(self.py, self.template, vertices, &self.grounds, |batch| {
+            named(template, quantity, options, Run { batch, verb, upstream: slices, outputs: written })?
         })?;
-        let rows = |numbers: Vec<T>| numbers.into_pyarray(self.py).reshape([shape[0], size]);
-        let gradient = |numbers: Vec<T>| numbers.into_pyarray(self.py).reshape([shape[0], shape[1], 3]);
-        Ok(match verb {
-            Verb::Value | Verb::Jvp => rows(first)?.into_any(),
-            Verb::Vjp | Verb::VjpJvp => gradient(first)?.into_any(),
-            Verb::ValueAndVjp => (rows(first)?, gradient(second)?).into_pyobject(self.py)?.into_any(),
+        Ok(match <[_; 1]>::try_from(outputs) {
+            Ok([one]) => one.into_any(),
+            Err(both) => PyTuple::new(self.py, both)?.into_any(),
         })
     }
+}
+
+/// An array whose numbers are there but mean nothing yet: every verb writes all of its output.
+fn unwritten<'py, T: Element>(py: Python<'py>, shape: &[usize]) -> Bound<'py, PyArrayDyn<T>> {
+    // SAFETY: T is f32 or f64, for which every bit pattern is a number.
+    unsafe { PyArrayDyn::new(py, shape, false) }
 }
 
 /// Upstream arrays must have the vertices' precision.

@@ -36,7 +36,7 @@ mod threads {
     /// The number of threads that batches use.
     #[pyfunction]
     pub fn get_num_threads() -> usize {
-        ipman::batch::num_threads()
+        ipman::threads::num_threads()
     }
 
     /// Sets the number of threads that batches use, 1 to 1024.
@@ -44,7 +44,7 @@ mod threads {
     pub fn set_num_threads(threads: Bound<'_, PyAny>) -> PyResult<()> {
         match threads.extract() {
             Ok(number @ 1..=1024) => {
-                ipman::batch::set_num_threads(number);
+                ipman::threads::set_num_threads(number);
                 Ok(())
             }
             _ => Err(PyValueError::new_err(format!("threads: expected 1 to 1024, got {threads}"))),

@@ -10,7 +10,7 @@
 use crate::error::Result;
 use crate::mass::{Centre, Method};
 use crate::number::vector::{Vec3, add_scaled, narrow, scale};
-use crate::number::{Real, Scalar};
+use crate::number::{Real, Room, Scalar};
 use crate::pressure::PressureCurve;
 use crate::quantity::{Quantity, unknown_choice};
 use crate::scene::Scene;
@@ -57,11 +57,11 @@ pub struct BalanceCost {
 }
 
 /// The solved problem.
-pub struct Balance<W> {
-    centre: Centre<W>,
-    supports: Supports<W>,
-    lambda: [W; 2],
-    cost: W,
+pub struct Balance<R: Real> {
+    centre: Centre<R>,
+    supports: Supports<R::Wide>,
+    lambda: [R::Wide; 2],
+    cost: R::Wide,
 }
 
 /// The samples as supports: x_i − m on the ground, and log ρ_i = log factor + exponent (up to a common constant).
@@ -93,7 +93,8 @@ const MAX_STEPS: usize = 100;
 const TOLERANCE: f64 = 1e-9;
 
 impl<W: Real> Supports<W> {
-    fn new<R: Real<Wide = W>>(scene: &Scene<R>, centre: &Centre<W>, curve: &PressureCurve) -> Self {
+    #[inline(always)]
+    fn new<R: Real<Wide = W>>(scene: &Scene<R>, centre: &Centre<R>, curve: &PressureCurve) -> Self {
         let count = scene.template.samples.len();
         let column = || Vec::with_capacity(count);
         let mut supports =
@@ -112,6 +113,7 @@ impl<W: Real> Supports<W> {
         supports
     }
 
+    #[inline(always)]
     fn weights(&self, lambda: [W; 2]) -> Weights<W> {
         let arms = self.arm_x.iter().zip(&self.arm_y);
         let mut of: Vec<W> =
@@ -127,6 +129,7 @@ impl<W: Real> Supports<W> {
 
 impl BalanceCost {
     /// F at λ, up to the constant log Σρ.
+    #[inline(always)]
     fn objective<W: Real>(&self, supports: &Supports<W>, lambda: [W; 2]) -> Objective<W> {
         let weights = supports.weights(lambda);
         let mut sums = [W::zero(); 5];
@@ -148,6 +151,7 @@ impl BalanceCost {
 
     /// Newton with backtracking, each lane at its own pace, and one full step at the end, which also carries a dual
     /// number's derivative of λ.
+    #[inline(always)]
     fn solve<W: Real>(&self, supports: &Supports<W>) -> ([W; 2], W) {
         let mut lambda = [W::zero(); 2];
         let mut here = self.objective(supports, lambda);
@@ -177,17 +181,30 @@ impl BalanceCost {
         (lambda, start - self.objective(supports, lambda).value)
     }
 
-    fn solved<R: Real>(&self, scene: &Scene<R>) -> Balance<R::Wide> {
-        let centre = self.method.forward(scene);
-        let supports = Supports::new(scene, &centre, &self.curve);
-        let (lambda, cost) = self.solve(&supports);
+    fn solved<R: Real>(&self, scene: &Scene<R>) -> Balance<R> {
+        R::apart::<Forward, _>((self, scene))
+    }
+}
+
+/// [`BalanceCost::solved`]
+struct Forward;
+
+impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>)> for Forward {
+    type Output = Balance<R>;
+
+    #[inline(always)]
+    fn enter((cost, scene): (&BalanceCost, &Scene<R>)) -> Balance<R> {
+        let centre = cost.method.forward(scene);
+        let supports = Supports::new(scene, &centre, &cost.curve);
+        let (lambda, divergence) = cost.solve(&supports);
         // J is a divergence: below zero there is only rounding.
-        Balance { centre, supports, lambda, cost: cost.at_least(R::Wide::zero()) }
+        Balance { centre, supports, lambda, cost: divergence.at_least(R::Wide::zero()) }
     }
 }
 
 impl<W: Real> Objective<W> {
     /// −H⁻¹ g
+    #[inline(always)]
     fn newton_step(&self) -> [W; 2] {
         let ([gx, gy], [xx, xy, yy]) = (self.gradient, self.hessian);
         let determinant = xx * yy - xy * xy;
@@ -195,15 +212,18 @@ impl<W: Real> Objective<W> {
     }
 
     /// Negative in a lane whose residual is small enough.
+    #[inline(always)]
     fn excess_residual(&self) -> W {
         self.gradient[0].abs().at_least(self.gradient[1].abs()) - W::of(TOLERANCE)
     }
 
+    #[inline(always)]
     fn has_arrived(&self) -> bool {
         let excess = self.excess_residual();
         (0..W::LANES).all(|lane| excess.lane(lane).value() < 0.0)
     }
 
+    #[inline(always)]
     fn replaced_where_negative(self, test: W, other: Self) -> Self {
         let pick = |a: W, b: W| test.if_negative(b, a);
         Objective {
@@ -215,34 +235,48 @@ impl<W: Real> Objective<W> {
 }
 
 impl Quantity for BalanceCost {
-    type Saved<R: Real> = Balance<R::Wide>;
+    type Saved<R: Real> = Balance<R>;
 
     fn len(&self, _: &Template) -> usize {
         1
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Balance<R::Wide> {
+    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Balance<R> {
         let balance = self.solved(scene);
         out[0] = R::narrow(self.wrap.value_and_slope(balance.cost).0);
         balance
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Balance<R::Wide>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        let Balance { centre, supports, lambda, cost } = saved;
-        let d_cost = d_out[0].widen() * self.wrap.value_and_slope(*cost).1;
-        let pull = scene.plane.raise(lambda.map(|l| d_cost * l));
-        self.method.backward(scene, centre, pull, d_points);
+    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Balance<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+        R::apart::<Backward, _>((self, scene, saved, d_out[0], d_points));
+    }
+}
 
-        let spread = supports.weights(*lambda);
-        let still = supports.weights([R::Wide::zero(); 2]);
-        for sample in 0..spread.of.len() {
-            let weight = spread.of[sample] / spread.total;
-            let pressure = still.of[sample] / still.total;
-            let factor = supports.factor[sample];
-            let log_slope = self.curve.slope(supports.height[sample], factor) / factor;
-            let mut d_point = scale(-weight, pull);
-            add_scaled(&mut d_point, -d_cost * (weight - pressure) * log_slope, scene.ground.normal);
-            scene.template.samples.point_backward(sample, narrow::<R>(d_point), d_points);
+/// The backward of the cost.
+struct Backward;
+
+impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>, &Balance<R>, R, &mut [Vec3<R>])> for Backward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((of, scene, saved, d_out, d_points): (&BalanceCost, &Scene<R>, &Balance<R>, R, &mut [Vec3<R>])) -> () {
+        {
+            let Balance { centre, supports, lambda, cost } = saved;
+            let d_cost = d_out.widen() * of.wrap.value_and_slope(*cost).1;
+            let pull = scene.plane.raise([d_cost * lambda[0], d_cost * lambda[1]]);
+            of.method.backward(scene, centre, pull, d_points);
+
+            let spread = supports.weights(*lambda);
+            let still = supports.weights([R::Wide::zero(); 2]);
+            for sample in 0..spread.of.len() {
+                let weight = spread.of[sample] / spread.total;
+                let pressure = still.of[sample] / still.total;
+                let factor = supports.factor[sample];
+                let log_slope = of.curve.slope(supports.height[sample], factor) / factor;
+                let mut d_point = scale(-weight, pull);
+                add_scaled(&mut d_point, -d_cost * (weight - pressure) * log_slope, scene.ground.normal);
+                scene.template.samples.point_backward(sample, narrow::<R>(d_point), d_points);
+            }
         }
     }
 }

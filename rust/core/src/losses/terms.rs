@@ -1,16 +1,16 @@
 //! The terms of a training or fitting step together: (stability, pull, push) or (balance, pull, push).
 //!
-//! Stability and ground share one pass over the samples.
+//! Stability and ground look at the samples together.
 
 use crate::losses::balance::{Balance, BalanceCost};
 use crate::losses::ground::GroundLoss;
-use crate::losses::stability::StabilityLoss;
+use crate::losses::stability::{StabilityLoss, distance_on_ground};
 use crate::mass::Centre;
 use crate::number::Real;
-use crate::number::vector::Vec3;
-use crate::pressure::CopPass;
+use crate::number::vector::{Vec3, scale};
+use crate::pressure::{Cop, LoadSums};
 use crate::quantity::Quantity;
-use crate::sampling::Points;
+use crate::sampling::{CHUNK, Points};
 use crate::scene::Scene;
 use crate::template::Template;
 
@@ -19,38 +19,69 @@ pub struct StabilityTerms {
     pub ground: GroundLoss,
 }
 
+impl StabilityTerms {
+    /// Values, and what the stability's backward needs. With `d_ground` the ground's backward is done at the same look at
+    /// the samples: its gradient by the vertices' heights is added there.
+    fn look<R: Real>(
+        &self,
+        scene: &Scene<R>,
+        out: &mut [R],
+        mut d_ground: Option<([R; 2], &mut [R])>,
+    ) -> (Centre<R>, Cop<R>, Vec<R>) {
+        let heights = scene.heights();
+        let mut loads = LoadSums::new(self.stability.pressure, &heights);
+        let mut ground = self.ground.sums();
+        let mut row = [R::zero(); CHUNK];
+        for place in Points::Samples.places(scene.template) {
+            place.read(&heights, &mut row);
+            loads.read(&place, &row);
+            if self.ground.points == Points::Samples {
+                match &mut d_ground {
+                    Some((shares, d_heights)) => ground.read_and_hand_back(&place, &row, *shares, d_heights),
+                    None => ground.read(&place, &row),
+                }
+            }
+        }
+        if self.ground.points == Points::Vertices {
+            for place in Points::Vertices.places(scene.template) {
+                place.read(&heights, &mut row);
+                match &mut d_ground {
+                    Some((shares, d_heights)) => ground.read_and_hand_back(&place, &row, *shares, d_heights),
+                    None => ground.read(&place, &row),
+                }
+            }
+        }
+        let (centre, cop) = (self.stability.method.forward(scene), loads.finish(scene));
+        out[0] = R::narrow(distance_on_ground(scene, &centre, &cop).0);
+        ground.finish(scene.template, &mut out[1..]);
+        (centre, cop, heights)
+    }
+}
+
 impl Quantity for StabilityTerms {
-    type Saved<R: Real> = (Centre<R::Wide>, CopPass<R>);
+    type Saved<R: Real> = (Centre<R>, Cop<R>, Vec<R>);
 
     fn len(&self, _: &Template) -> usize {
         3
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
-        let centre = self.stability.method.forward(scene);
-        let mut cop = self.stability.pressure.pass();
-        let mut ground = self.ground.pass();
-        if self.ground.points == Points::Samples {
-            Points::Samples.read(scene, &mut (&mut cop, &mut ground));
-        } else {
-            Points::Samples.read(scene, &mut cop);
-            self.ground.points.read(scene, &mut ground);
-        }
-        cop.finish(scene);
-        out[0] = self.stability.loss(scene, &centre, &cop);
-        ground.finish(scene.template, &mut out[1..]);
-        (centre, cop)
+        self.look(scene, out, None)
     }
 
     fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        let mut cop = self.stability.loss_backward(scene, &saved.0, &saved.1, d_out[0], d_points);
-        let mut ground = self.ground.backward_pass(scene.template, &d_out[1..]);
-        if self.ground.points == Points::Samples {
-            Points::Samples.hand_back(scene, &(&mut cop, &mut ground), d_points);
-        } else {
-            Points::Samples.hand_back(scene, &cop, d_points);
-            self.ground.points.hand_back(scene, &ground, d_points);
-        }
+        self.stability.backward(scene, saved, &d_out[..1], d_points);
+        self.ground.backward(scene, &saved.2, &d_out[1..], d_points);
+    }
+
+    fn forward_and_backward<R: Real>(&self, scene: &Scene<R>, d_out: &[R], out: &mut [R], d_points: &mut [Vec3<R>]) {
+        let mut d_heights = vec![R::zero(); scene.template.mesh.num_vertices];
+        let shares = self.ground.shares(scene.template, &d_out[1..]);
+        let (centre, cop, heights) = self.look(scene, out, Some((shares, &mut d_heights)));
+        let d_centre = scale(d_out[0].widen(), distance_on_ground(scene, &centre, &cop).1);
+        cop.backward(scene, &heights, scale(R::Wide::of(-1.0), d_centre), &mut d_heights, d_points);
+        scene.heights_backward(&d_heights, d_points);
+        self.stability.method.backward(scene, &centre, d_centre, d_points);
     }
 }
 
@@ -60,20 +91,19 @@ pub struct BalanceTerms {
 }
 
 impl Quantity for BalanceTerms {
-    type Saved<R: Real> = Balance<R::Wide>;
+    type Saved<R: Real> = (Balance<R>, Vec<R>);
 
     fn len(&self, _: &Template) -> usize {
         3
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Balance<R::Wide> {
+    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
         let (first, rest) = out.split_at_mut(1);
-        self.ground.forward(scene, rest);
-        self.balance.forward(scene, first)
+        (self.balance.forward(scene, first), self.ground.forward(scene, rest))
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Balance<R::Wide>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        self.ground.backward(scene, &(), &d_out[1..], d_points);
-        self.balance.backward(scene, saved, &d_out[..1], d_points);
+    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+        self.ground.backward(scene, &saved.1, &d_out[1..], d_points);
+        self.balance.backward(scene, &saved.0, &d_out[..1], d_points);
     }
 }

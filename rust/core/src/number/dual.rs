@@ -57,11 +57,15 @@ impl Neg for Dual {
 
 impl Real for Dual {
     type Scalar = Dual;
+    type Data = f64;
     type Wide = Dual;
     const LANES: usize = 1;
 
     fn of(value: f64) -> Self {
         Dual::new(value, 0.0)
+    }
+    fn splat(number: f64) -> Self {
+        Dual::of(number)
     }
     fn if_negative(self, below: Self, otherwise: Self) -> Self {
         if self.value < 0.0 { below } else { otherwise }
@@ -103,6 +107,12 @@ impl Real for Dual {
 
 impl Scalar for Dual {
     fn value(self) -> f64 {
+        self.value
+    }
+    fn read(data: f64) -> Self {
+        Dual::of(data)
+    }
+    fn data(self) -> f64 {
         self.value
     }
 }

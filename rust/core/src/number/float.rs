@@ -1,18 +1,23 @@
-//! `f32` and `f64` as numbers with one lane.
+//! `f32` and `f64` as numbers with one lane, on any CPU.
 
-use super::curves::{self, Format};
-use super::{Real, Scalar};
+use super::curves::{self, DOUBLE_POWERS, Format, SINGLE_POWERS};
+use super::{Data, Real, Scalar};
 
 macro_rules! float {
     ($float:ty) => {
         impl Real for $float {
             type Scalar = $float;
+            type Data = $float;
             type Wide = f64;
             const LANES: usize = 1;
 
             #[inline(always)]
             fn of(value: f64) -> Self {
                 value as $float
+            }
+            #[inline(always)]
+            fn splat(number: $float) -> Self {
+                number
             }
             #[inline(always)]
             fn if_negative(self, below: Self, otherwise: Self) -> Self {
@@ -65,6 +70,14 @@ macro_rules! float {
             fn value(self) -> f64 {
                 self as f64
             }
+            #[inline(always)]
+            fn read(data: $float) -> Self {
+                data
+            }
+            #[inline(always)]
+            fn data(self) -> $float {
+                self
+            }
         }
     };
 }
@@ -72,24 +85,36 @@ macro_rules! float {
 float!(f32);
 float!(f64);
 
-// power_of_two: adding 2^(mantissa bits) + bias leaves the biased exponent in the lowest bits; the shift moves it to
-// its place and everything else out.
-impl Format for f32 {
-    const ROUNDER: f64 = 12_582_912.0;
-    const EXPONENTS: (f64, f64) = (-126.0, 127.0);
-    const DEGREE: usize = 7;
+impl Data for f32 {
     #[inline(always)]
-    fn power_of_two(k: f32) -> f32 {
-        f32::from_bits((k + (8_388_608.0 + 127.0)).to_bits() << 23)
+    fn pick<'a>(single: &'a [f32], _: &'a [f64]) -> &'a [f32] {
+        single
+    }
+}
+
+impl Data for f64 {
+    #[inline(always)]
+    fn pick<'a>(_: &'a [f32], double: &'a [f64]) -> &'a [f64] {
+        double
+    }
+}
+
+impl Format for f32 {
+    const ROUNDER: f64 = 12_582_912.0 + 127.0;
+    const EXPONENTS: (f64, f64) = (-126.0, 127.0);
+    const POWERS: &'static [f64] = &SINGLE_POWERS;
+    #[inline(always)]
+    fn low_bits_as_power(self) -> f32 {
+        f32::from_bits(self.to_bits() << 23)
     }
 }
 
 impl Format for f64 {
-    const ROUNDER: f64 = 6_755_399_441_055_744.0;
+    const ROUNDER: f64 = 6_755_399_441_055_744.0 + 1023.0;
     const EXPONENTS: (f64, f64) = (-1022.0, 1023.0);
-    const DEGREE: usize = 13;
+    const POWERS: &'static [f64] = &DOUBLE_POWERS;
     #[inline(always)]
-    fn power_of_two(k: f64) -> f64 {
-        f64::from_bits((k + (4_503_599_627_370_496.0 + 1023.0)).to_bits() << 52)
+    fn low_bits_as_power(self) -> f64 {
+        f64::from_bits(self.to_bits() << 52)
     }
 }

@@ -1,17 +1,35 @@
 //! The number that every room is written in.
 //!
-//! A room computes with [`Real`] and so is at once the exact path (`f64`), the fast scalar path (`f32`) and the
-//! forward-mode derivative ([`Dual`]). A lane type (many bodies side by side) fits the same trait, which is why no
-//! method returns a bool: a choice between two values is made by [`Real::if_negative`].
+//! A room computes with [`Real`] and so is at once the exact path (`f64`), the fast path (lanes: one lane = one body) and
+//! the forward-mode derivative ([`Dual`]). No method returns a bool, for lanes may disagree: a choice between two values
+//! is made by [`Real::if_negative`].
+//!
+//! All numbers of one CPU level ([`gate`]) round alike, operation by operation: a body has the same bits alone and in
+//! any lane of any width. Therefore rooms fix the order of their sums, and write `mul_add` where one rounding is meant.
 
 mod curves;
 mod dual;
 mod float;
+mod fused;
+pub mod gate;
+pub mod lanes;
+#[cfg(target_arch = "aarch64")]
+mod neon;
+#[cfg(target_arch = "x86_64")]
+mod simd;
 pub mod vector;
 
 pub use dual::Dual;
+pub use fused::Fused;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A function that is compiled once for each number, see [`Real::apart`].
+pub trait Room<Arguments> {
+    type Output;
+    /// To be marked `#[inline(always)]`.
+    fn enter(arguments: Arguments) -> Self::Output;
+}
 
 /// A number, or one number for each lane.
 pub trait Real:
@@ -26,12 +44,21 @@ pub trait Real:
     + Neg<Output = Self>
 {
     /// One lane of it.
-    type Scalar: Scalar;
+    type Scalar: Scalar<Data = Self::Data>;
+    /// What one lane of it is in memory outside.
+    type Data: Data;
     /// The type that long sums run in: the same lanes in double precision.
     type Wide: Real<Wide = Self::Wide>;
     const LANES: usize;
 
     fn of(value: f64) -> Self;
+    /// The same number in all lanes.
+    fn splat(number: Self::Data) -> Self;
+    /// self · factor + term, rounded once where the CPU level has fused operations.
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        self * factor + term
+    }
     /// `below` where self < 0, else `otherwise` (at 0, and for NaN).
     fn if_negative(self, below: Self, otherwise: Self) -> Self;
     fn at_least(self, floor: Self) -> Self;
@@ -44,12 +71,24 @@ pub trait Real:
     fn tanh(self) -> Self;
     fn widen(self) -> Self::Wide;
     fn narrow(wide: Self::Wide) -> Self;
+    /// Enters `F` in a function of its own that may use the CPU's instructions for this number. Gates inline all that they
+    /// lead to; a large room that many quantities enter is compiled once behind this door.
+    #[inline(never)]
+    fn apart<F: Room<A>, A>(arguments: A) -> F::Output {
+        F::enter(arguments)
+    }
     fn lane(self, lane: usize) -> Self::Scalar;
     fn from_lanes(lane: impl FnMut(usize) -> Self::Scalar) -> Self;
 
     #[inline(always)]
     fn zero() -> Self {
         Self::of(0.0)
+    }
+
+    /// −(self · factor) + term
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+        (-self).mul_add(factor, term)
     }
 
     #[inline(always)]
@@ -67,9 +106,29 @@ pub trait Real:
     fn exp(self) -> Self {
         (self * Self::of(std::f64::consts::LOG2_E)).exp2()
     }
+
+    /// Rows of numbers, one row a lane and all of one length, as one row of lanes, each less its lane's `origin[k % 3]`.
+    #[inline(always)]
+    fn read_rows(rows: &[&[Self::Data]], origin: &[[Self::Data; 3]], out: &mut [Self]) {
+        lanes::read_rows_one_by_one(rows, origin, out);
+    }
+
+    /// The way back: lane l of every number to `rows[l]`.
+    #[inline(always)]
+    fn write_rows(numbers: &[Self], rows: &mut [&mut [Self::Data]]) {
+        lanes::write_rows_one_by_one(numbers, rows);
+    }
 }
 
 /// A number that stands alone, so that decisions (contact, hull) can be taken on its value.
 pub trait Scalar: Real<Scalar = Self> {
     fn value(self) -> f64;
+    fn read(data: Self::Data) -> Self;
+    fn data(self) -> Self::Data;
+}
+
+/// A floating-point format of the caller's arrays, itself a number with one lane.
+pub trait Data: Scalar<Data = Self> + gate::Gates {
+    /// The ones that are kept in this format, of constants that are kept in both.
+    fn pick<'a>(single: &'a [f32], double: &'a [f64]) -> &'a [Self];
 }

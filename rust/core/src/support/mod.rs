@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::ground::values;
 use crate::mass::{Centre, Method};
 use crate::number::vector::{Vec3, narrow};
-use crate::number::{Real, Scalar};
+use crate::number::{Real, Room, Scalar};
 use crate::quantity::{Quantity, unknown_choice};
 use crate::scene::Scene;
 use crate::support::margin::{Margin, Nearest};
@@ -54,18 +54,32 @@ impl Contact {
     /// The contact samples of one lane and their positions on the ground. Always decided in double precision, so that
     /// single and double precision agree on the contact set.
     fn find<R: Real>(&self, scene: &Scene<R>, lane: usize) -> (Vec<u32>, Vec<[f64; 2]>) {
-        let (mut samples, mut positions) = (Vec::new(), Vec::new());
-        for sample in 0..scene.template.samples.len() {
-            let point = scene.template.samples.wide_point(sample, scene.points);
-            if self.touches(scene.ground.signed_height(point).lane(lane).value()) {
-                samples.push(sample as u32);
-                positions.push(values(scene.plane.flatten(point).map(|x| x.lane(lane))));
+        R::apart::<Find, _>((self, scene, lane))
+    }
+}
+
+/// [`Contact::find`]
+struct Find;
+
+impl<R: Real> Room<(&Contact, &Scene<'_, R>, usize)> for Find {
+    type Output = (Vec<u32>, Vec<[f64; 2]>);
+
+    #[inline(always)]
+    fn enter((contact, scene, lane): (&Contact, &Scene<R>, usize)) -> (Vec<u32>, Vec<[f64; 2]>) {
+        {
+            let (mut samples, mut positions) = (Vec::new(), Vec::new());
+            for sample in 0..scene.template.samples.len() {
+                let point = scene.template.samples.wide_point(sample, scene.points);
+                if contact.touches(scene.ground.signed_height(point).lane(lane).value()) {
+                    samples.push(sample as u32);
+                    positions.push(values(scene.plane.flatten(point).map(|x| x.lane(lane))));
+                }
             }
+            if contact.rule == ContactRule::Released && samples.len() < RELEASED_MINIMUM {
+                return (Vec::new(), Vec::new());
+            }
+            (samples, positions)
         }
-        if self.rule == ContactRule::Released && samples.len() < RELEASED_MINIMUM {
-            return (Vec::new(), Vec::new());
-        }
-        (samples, positions)
     }
 }
 
@@ -127,13 +141,14 @@ pub struct SupportMargin {
 }
 
 /// For each lane the samples that span the nearest boundary, as the boundary's two ends, and the centre of mass.
-pub struct SavedMargin<W> {
-    centre: Centre<W>,
+pub struct SavedMargin<R: Real> {
+    centre: Centre<R>,
     nearest: Vec<Option<Nearest<u32>>>,
 }
 
 impl SupportMargin {
-    fn nearest<R: Real>(&self, scene: &Scene<R>, centre: &Centre<R::Wide>, lane: usize) -> Option<Nearest<u32>> {
+    #[inline(always)]
+    fn nearest<R: Real>(&self, scene: &Scene<R>, centre: &Centre<R>, lane: usize) -> Option<Nearest<u32>> {
         let (samples, positions) = self.contact.find(scene, lane);
         let corners = hull::convex_hull(&positions);
         let polygon: Vec<_> = corners.iter().map(|&i| positions[i]).collect();
@@ -142,9 +157,10 @@ impl SupportMargin {
     }
 
     /// The margin and its derivatives, with the nearest boundary held.
+    #[inline(always)]
     fn margin<R: Real>(
         scene: &Scene<R>,
-        centre: &Centre<R::Wide>,
+        centre: &Centre<R>,
         nearest: Nearest<u32>,
         lane: usize,
     ) -> Margin<<R::Wide as Real>::Scalar> {
@@ -156,13 +172,13 @@ impl SupportMargin {
 }
 
 impl Quantity for SupportMargin {
-    type Saved<R: Real> = SavedMargin<R::Wide>;
+    type Saved<R: Real> = SavedMargin<R>;
 
     fn len(&self, _: &Template) -> usize {
         1
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> SavedMargin<R::Wide> {
+    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> SavedMargin<R> {
         let centre = self.method.forward(scene);
         let nearest: Vec<_> = (0..R::LANES).map(|lane| self.nearest(scene, &centre, lane)).collect();
         let lanes = R::Wide::from_lanes(|lane| match nearest[lane] {
@@ -173,7 +189,7 @@ impl Quantity for SupportMargin {
         SavedMargin { centre, nearest }
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &SavedMargin<R::Wide>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &SavedMargin<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
         let margins: Vec<_> =
             (0..R::LANES).map(|lane| Some(Self::margin(scene, &saved.centre, saved.nearest[lane]?, lane))).collect();
         // The direction of each lane's derivative; no contact, no derivative.

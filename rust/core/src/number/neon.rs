@@ -1,0 +1,1 @@
+//! Lane types on aarch64.

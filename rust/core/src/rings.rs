@@ -1,0 +1,128 @@
+//! Rings: around each point of a closed part its neighbours in cyclic order.
+//!
+//! The faces at a point v close a fan; the sum of their area vectors is the area vector A of the ring, whatever point the
+//! fan has. So ∂vol/∂v = A/3, and since the volume is homogeneous of degree three, vol = ⅓ Σ_v v·∂vol/∂v = Σ_v v·A_v/9:
+//! one walk over the rings is the part's volume and its gradient. A ring is walked from its own first neighbour, so the
+//! edges that enter are short and keep single precision.
+
+use crate::number::Real;
+use crate::number::vector::{Vec3, add_cross, sub};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// The rings of one closed part. A point where the part touches itself has several.
+#[derive(Clone, Debug, Default)]
+pub struct Rings {
+    /// The point of each ring.
+    pub points: Vec<u32>,
+    neighbours: Vec<u32>,
+    blocks: Vec<Block>,
+}
+
+/// Consecutive rings of one size: few enough for single-precision partial sums.
+#[derive(Clone, Debug)]
+pub struct Block {
+    pub rings: Range<usize>,
+    size: usize,
+    /// Where the rings' neighbours start.
+    start: usize,
+}
+
+const BLOCK: usize = 16;
+
+impl Rings {
+    pub fn new(faces: &[[u32; 3]]) -> Self {
+        let mut rings = cycles(faces);
+        rings.sort_by_key(|(point, ring)| (ring.len(), *point));
+        let mut all = Rings::default();
+        for run in rings.chunk_by(|a, b| a.1.len() == b.1.len()) {
+            for block in run.chunks(BLOCK) {
+                let first = all.points.len();
+                let (size, start) = (block[0].1.len(), all.neighbours.len());
+                for (point, ring) in block {
+                    all.points.push(*point);
+                    all.neighbours.extend(ring);
+                }
+                all.blocks.push(Block { rings: first..all.points.len(), size, start });
+            }
+        }
+        all
+    }
+
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    pub fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    /// Twice the area vector of each ring of a block.
+    #[inline(always)]
+    pub fn area_vectors<R: Real>(&self, block: &Block, points: &[Vec3<R>], doubled: &mut [Vec3<R>]) {
+        match block.size {
+            3 => self.of_size::<R, 3>(block, points, doubled),
+            4 => self.of_size::<R, 4>(block, points, doubled),
+            5 => self.of_size::<R, 5>(block, points, doubled),
+            6 => self.of_size::<R, 6>(block, points, doubled),
+            7 => self.of_size::<R, 7>(block, points, doubled),
+            8 => self.of_size::<R, 8>(block, points, doubled),
+            size => {
+                let rings = self.neighbours[block.start..].chunks_exact(size);
+                for (doubled, ring) in doubled.iter_mut().zip(rings) {
+                    *doubled = area_vector(ring, points);
+                }
+            }
+        }
+    }
+
+    /// The same with a size that the compiler knows.
+    #[inline(always)]
+    fn of_size<R: Real, const N: usize>(&self, block: &Block, points: &[Vec3<R>], doubled: &mut [Vec3<R>]) {
+        let rings = self.neighbours[block.start..].as_chunks::<N>().0;
+        for (doubled, ring) in doubled.iter_mut().zip(rings) {
+            *doubled = area_vector(ring, points);
+        }
+    }
+}
+
+/// Twice the area vector of a closed polygon, as a fan from its first corner.
+#[inline(always)]
+fn area_vector<R: Real>(ring: &[u32], points: &[Vec3<R>]) -> Vec3<R> {
+    let apex = points[ring[0] as usize];
+    let mut edge = sub(points[ring[1] as usize], apex);
+    let mut doubled = [R::zero(); 3];
+    for &corner in &ring[2..] {
+        let next = sub(points[corner as usize], apex);
+        doubled = add_cross(doubled, edge, next);
+        edge = next;
+    }
+    doubled
+}
+
+/// The cycles that the edges opposite to each point form. In a closed part every point has as many edges in as out.
+fn cycles(faces: &[[u32; 3]]) -> Vec<(u32, Vec<u32>)> {
+    let mut opposite: BTreeMap<u32, Vec<(u32, u32)>> = BTreeMap::new();
+    for &[a, b, c] in faces {
+        for (point, from, to) in [(a, b, c), (b, c, a), (c, a, b)] {
+            opposite.entry(point).or_default().push((from, to));
+        }
+    }
+    let mut all = Vec::new();
+    for (point, mut edges) in opposite {
+        while let Some((first, mut at)) = edges.pop() {
+            let mut ring = vec![first];
+            while at != first {
+                ring.push(at);
+                let next = edges.iter().position(|&(from, _)| from == at).expect("the part is closed");
+                at = edges.swap_remove(next).1;
+            }
+            all.push((point, ring));
+        }
+    }
+    all
+}
