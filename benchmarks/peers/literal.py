@@ -1,7 +1,7 @@
 """(a) The paper's procedure as research code organises it, written afresh.
 
-A batch at once, but part after part in Python: each part's faces, boundary and lids are looked up again at every call,
-its closed mesh is put together, moved to its centroid and filled with tetrahedra one face each; every sample gets its
+A batch at once, but part after part in Python: at every call each part's faces and lids are looked up again, its closed
+mesh is put together, moved to its centroid and filled with tetrahedra one face each; every sample gets its
 part's volume by a loop; samples are a sparse product in double precision with all coordinates side by side. Autograd
 gives the gradient. The base of support is the linear programme "is the centre a convex combination of the contacts?".
 """
@@ -30,6 +30,8 @@ class Literal:
         mesh = topology(template, torch.device("cpu"))
         self.lid_of_vertex = np.full(template.num_vertices, -1)
         self.lid_of_vertex[mesh.ring_vertices.numpy()] = mesh.ring_components.numpy()
+        # Boundaries come with the segmentation files; what is built upon them is built at each call.
+        self.boundaries = [_boundary(self.faces[self.face_parts == part]) for part in range(template.num_parts)]
 
     def terms(self, vertices: Tensor) -> Tensor:
         """(3, B)."""
@@ -76,7 +78,7 @@ class Literal:
         local[members] = np.arange(len(members))
         points, triangles = vertices[:, torch.tensor(members)], [local[faces]]
 
-        edges = _boundary(faces)
+        edges = self.boundaries[part]
         for lid in np.unique(self.lid_of_vertex[edges[:, 0]]) if len(edges) else ():
             of_lid = torch.tensor(np.flatnonzero(self.lid_of_vertex == lid))
             centre = vertices[:, of_lid].mean(dim=1, keepdim=True)

@@ -63,11 +63,11 @@ class Smplx:
 class TorchSkinning:
     """Shape blend, pose blend, Rodrigues, the kinematic chain by 4 × 4 products, blended transforms."""
 
-    def __init__(self) -> None:
+    def __init__(self, dtype: torch.dtype = torch.float32) -> None:
         model = ip.load_body(synthetic_smpl())
 
         def floats(array: Any) -> Tensor:
-            return torch.tensor(np.asarray(array), dtype=torch.float32)
+            return torch.tensor(np.asarray(array), dtype=dtype)
 
         self.parents = model.parents.tolist()
         self.v_template, self.shapedirs = floats(model.v_template), floats(model.shapedirs)
@@ -81,7 +81,7 @@ class TorchSkinning:
         shaped = self.v_template + torch.einsum("bl,vkl->bvk", betas, self.shapedirs)
         joints = self.joints + torch.einsum("bl,jkl->bjk", betas, self.joint_shapes)
         rotations = rodrigues(pose.reshape(-1, 3)).reshape(batch, -1, 3, 3)
-        feature = (rotations[:, 1:] - torch.eye(3)).flatten(1)
+        feature = (rotations[:, 1:] - torch.eye(3).to(pose)).flatten(1)
         rest = shaped + (feature @ self.posedirs).reshape(batch, -1, 3)
 
         bones = joints.clone()
@@ -99,7 +99,7 @@ class TorchSkinning:
 
     @staticmethod
     def _last_row(rotations: Tensor) -> Tensor:
-        return torch.tensor([0.0, 0.0, 0.0, 1.0]).expand(*rotations.shape[:2], 1, 4)
+        return rotations.new_tensor([0.0, 0.0, 0.0, 1.0]).expand(*rotations.shape[:2], 1, 4)
 
 
 class OurSkinning:
@@ -117,7 +117,7 @@ def rodrigues(vectors: Tensor) -> Tensor:
     zero = torch.zeros_like(x)
     skew = torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], dim=1).reshape(-1, 3, 3)
     sin, cos = angle.sin()[..., None], angle.cos()[..., None]
-    return torch.eye(3) + sin * skew + (1 - cos) * (skew @ skew)
+    return torch.eye(3).to(vectors) + sin * skew + (1 - cos) * (skew @ skew)
 
 
 def parameters(batch: int, dtype: torch.dtype = torch.float32) -> tuple[Tensor, Tensor, Tensor]:
