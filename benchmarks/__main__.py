@@ -1,6 +1,6 @@
 """`make bench`: runs every peer and writes docs/performance.md, .svg and .json.
 
-    python -m benchmarks [--quick] [--out docs]
+python -m benchmarks [--quick] [--out docs]
 """
 
 from __future__ import annotations

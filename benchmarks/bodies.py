@@ -61,7 +61,9 @@ def _decimated(full: BodyModel) -> dict[str, NDArray]:
     import trimesh
     from scipy.spatial import KDTree
 
-    vertices, faces = fast_simplification.simplify(full.v_template, full.faces, target_count=SMPL_FACES)
+    vertices, faces = fast_simplification.simplify(
+        full.v_template, full.faces.astype(np.int32), target_count=SMPL_FACES
+    )
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     if not (mesh.is_watertight and mesh.is_winding_consistent and mesh.euler_number == 2 and mesh.volume > 0):
         raise RuntimeError("the decimated body is no closed surface")

@@ -60,7 +60,9 @@ def rows(budget: Budget) -> Iterator[Row]:
 
 def _losses(budget: Budget, body: str, preset: str, batch: int, threads: int) -> Iterator[Row]:
     vertices = bodies.vertices_of(body, batch)
-    peers = {name: LOSS_PEERS[name](bodies.body(body).template, preset) for name in _names(body, preset, batch, threads)}
+    peers = {
+        name: LOSS_PEERS[name](bodies.body(body).template, preset) for name in _names(body, preset, batch, threads)
+    }
     weights = torch.tensor(list(presets.get(preset).weights.values()))[:, None] / batch
     for case in ("weighted", "terms"):
 
@@ -72,7 +74,9 @@ def _losses(budget: Budget, body: str, preset: str, batch: int, threads: int) ->
         expected = None
         if batch <= 64:
             double = vertices.detach().double().requires_grad_()
-            expected = _value_and_gradient(lambda x=double: total(Vectorised(bodies.body(body).template, preset), x), double)
+            expected = _value_and_gradient(
+                lambda x=double: total(Vectorised(bodies.body(body).template, preset), x), double
+            )
         runs = {name: _step(lambda peer=peer: total(peer), vertices) for name, peer in peers.items()}
         times = interleaved(runs, budget.seconds, budget.min_turns)
         for name, seconds in medians(times).items():
@@ -120,7 +124,8 @@ def _skinning(budget: Budget) -> Iterator[Row]:
                 value = relative_error(run(peers[name]), expected)
                 gradient = max(relative_error(a.grad, b.grad) for a, b in zip(inputs, doubles, strict=True))
                 yield Row(
-                    "skinning", "smpl", "", batch, threads, name, 1e6 * seconds / batch, len(times[name]), value, gradient
+                    "skinning", "smpl", "", batch, threads, name,
+                    1e6 * seconds / batch, len(times[name]), value, gradient,
                 )  # fmt: skip
 
 
@@ -149,8 +154,8 @@ def _metrics(budget: Budget) -> Iterator[Row]:
 
 
 def _metric_error(found: Any, expected: Any) -> float:
-    """Of a tuple the largest; of a truth value the share of bodies on which it is another; of margins only those inside,
-    where the distance to scipy's lines is the distance to the polygon."""
+    """Of a tuple the largest; of a truth value the share of bodies on which it is another; of margins only those
+    inside, where the distance to scipy's lines is the distance to the polygon."""
     if isinstance(found, tuple):
         return max(relative_error(a, b) for a, b in zip(found, expected, strict=True))
     if found.dtype == bool:

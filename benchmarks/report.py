@@ -63,7 +63,7 @@ def _goals(rows: Rows) -> list[list[str]]:
 def _others(rows: Rows) -> list[list[str]]:
     """Skinning and metrics: case, batch, peer, µs, ours, ratio."""
     table = []
-    goals = {("support", "literal LP"): 100, ("support", "scipy ConvexHull"): 5}
+    goals: dict[tuple[Any, ...], int] = {("support", "literal LP"): 100, ("support", "scipy ConvexHull"): 5}
     goals |= {("skinning", "torch", 1): 4, ("skinning", "torch", 32): 3}
     for case in ("support", "mass", "skinning"):
         for row in _where(rows, case=case):

@@ -1,4 +1,4 @@
-"""Does every room still run on lanes? `cargo bench` of the core once for each SIMD level, and the speed-up of each room.
+"""Does every room still run on lanes? `cargo bench` of the core once for each SIMD level, and each room's speed-up.
 
     python -m benchmarks.widths [--levels scalar,avx2,avx512] [--batch 64] [ROOM ...]
 

@@ -11,9 +11,6 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("fast_simplification")
 pytest.importorskip("smplx")
 
-from click.testing import CliRunner  # noqa: E402
-
-import ipman_rs as ip  # noqa: E402
 from benchmarks import bodies, cases, widths  # noqa: E402
 from benchmarks.__main__ import main  # noqa: E402
 from benchmarks.measure import Row, interleaved, relative_error  # noqa: E402
@@ -21,6 +18,9 @@ from benchmarks.peers import skinning  # noqa: E402
 from benchmarks.peers.best_torch import BestTorch  # noqa: E402
 from benchmarks.peers.metrics import Metrics  # noqa: E402
 from benchmarks.peers.vectorised import Vectorised  # noqa: E402
+from click.testing import CliRunner  # noqa: E402
+
+import ipman_rs as ip  # noqa: E402
 
 # float32 positions of metres carry 6e-8 m, and α = 100 / m turns that into 6e-6 of a pressure near 1; eager torch sums
 # 20,000 of them pairwise, best torch one after the other.

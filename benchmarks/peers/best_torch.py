@@ -13,7 +13,7 @@ It is float32 throughout and takes y = 0 for the ground. Nothing is guarded: no 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +25,7 @@ from ipman_rs import BodyTemplate, presets
 from ipman_rs.torch.reference.topology import topology
 
 ROW_WIDTHS = (1, 2, 3, 4, 6, 8)
-"""Rows of a sparse matrix are filled up to the next of these; longer rows are cut into pieces that are added up after."""
+"""Rows of a sparse matrix are filled up to the next of these; longer rows are cut into pieces, added up after."""
 
 PIECE_WIDTHS = (1, 2, 4, 8, 16)
 """How many pieces a row has, filled up."""
@@ -33,6 +33,9 @@ PIECE_WIDTHS = (1, 2, 4, 8, 16)
 RING_WIDTHS = (5, 6, 7, 8, 10)
 """The same for rings; longer ones stand together and are summed by a loop."""
 
+
+OPTIONS = {"realize_reads_threshold": 1, "realize_opcount_threshold": 8, "assert_indirect_indexing": False}
+"""Of inductor: a field that several gathers read is stored once instead of being computed at every read."""
 
 Row = list[tuple[int, float]]
 """(column, weight) of a sparse row."""
@@ -97,12 +100,11 @@ class BestTorch:
             raise ValueError(f"preset: expected one with the norm and no epsilon, got {preset!r}")
         self.numbers = numbers
         self.fixed = fixed_of(template)
-        self.first, self.second, self.both = self._first, self._second, self._both
-        if compiled:
-            self.first, self.second, self.both = (
-                torch.compile(f, fullgraph=True, dynamic=False)
-                for f in (self._first, self._second, self._both)
-            )
+
+        def built(function: Callable[..., Any]) -> Callable[..., Any]:
+            return torch.compile(function, fullgraph=True, dynamic=False, options=OPTIONS) if compiled else function
+
+        self.first, self.second, self.both = built(self._first), built(self._second), built(self._both)
 
     def terms(self, vertices: Tensor) -> Tensor:
         """(3, B), each with its own upstream gradient."""
@@ -128,7 +130,7 @@ class BestTorch:
         pressure, _ = pressure_of(height, n.alpha, n.gamma)
         load = apply(fixed.spread, pressure)
         total_pressure = pressure.sum(0)
-        cop = tuple((load * axis).sum(0) / total_pressure for axis in (x, z))
+        cop = (load * x).sum(0) / total_pressure, (load * z).sum(0) / total_pressure
 
         points = [torch.cat([axis, apply(fixed.lids, axis)]) for axis in (x, y, z)]
         normals, volume = rings_of(points, fixed.rings)
@@ -136,7 +138,7 @@ class BestTorch:
         part_x, part_z = fixed.part_sums @ x, fixed.part_sums @ z
         weight = volumes.abs()
         mass = (weight * fixed.part_counts).sum(0)
-        com = tuple((weight * part).sum(0) / mass for part in (part_x, part_z))
+        com = (weight * part_x).sum(0) / mass, (weight * part_z).sum(0) / mass
 
         below = height < 0
         wave, _ = wave_of(height / torch.where(below, n.beta2, n.alpha2))
@@ -278,9 +280,7 @@ def fixed_of(template: BodyTemplate) -> Fixed:
     parts = np.repeat(np.arange(template.num_parts), mesh.part_sizes)
     regressor = template.regressor()
     rings, ring_vertex, ring_part = _rings(triangles, parts)
-    vertex_of_lid = [
-        mesh.ring_vertices[mesh.ring_components == lid].tolist() for lid in range(len(mesh.ring_sizes))
-    ]
+    vertex_of_lid = [mesh.ring_vertices[mesh.ring_components == lid].tolist() for lid in range(len(mesh.ring_sizes))]
 
     # Which rings a vertex gathers: its own, and those of its lid by its share.
     takes: list[Row] = [[] for _ in range(template.num_vertices)]

@@ -50,8 +50,11 @@ class Literal:
 
     def weighted(self, vertices: Tensor) -> Tensor:
         """The mean over the bodies."""
-        weights = self.numbers.weights.values()
-        return sum(weight * term.mean() for weight, term in zip(weights, self.terms(vertices), strict=True))
+        stability, pull, push = (
+            weight * term.mean()
+            for weight, term in zip(self.numbers.weights.values(), self.terms(vertices), strict=True)
+        )
+        return stability + pull + push
 
     def samples(self, vertices: Tensor) -> Tensor:
         """v = W V by a sparse product in double: (B, S, 3)."""

@@ -10,7 +10,6 @@ from scipy.spatial import ConvexHull
 from ipman_rs import BodyTemplate, Ground, base_of_support, mass_properties
 
 
-
 class Metrics:
     """Metrics of bodies (B, V, 3) over y = 0, each from the vertices on."""
 
@@ -64,9 +63,7 @@ class Metrics:
             from ipman_rs.torch.reference.topology import topology
 
             mesh = topology(self.template, torch.device("cpu"))
-            rings = [
-                mesh.ring_vertices[mesh.ring_components == k].numpy() for k in range(len(mesh.ring_sizes))
-            ]
+            rings = [mesh.ring_vertices[mesh.ring_components == k].numpy() for k in range(len(mesh.ring_sizes))]
             self._closed = mesh.triangles.numpy(), rings, np.cumsum([0, *mesh.part_sizes[:-1]])
         triangles, rings, starts = self._closed
         lids = [vertices[:, ring].mean(axis=1, keepdims=True) for ring in rings]

@@ -10,7 +10,6 @@ from .ours import Ours
 
 
 class Vectorised(Ours):
-
     def terms(self, vertices: Tensor) -> Tensor:
         with _reference_path():
             return super().terms(vertices)

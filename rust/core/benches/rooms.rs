@@ -5,6 +5,7 @@
 //! `python -m benchmarks.widths` compares the lanes room by room.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use ipman::Template;
 use ipman::batch::{Batch, set_num_threads};
 use ipman::losses::balance::{BalanceCost, Wrap};
 use ipman::losses::ground::{GroundLoss, Tanh};
@@ -17,7 +18,6 @@ use ipman::quantity::Quantity;
 use ipman::sampling::{Points, SampleSurface};
 use ipman::support::{Contact, ContactRule, SupportMargin};
 use ipman::volume::{MassProperties, PartVolumes};
-use ipman::Template;
 use std::hint::black_box;
 use std::time::Duration;
 
