@@ -34,9 +34,6 @@ RING_WIDTHS = (5, 6, 7, 8, 10)
 """The same for rings; longer ones stand together and are summed by a loop."""
 
 
-OPTIONS = {"realize_reads_threshold": 1, "realize_opcount_threshold": 8, "assert_indirect_indexing": False}
-"""Of inductor: a field that several gathers read is stored once instead of being computed at every read."""
-
 Row = list[tuple[int, float]]
 """(column, weight) of a sparse row."""
 
@@ -91,6 +88,14 @@ class Kept(NamedTuple):
     total_pressure: Tensor  # (B,)
 
 
+class Stages(NamedTuple):
+    turned: Callable[[Tensor], Tensor]
+    turned_back: Callable[[Tensor], Tensor]
+    first: Callable[[Tensor], tuple[Tensor, Kept]]
+    second: Callable[[Tensor, Kept, Tensor], Tensor]
+    both: Callable[[Tensor], tuple[Tensor, Tensor]]
+
+
 class BestTorch:
     """Stability, pull and push of a batch (B, V, 3), float32, over y = 0. Each batch size is compiled once."""
 
@@ -100,11 +105,19 @@ class BestTorch:
             raise ValueError(f"preset: expected one with the norm and no epsilon, got {preset!r}")
         self.numbers = numbers
         self.fixed = fixed_of(template)
+        self.compiled = compiled
+        self.stages_of: dict[int, Stages] = {}
 
-        def built(function: Callable[..., Any]) -> Callable[..., Any]:
-            return torch.compile(function, fullgraph=True, dynamic=False, options=OPTIONS) if compiled else function
-
-        self.first, self.second, self.both = built(self._first), built(self._second), built(self._both)
+    def stages(self, batch: int) -> Stages:
+        """The compiled functions for this batch size."""
+        if batch not in self.stages_of:
+            functions = (turned, turned_back, self._first, self._second, self._both)
+            if self.compiled:
+                # Eight bodies fill the lanes of AVX2; wider ones would stay empty.
+                options = {"cpp.simdlen": 256} if 1 < batch < 16 else {}
+                functions = [torch.compile(f, fullgraph=True, dynamic=False, options=options) for f in functions]
+            self.stages_of[batch] = Stages(*functions)
+        return self.stages_of[batch]
 
     def terms(self, vertices: Tensor) -> Tensor:
         """(3, B), each with its own upstream gradient."""
@@ -114,17 +127,17 @@ class BestTorch:
         """The mean over the bodies of Σ λ · term, value and gradient in one pass."""
         return _Weighted.apply(vertices, self)
 
-    def _both(self, vertices: Tensor) -> tuple[Tensor, Tensor]:
+    def _both(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """The total and its gradient."""
-        terms, kept = self._first(vertices)
-        weights = torch.tensor(list(self.numbers.weights.values()), dtype=terms.dtype) / len(vertices)
+        terms, kept = self._first(points)
+        weights = torch.tensor(list(self.numbers.weights.values()), dtype=terms.dtype) / points.shape[1]
         upstream = weights[:, None].expand_as(terms)
-        return (upstream * terms).sum(), self._second(vertices, kept, upstream)
+        return (upstream * terms).sum(), self._second(points, kept, upstream)
 
-    def _first(self, vertices: Tensor) -> tuple[Tensor, Kept]:
-        """Terms (3, B) of vertices (B, V, 3)."""
+    def _first(self, points: Tensor) -> tuple[Tensor, Kept]:
+        """Terms (3, B) of points (3 V, B)."""
         n, fixed = self.numbers, self.fixed
-        x, y, z = batch_last(vertices)
+        x, y, z = points.unflatten(0, (-1, 3)).unbind(1)
 
         height = gather(y, fixed.samples)
         pressure, _ = pressure_of(height, n.alpha, n.gamma)
@@ -132,8 +145,8 @@ class BestTorch:
         total_pressure = pressure.sum(0)
         cop = (load * x).sum(0) / total_pressure, (load * z).sum(0) / total_pressure
 
-        points = [torch.cat([axis, apply(fixed.lids, axis)]) for axis in (x, y, z)]
-        normals, volume = rings_of(points, fixed.rings)
+        closed = [torch.cat([axis, apply(fixed.lids, axis)]) for axis in (x, y, z)]
+        normals, volume = rings_of(closed, fixed.rings)
         volumes = fixed.in_part @ volume
         part_x, part_z = fixed.part_sums @ x, fixed.part_sums @ z
         weight = volumes.abs()
@@ -148,10 +161,10 @@ class BestTorch:
         kept = Kept(height, load, normals, volumes, part_x, part_z, com, cop, total_pressure)
         return torch.stack([stability, pull, push]), kept
 
-    def _second(self, vertices: Tensor, kept: Kept, upstream: Tensor) -> Tensor:
-        """The gradient (B, V, 3) of Σ upstream (3, B) · terms."""
+    def _second(self, points: Tensor, kept: Kept, upstream: Tensor) -> Tensor:
+        """The gradient (3 V, B) of Σ upstream (3, B) · terms."""
         n, fixed = self.numbers, self.fixed
-        x, _, z = batch_last(vertices)
+        x, _, z = points.unflatten(0, (-1, 3)).unbind(1)
         d_stability, d_pull, d_push = upstream.unbind(0)
         across = [mass - pressure for mass, pressure in zip(kept.com, kept.cop, strict=True)]
         distance = (across[0] ** 2 + across[1] ** 2).sqrt()
@@ -183,26 +196,29 @@ class BestTorch:
             flat + apply(fixed.unite, d_ring * normal)
             for flat, normal in zip((d_x, d_y, d_z), kept.normals, strict=True)
         ]
-        return torch.stack(d, dim=1).flatten(0, 1).T.contiguous().reshape(vertices.shape)
+        return torch.stack(d, dim=1).flatten(0, 1)
 
 
 class _Terms(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, vertices: Tensor, peer: BestTorch) -> Tensor:
-        terms, kept = peer.first(vertices.detach())
-        ctx.peer, ctx.kept = peer, kept
-        ctx.save_for_backward(vertices)
+        ctx.stages = peer.stages(len(vertices))
+        points = ctx.stages.turned(vertices.detach())
+        terms, ctx.kept = ctx.stages.first(points)
+        ctx.points = points
         return terms
 
     @staticmethod
     def backward(ctx: Any, d_terms: Tensor) -> tuple[Tensor, None]:  # type: ignore[override]
-        return ctx.peer.second(ctx.saved_tensors[0].detach(), ctx.kept, d_terms.contiguous()), None
+        return ctx.stages.turned_back(ctx.stages.second(ctx.points, ctx.kept, d_terms.contiguous())), None
 
 
 class _Weighted(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, vertices: Tensor, peer: BestTorch) -> Tensor:
-        total, ctx.gradient = peer.both(vertices.detach())
+        stages = peer.stages(len(vertices))
+        total, gradient = stages.both(stages.turned(vertices.detach()))
+        ctx.gradient = stages.turned_back(gradient)
         return total
 
     @staticmethod
@@ -211,10 +227,17 @@ class _Weighted(torch.autograd.Function):
         return gradient.mul_(d_total), None
 
 
-def batch_last(vertices: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """x, y, z, each (V, B), of vertices (B, V, 3): one transpose of a plain matrix, which inductor does in tiles."""
-    x, y, z = vertices.flatten(1).T.contiguous().unflatten(0, (-1, 3)).unbind(1)
-    return x, y, z
+# The turns are compiled by themselves: fused into what follows, inductor would read through them at every gather.
+
+
+def turned(vertices: Tensor) -> Tensor:
+    """(B, V, 3) -> (3 V, B): a plain transpose, which inductor does in tiles."""
+    return vertices.flatten(1).T.contiguous()
+
+
+def turned_back(points: Tensor) -> Tensor:
+    """(3 V, B) -> (B, V, 3)."""
+    return points.T.contiguous().unflatten(1, (-1, 3))
 
 
 def pressure_of(height: Tensor, alpha: float, gamma: float) -> tuple[Tensor, Tensor]:
