@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
 from ipman_rs import BodyTemplate, presets
@@ -92,8 +92,8 @@ class Stages(NamedTuple):
     turned: Callable[[Tensor], Tensor]
     turned_back: Callable[[Tensor], Tensor]
     first: Callable[[Tensor], tuple[Tensor, Kept]]
-    second: Callable[[Tensor, Kept, Tensor], Tensor]
-    both: Callable[[Tensor], tuple[Tensor, Tensor]]
+    sample_gradient: Callable[[Tensor, Kept, Tensor], Tensor]
+    gather_gradient: Callable[[Tensor, Kept, Tensor, Tensor], Tensor]
 
 
 class BestTorch:
@@ -105,13 +105,14 @@ class BestTorch:
             raise ValueError(f"preset: expected one with the norm and no epsilon, got {preset!r}")
         self.numbers = numbers
         self.fixed = fixed_of(template)
+        self.weights = _floats(list(numbers.weights.values()))
         self.compiled = compiled
         self.stages_of: dict[int, Stages] = {}
 
     def stages(self, batch: int) -> Stages:
         """The compiled functions for this batch size."""
         if batch not in self.stages_of:
-            functions = (turned, turned_back, self._first, self._second, self._both)
+            functions = [turned, turned_back, self._first, self._sample_gradient, self._gather_gradient]
             if self.compiled:
                 # Eight bodies fill the lanes of AVX2; wider ones would stay empty.
                 options = {"cpp.simdlen": 256} if 1 < batch < 16 else {}
@@ -127,13 +128,6 @@ class BestTorch:
         """The mean over the bodies of Σ λ · term, value and gradient in one pass."""
         return _Weighted.apply(vertices, self)
 
-    def _both(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """The total and its gradient."""
-        terms, kept = self._first(points)
-        weights = torch.tensor(list(self.numbers.weights.values()), dtype=terms.dtype) / points.shape[1]
-        upstream = weights[:, None].expand_as(terms)
-        return (upstream * terms).sum(), self._second(points, kept, upstream)
-
     def _first(self, points: Tensor) -> tuple[Tensor, Kept]:
         """Terms (3, B) of points (3 V, B)."""
         n, fixed = self.numbers, self.fixed
@@ -142,8 +136,8 @@ class BestTorch:
         height = gather(y, fixed.samples)
         pressure, _ = pressure_of(height, n.alpha, n.gamma)
         load = apply(fixed.spread, pressure)
-        total_pressure = pressure.sum(0)
-        cop = (load * x).sum(0) / total_pressure, (load * z).sum(0) / total_pressure
+        total_pressure = total(pressure)
+        cop = total(load * x) / total_pressure, total(load * z) / total_pressure
 
         closed = [torch.cat([axis, apply(fixed.lids, axis)]) for axis in (x, y, z)]
         normals, volume = rings_of(closed, fixed.rings)
@@ -155,33 +149,33 @@ class BestTorch:
 
         below = height < 0
         wave, _ = wave_of(height / torch.where(below, n.beta2, n.alpha2))
-        pull = n.alpha1 * torch.where(below, 0, wave).mean(0)
-        push = n.beta1 * torch.where(below, wave, 0).mean(0)
+        pull = n.alpha1 / len(height) * total(torch.where(below, 0, wave))
+        push = n.beta1 / len(height) * total(torch.where(below, wave, 0))
         stability = ((com[0] - cop[0]) ** 2 + (com[1] - cop[1]) ** 2).sqrt()
         kept = Kept(height, load, normals, volumes, part_x, part_z, com, cop, total_pressure)
         return torch.stack([stability, pull, push]), kept
 
-    def _second(self, points: Tensor, kept: Kept, upstream: Tensor) -> Tensor:
-        """The gradient (3 V, B) of Σ upstream (3, B) · terms."""
+    def _sample_gradient(self, points: Tensor, kept: Kept, upstream: Tensor) -> Tensor:
+        """By the height of each sample, (S, B), of Σ upstream (3, B) · terms."""
         n, fixed = self.numbers, self.fixed
         x, _, z = points.unflatten(0, (-1, 3)).unbind(1)
-        d_stability, d_pull, d_push = upstream.unbind(0)
-        across = [mass - pressure for mass, pressure in zip(kept.com, kept.cop, strict=True)]
-        distance = (across[0] ** 2 + across[1] ** 2).sqrt()
-        scale = torch.where(distance > 0, d_stability / torch.where(distance > 0, distance, 1), 0)
-        d_com_x, d_com_z = (scale * side for side in across)
-
-        # CoP = Σ ρ v / Σ ρ, and its gradient is minus that of the CoM.
+        _, d_pull, d_push = upstream.unbind(0)
+        d_com_x, d_com_z = d_center(kept, upstream)
         d_moment_x, d_moment_z = -d_com_x / kept.total_pressure, -d_com_z / kept.total_pressure
         d_total = -(d_moment_x * kept.cop[0] + d_moment_z * kept.cop[1])
         d_pressure = gather(d_moment_x * x + d_moment_z * z, fixed.samples) + d_total
         _, slope = pressure_of(kept.height, n.alpha, n.gamma)
         below = kept.height < 0
-        size = torch.where(below, n.beta2, n.alpha2)
-        _, wave_slope = wave_of(kept.height / size)
+        _, wave_slope = wave_of(kept.height / torch.where(below, n.beta2, n.alpha2))
         d_wave = torch.where(below, n.beta1 / n.beta2 * d_push, n.alpha1 / n.alpha2 * d_pull) / len(kept.height)
-        d_y = apply(fixed.spread, d_pressure * slope + d_wave * wave_slope)
+        return d_pressure * slope + d_wave * wave_slope
 
+    def _gather_gradient(self, points: Tensor, kept: Kept, upstream: Tensor, d_height: Tensor) -> Tensor:
+        """By the vertices, (3 V, B)."""
+        fixed = self.fixed
+        d_com_x, d_com_z = d_center(kept, upstream)
+        # CoP = Σ ρ v / Σ ρ, and its gradient is minus that of the CoM.
+        d_moment_x, d_moment_z = -d_com_x / kept.total_pressure, -d_com_z / kept.total_pressure
         # CoM = Σ |vol| Σ v / Σ |vol| N over the parts.
         weight = kept.volumes.abs()
         mass = (weight * fixed.part_counts).sum(0)
@@ -192,42 +186,56 @@ class BestTorch:
         lever_z = kept.part_z - kept.com[1] * fixed.part_counts
         d_volume = kept.volumes.sign() * (d_com_x * lever_x + d_com_z * lever_z) / mass
         d_ring = d_volume[fixed.part_of_ring]
-        d = [
-            flat + apply(fixed.unite, d_ring * normal)
-            for flat, normal in zip((d_x, d_y, d_z), kept.normals, strict=True)
-        ]
+        flat = (d_x, apply(fixed.spread, d_height), d_z)
+        d = [own + apply(fixed.unite, d_ring * normal) for own, normal in zip(flat, kept.normals, strict=True)]
         return torch.stack(d, dim=1).flatten(0, 1)
+
+
+def d_center(kept: Kept, upstream: Tensor) -> tuple[Tensor, Tensor]:
+    """x, z (B,) of the gradient by the CoM: the direction from the CoP to it; 0 where they coincide."""
+    across_x, across_z = kept.com[0] - kept.cop[0], kept.com[1] - kept.cop[1]
+    distance = (across_x**2 + across_z**2).sqrt()
+    scale = torch.where(distance > 0, upstream[0] / torch.where(distance > 0, distance, 1), 0)
+    return scale * across_x, scale * across_z
+
+
+def gradient(stages: Stages, points: Tensor, kept: Kept, upstream: Tensor) -> Tensor:
+    """(B, V, 3) of Σ upstream (3, B) · terms."""
+    d_height = stages.sample_gradient(points, kept, upstream)
+    return stages.turned_back(stages.gather_gradient(points, kept, upstream, d_height))
 
 
 class _Terms(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, vertices: Tensor, peer: BestTorch) -> Tensor:
         ctx.stages = peer.stages(len(vertices))
-        points = ctx.stages.turned(vertices.detach())
-        terms, ctx.kept = ctx.stages.first(points)
-        ctx.points = points
+        ctx.points = ctx.stages.turned(vertices.detach())
+        terms, ctx.kept = ctx.stages.first(ctx.points)
         return terms
 
     @staticmethod
     def backward(ctx: Any, d_terms: Tensor) -> tuple[Tensor, None]:  # type: ignore[override]
-        return ctx.stages.turned_back(ctx.stages.second(ctx.points, ctx.kept, d_terms.contiguous())), None
+        return gradient(ctx.stages, ctx.points, ctx.kept, d_terms.contiguous()), None
 
 
 class _Weighted(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, vertices: Tensor, peer: BestTorch) -> Tensor:
         stages = peer.stages(len(vertices))
-        total, gradient = stages.both(stages.turned(vertices.detach()))
-        ctx.gradient = stages.turned_back(gradient)
-        return total
+        points = stages.turned(vertices.detach())
+        terms, kept = stages.first(points)
+        weights = peer.weights[:, None] / len(vertices)
+        ctx.gradient = gradient(stages, points, kept, weights.expand_as(terms).contiguous())
+        return (weights * terms).sum()
 
     @staticmethod
     def backward(ctx: Any, d_total: Tensor) -> tuple[Tensor, None]:  # type: ignore[override]
-        gradient, ctx.gradient = ctx.gradient, None
-        return gradient.mul_(d_total), None
+        found, ctx.gradient = ctx.gradient, None
+        return found.mul_(d_total), None
 
 
-# The turns are compiled by themselves: fused into what follows, inductor would read through them at every gather.
+# The turns, and the gradient by the samples, are compiled by themselves: fused with what gathers from them, inductor
+# would compute them again at every read.
 
 
 def turned(vertices: Tensor) -> Tensor:
@@ -252,6 +260,12 @@ def wave_of(x: Tensor) -> tuple[Tensor, Tensor]:
     tanh = 1 - 2 / (torch.exp(2 * x) + 1)  # torch.tanh costs four times as much
     square = tanh * tanh
     return square, 2 * tanh * (1 - square)
+
+
+def total(values: Tensor) -> Tensor:
+    """The sum of each column, as a product: inductor's own reduction would walk down one column after the other, and
+    compute its terms there."""
+    return (values.new_ones(1, len(values)) @ values)[0]
 
 
 def gather(values: Tensor, group: Group) -> Tensor:
@@ -416,5 +430,5 @@ def _by_width(lengths: Sequence[int], widths: Sequence[int]) -> list[tuple[int, 
     return [(int(width), np.flatnonzero(taken == width)) for width in every if (taken == width).any()]
 
 
-def _floats(array: NDArray) -> Tensor:
+def _floats(array: ArrayLike) -> Tensor:
     return torch.tensor(np.asarray(array), dtype=torch.float32)
