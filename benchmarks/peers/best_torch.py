@@ -115,7 +115,7 @@ class BestTorch:
             functions = [turned, turned_back, self._first, self._sample_gradient, self._gather_gradient]
             if self.compiled:
                 # Eight bodies fill the lanes of AVX2; wider ones would stay empty.
-                options = {"cpp.simdlen": 256} if 1 < batch < 16 else {}
+                options: dict[str, Any] = {"cpp.simdlen": 256} if 1 < batch < 16 else {}
                 functions = [torch.compile(f, fullgraph=True, dynamic=False, options=options) for f in functions]
             self.stages_of[batch] = Stages(*functions)
         return self.stages_of[batch]
