@@ -37,7 +37,7 @@ help:
 	@echo 'make lint     formats and lints checked, nothing changed'
 	@echo 'make format   sources formatted'
 	@echo 'make wheel    one wheel for all Pythons >= 3.10 in dist/, tried alone in a clean environment'
-	@echo 'make bench    microseconds a body, beside plain torch'
+	@echo 'make bench    every peer, into docs/performance.md (QUICK=1: the most important ones, in three minutes)'
 	@echo 'make clean    remove what was built (.venv, target, out, dist)'
 	@echo 'PYTHON=python3.12 make …   chooses the interpreter of a new .venv'
 
@@ -76,8 +76,8 @@ wheel: $(VENV)/wheel-tools
 	maturin build --release --locked --out dist $(if $(filter Linux,$(shell uname)),--zig --compatibility manylinux2014)
 	tools/check_wheel.sh dist/*.whl
 
-bench: $(VENV)/test-tools
-	python benchmarks/torch_path.py
+bench: $(VENV)/bench-tools
+	python -m benchmarks $(if $(QUICK),--quick)
 
 clean:
 	rm -rf $(VENV) target out dist $(BINARY)
@@ -99,6 +99,10 @@ $(VENV)/built: $(SOURCES) $(if $(wildcard $(BINARY)),,FORCE) | $(VENV)/created
 
 $(VENV)/test-tools: pyproject.toml | $(VENV)/built
 	$(MATURIN_DEVELOP) --extras torch --group test
+	touch $@
+
+$(VENV)/bench-tools: pyproject.toml | $(VENV)/test-tools
+	$(PIP) install --quiet --group bench
 	touch $@
 
 $(VENV)/lint-tools: pyproject.toml | $(VENV)/created
