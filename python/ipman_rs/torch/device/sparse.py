@@ -28,14 +28,15 @@ class SparseRows(NamedTuple):
     weight: Tensor
     groups: Tensor | None
 
-    def product(self, values: Tensor, dtype: torch.dtype | None = None) -> Tensor:
-        """(B, n) or (B, n, 3) -> (B, R) or (B, R, 3), summed in `dtype` (that of values if None)."""
-        gathered = values.index_select(1, self.index.flatten()).unflatten(1, self.index.shape)
-        weight = self.weight if values.ndim == 2 else self.weight[..., None]
-        sums = (gathered * weight).sum(dim=2, dtype=dtype)
-        if self.groups is None:
-            return sums
-        return sums.index_select(1, self.groups.flatten()).unflatten(1, self.groups.shape).sum(dim=2)
+
+def product(rows: SparseRows, values: Tensor, dtype: torch.dtype) -> Tensor:
+    """The matrix times (B, n) or (B, n, 3): (B, R) or (B, R, 3), summed in `dtype`."""
+    gathered = values.index_select(1, rows.index.flatten()).unflatten(1, rows.index.shape)
+    weight = rows.weight if values.ndim == 2 else rows.weight[..., None]
+    sums = (gathered * weight).sum(dim=2, dtype=dtype)
+    if rows.groups is None:
+        return sums
+    return sums.index_select(1, rows.groups.flatten()).unflatten(1, rows.groups.shape).sum(dim=2)
 
 
 def sparse_rows(matrix: csr_array, device: torch.device, dtype: torch.dtype, group: int = 8) -> SparseRows:

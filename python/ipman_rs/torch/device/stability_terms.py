@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from ..reference.topology import widest
+from .sparse import product
 from .tables import Tables
 
 
@@ -73,17 +74,17 @@ def _values(
 
     above = (normal * origin.to(wide)).sum(dim=-1) - height
     at_vertices = (points * narrow[:, None]).sum(dim=-1) + above.to(points.dtype)[:, None]
-    at_samples = tables.samples.product(at_vertices)
+    at_samples = product(tables.samples, at_vertices, points.dtype)
     density = _density(o, at_samples)
-    load = tables.samples_back.product(density)
+    load = product(tables.samples_back, density, points.dtype)
     total = density.sum(dim=-1, dtype=wide) + o.epsilon
     moment = (load[..., None] * points).sum(dim=1, dtype=wide)
     cop = (moment - o.epsilon * origin.to(wide)) / total[:, None]  # ε pulls towards the world's origin
 
     a, b, c = _corners(tables, points).unbind(dim=1)
     area = torch.linalg.cross(b - a, c - a)
-    volume = tables.parts.product((a * area).sum(dim=-1), wide) / 6
-    sums = tables.sample_sums.product(points, wide)
+    volume = product(tables.parts, (a * area).sum(dim=-1), wide) / 6
+    sums = product(tables.sample_sums, points, wide)
     com = (volume.abs()[..., None] * sums).sum(dim=1) / _weight(tables, volume)[:, None]
 
     offset = com - cop
@@ -112,18 +113,20 @@ def _gradient(tables: Tables, o: Options, curve: str, s: Stage, weights: Tensor)
     samples = s.height.shape[1]
     pull = _wave(curve, s.height.clamp(min=0) / o.alpha2)[1] * (weights[:, 1:2] * (o.alpha1 / o.alpha2 / samples))
     push = _wave(curve, s.height.clamp(max=0) / o.beta2)[1] * (weights[:, 2:3] * (o.beta1 / o.beta2 / samples))
-    d_height = tables.samples_back.product(density_slope * tables.samples.product(lever) + pull + push)
+    d_height = product(
+        tables.samples_back, density_slope * product(tables.samples, lever, dtype) + pull + push, dtype
+    )
 
     # m̄ = Σ_p |vol_p| sums_p / Σ_p |vol_p| n_p: by the samples, and by the volumes, whose gradient at a vertex is a
     # sixth of the area normals around it, for each part is closed.
     weight = _weight(tables, s.volume)[:, None]
-    share = tables.sample_sums_back.product((s.volume.abs() / weight).to(dtype))
+    share = product(tables.sample_sums_back, (s.volume.abs() / weight).to(dtype), dtype)
     arm = s.sums - tables.part_sizes.to(wide)[:, None] * s.com[:, None]
     d_volume = s.volume.sign() * (arm * d_com[:, None]).sum(dim=-1) / weight / 6
     of_triangle = d_volume.to(dtype).index_select(1, tables.triangle_parts)
-    at_corners = tables.incidence.product(s.area * of_triangle[..., None])
+    at_corners = product(tables.incidence, s.area * of_triangle[..., None], dtype)
     real = s.points.shape[1]
-    gradient = at_corners[:, :real] + tables.centres_back.product(at_corners[:, real:])
+    gradient = at_corners[:, :real] + product(tables.centres_back, at_corners[:, real:], dtype)
 
     gradient = gradient + share[..., None] * d_com.to(dtype)[:, None] + s.load[..., None] * d_cop[:, None]
     gradient = gradient + d_height[..., None] * s.normal[:, None]
@@ -132,7 +135,7 @@ def _gradient(tables: Tables, o: Options, curve: str, s: Stage, weights: Tensor)
 
 def _corners(tables: Tables, points: Tensor) -> Tensor:
     """The triangles' corners, virtual ones included: (B, 3, T, 3)."""
-    every = torch.cat([points, tables.centres.product(points)], dim=1)
+    every = torch.cat([points, product(tables.centres, points, points.dtype)], dim=1)
     return every.index_select(1, tables.corners).unflatten(1, (3, -1))
 
 

@@ -2,8 +2,6 @@
 the body. Upper-case arguments are compile-time constants. `Layout` explains the index arrays.
 """
 
-# ruff: noqa: N803 (Triton's constants are upper-case)
-
 from __future__ import annotations
 
 import triton
@@ -15,11 +13,6 @@ def _xyz(rows, index, mask):
     """Rows of (n, 3), 0 where masked."""
     at = rows + 3 * index
     return tl.load(at, mask=mask, other=0), tl.load(at + 1, mask=mask, other=0), tl.load(at + 2, mask=mask, other=0)
-
-
-@triton.jit
-def _number(array):
-    return tl.load(array)
 
 
 @triton.jit

@@ -1,18 +1,18 @@
 """`stability_terms` as Triton kernels: one program a (body, block), every sum in a fixed order, no atomics.
 
-    _centres -> _triangles, _samples -> _balance                       values, and what the gradient is made of
-    _slopes, _rims -> _vertices                                        gradient
+    centres -> triangles, samples -> balance        values, and what the gradient is made of
+    slopes, rims -> vertices                        gradient
 
-`_triangles` and `_samples` leave one partial sum a block, all of whose entries lie in one part; `_balance` adds them in
-float64 and solves the body's few numbers; `_slopes` writes two numbers a sample, and each vertex collects what its own
-samples and triangles hold for it. Kernels are defined at the first use, so that importing this needs no Triton.
+`triangles` and `samples` leave one partial sum a block, all of whose entries lie in one part; `balance` adds them in
+float64 and solves the body's few numbers; `slopes` writes two numbers a sample, and each vertex collects what its own
+samples and triangles hold for it. The kernels (`triton_kernels`) are imported at the first launch: importing this file
+needs no Triton.
 """
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from functools import cache
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -28,16 +28,12 @@ if TYPE_CHECKING:
     from ipman_rs import BodyTemplate
 
 BLOCK = 256
-
-
-@cache
-def installed() -> bool:
-    return find_spec("triton") is not None
+INSTALLED = find_spec("triton") is not None
 
 
 def serves(vertices: Tensor) -> bool:
     """Whether the kernels run on this tensor's device: CUDA, or anything under Triton's interpreter."""
-    return installed() and (vertices.is_cuda or os.environ.get("TRITON_INTERPRET") == "1")
+    return INSTALLED and (vertices.is_cuda or os.environ.get("TRITON_INTERPRET") == "1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,17 +138,9 @@ _layout = PerTemplate(_build)
 
 # What one block of samples leaves: lowest height, Σ ρ, Σ ρ x, Σ x, Σ pull, Σ push.
 SAMPLE_SUMS = 10
-# What `_balance` leaves of a body before the numbers of its parts: shift, d m̄ (3), 1 / (Σ ρ + ε), d m̄ · s̄, and the
+# What `balance` leaves of a body before the numbers of its parts: shift, d m̄ (3), 1 / (Σ ρ + ε), d m̄ · s̄, and the
 # factors of the pull and the push slope.
 BODY_NUMBERS = 8
-
-
-@cache
-def _kernels() -> Any:
-    """The kernels. Arrays are (B, …) contiguous; lower-case pointers, upper-case compile-time constants."""
-    from . import triton_kernels
-
-    return triton_kernels
 
 
 def _run(
@@ -164,9 +152,24 @@ def _run(
     curve: str,
     options: list[float],
 ) -> tuple[Tensor, Tensor]:
+    """Values (B, 3) and, given weights, the gradient of their weighted sum (B, V, 3)."""
+    with torch.cuda.device_of(vertices):  # Triton launches on the current device
+        return _launch(vertices, normal, height, weights, template_key, curve, options)
+
+
+def _launch(
+    vertices: Tensor,
+    normal: Tensor,
+    height: Tensor,
+    weights: Tensor | None,
+    template_key: int,
+    curve: str,
+    options: list[float],
+) -> tuple[Tensor, Tensor]:
+    from . import triton_kernels as k
+
     template = by_key(template_key)
     layout: Layout = _layout(template, vertices.device, vertices.dtype)
-    k = _kernels()
     vertices = vertices.contiguous()
     normal, height = normal.to(torch.float64).contiguous(), height.to(torch.float64).contiguous()
     batch, parts = len(vertices), template.num_parts
