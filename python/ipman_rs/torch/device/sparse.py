@@ -31,12 +31,13 @@ class SparseRows(NamedTuple):
 
 def product(rows: SparseRows, values: Tensor, dtype: torch.dtype) -> Tensor:
     """The matrix times (B, n) or (B, n, 3): (B, R) or (B, R, 3), summed in `dtype`."""
-    gathered = values.index_select(1, rows.index.flatten()).unflatten(1, rows.index.shape)
+    batch, rest = values.shape[0], values.shape[2:]
+    gathered = values.index_select(1, rows.index.flatten()).reshape(batch, *rows.index.shape, *rest)
     weight = rows.weight if values.ndim == 2 else rows.weight[..., None]
     sums = (gathered * weight).sum(dim=2, dtype=dtype)
     if rows.groups is None:
         return sums
-    return sums.index_select(1, rows.groups.flatten()).unflatten(1, rows.groups.shape).sum(dim=2)
+    return sums.index_select(1, rows.groups.flatten()).reshape(batch, *rows.groups.shape, *rest).sum(dim=2)
 
 
 def sparse_rows(matrix: csr_array, device: torch.device, dtype: torch.dtype, group: int = 8) -> SparseRows:

@@ -89,7 +89,7 @@ def _values(
 
     offset = com - cop
     offset = offset - (offset * normal).sum(dim=-1, keepdim=True) * normal
-    length = (offset * offset).sum(dim=-1).sqrt()
+    length = (offset * offset).sum(dim=-1).sqrt()  # differentiated by hand: no trouble at 0
 
     pull = o.alpha1 * _wave(curve, at_samples.clamp(min=0) / o.alpha2)[0].mean(dim=-1, dtype=wide)
     push = o.beta1 * _wave(curve, at_samples.clamp(max=0) / o.beta2)[0].mean(dim=-1, dtype=wide)
@@ -136,7 +136,7 @@ def _gradient(tables: Tables, o: Options, curve: str, s: Stage, weights: Tensor)
 def _corners(tables: Tables, points: Tensor) -> Tensor:
     """The triangles' corners, virtual ones included: (B, 3, T, 3)."""
     every = torch.cat([points, product(tables.centres, points, points.dtype)], dim=1)
-    return every.index_select(1, tables.corners).unflatten(1, (3, -1))
+    return every.index_select(1, tables.corners).reshape(len(every), 3, -1, 3)
 
 
 def _weight(tables: Tables, volume: Tensor) -> Tensor:
