@@ -73,7 +73,8 @@ def _values(
     narrow = normal.to(points.dtype)
 
     above = (normal * origin.to(wide)).sum(dim=-1) - height
-    at_vertices = (points * narrow[:, None]).sum(dim=-1) + above.to(points.dtype)[:, None]
+    # The steep pressure curve multiplies rounding by α: heights are small near the ground, if formed in float64.
+    at_vertices = ((points.to(wide) * normal[:, None]).sum(dim=-1) + above[:, None]).to(points.dtype)
     at_samples = product(tables.samples, at_vertices, points.dtype)
     density = _density(o, at_samples)
     load = product(tables.samples_back, density, points.dtype)
@@ -113,9 +114,7 @@ def _gradient(tables: Tables, o: Options, curve: str, s: Stage, weights: Tensor)
     samples = s.height.shape[1]
     pull = _wave(curve, s.height.clamp(min=0) / o.alpha2)[1] * (weights[:, 1:2] * (o.alpha1 / o.alpha2 / samples))
     push = _wave(curve, s.height.clamp(max=0) / o.beta2)[1] * (weights[:, 2:3] * (o.beta1 / o.beta2 / samples))
-    d_height = product(
-        tables.samples_back, density_slope * product(tables.samples, lever, dtype) + pull + push, dtype
-    )
+    d_height = product(tables.samples_back, density_slope * product(tables.samples, lever, dtype) + pull + push, dtype)
 
     # m̄ = Σ_p |vol_p| sums_p / Σ_p |vol_p| n_p: by the samples, and by the volumes, whose gradient at a vertex is a
     # sixth of the area normals around it, for each part is closed.

@@ -51,17 +51,20 @@ def _density(height, shift, ALPHA: tl.constexpr, GAMMA: tl.constexpr):
 
 @triton.jit
 def _sample(vertices, normal, height, samples, barycentric, ORIGIN: tl.constexpr, V: tl.constexpr, BLOCK: tl.constexpr):
-    """This block's samples: position from the body's origin, height, and which are real."""
+    """This block's samples: position from the body's origin, height, and which are real.
+
+    The steep pressure curve multiplies rounding by α: heights are small near the ground, if formed in float64.
+    """
     body = tl.program_id(0)
     slot = tl.program_id(1) * BLOCK + tl.arange(0, BLOCK)
     points = vertices + body.to(tl.int64) * V * 3
     ox, oy, oz = _origin(vertices, body, ORIGIN, V)
     nx, ny, nz = _xyz(normal, body, True)
-    above = (nx * ox + ny * oy + nz * oz - tl.load(height + body)).to(ox.dtype)
+    level = tl.load(height + body)
 
     real = tl.load(samples + 3 * slot) >= 0
     x = tl.zeros([BLOCK], ox.dtype)
-    y, z = x, x
+    y, z, h = x, x, x
     for corner in tl.static_range(3):
         index = tl.load(samples + 3 * slot + corner)
         weight = tl.load(barycentric + 3 * slot + corner)
@@ -69,7 +72,7 @@ def _sample(vertices, normal, height, samples, barycentric, ORIGIN: tl.constexpr
         x += weight * (vx - ox)
         y += weight * (vy - oy)
         z += weight * (vz - oz)
-    h = nx.to(ox.dtype) * x + ny.to(ox.dtype) * y + nz.to(ox.dtype) * z + above
+        h += weight * (nx * vx + ny * vy + nz * vz - level).to(ox.dtype)
     return x, y, z, h, real, slot
 
 
