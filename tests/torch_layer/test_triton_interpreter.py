@@ -102,7 +102,10 @@ def test_opcheck(tiny):
     normal, height = tiny.ground.normal.expand(3, 3), tiny.ground.height.expand(3)
     problem = (tiny.template._key, "tanh_squared", [100.0, 10.0, 0.0, 1.0, 0.15, 10.0, 0.15])
     weights = torch.ones(3, 3, dtype=torch.float64)
-    torch.library.opcheck(torch.ops.ipman_rs.stability_terms.default, (tiny.vertices, normal, height, *problem))
+    utilities = ("test_schema", "test_faketensor")
+    torch.library.opcheck(
+        torch.ops.ipman_rs.stability_terms.default, (tiny.vertices, normal, height, *problem), test_utils=utilities
+    )
     torch.library.opcheck(
         torch.ops.ipman_rs.stability_terms_and_gradient.default, (tiny.vertices, normal, height, weights, *problem)
     )

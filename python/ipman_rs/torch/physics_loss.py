@@ -134,7 +134,7 @@ class IntuitivePhysicsLoss(nn.Module):
 
 
 def _row(like: Tensor, numbers: list[float]) -> Tensor:
-    """Numbers beside a tensor. Devices fill them in by kernels: a copy from the host would wait, and stop a CUDA graph."""
+    """Numbers beside a tensor, filled in by kernels on devices: a copy from the host waits, and stops a CUDA graph."""
     if like.device.type == "cpu":
         return like.new_tensor(numbers)
     return torch.stack([like.new_full((), number) for number in numbers])

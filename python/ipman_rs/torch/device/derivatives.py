@@ -1,4 +1,4 @@
-"""The tuned terms as differentiable functions: a hand-written first derivative, the reference formula for the second."""
+"""The tuned terms as differentiable functions: the first derivative by hand, the second by the reference formula."""
 
 from __future__ import annotations
 

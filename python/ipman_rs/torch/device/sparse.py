@@ -19,7 +19,7 @@ SHORT = 16
 
 
 class SparseRows(NamedTuple):
-    """`index` and `weight` (N, G): N groups of entries. `groups` (R, M): the groups of each row, None if group r is row r.
+    """`index` and `weight` (N, G): N groups of entries. `groups` (R, M): those of each row, None if row r is group r.
 
     Padding has weight 0; padding in `groups` names a group of padding.
     """

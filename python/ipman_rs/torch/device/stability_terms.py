@@ -49,7 +49,7 @@ class Stage(NamedTuple):
 
 
 def values(tables: Tables, o: Options, curve: str, vertices: Tensor, normal: Tensor, height: Tensor) -> Tensor:
-    """(B, 3): stability, pull, push. vertices (B, V, 3), normal (B, 3), height (B,); NaN for a body that is not finite."""
+    """(B, 3): stability, pull, push; NaN for a body that is not finite. vertices (B, V, 3), normal (B, 3), height (B,)."""
     return _values(tables, o, curve, vertices, normal, height)[0]
 
 
@@ -125,7 +125,9 @@ def _gradient(tables: Tables, o: Options, curve: str, s: Stage, weights: Tensor)
     of_triangle = d_volume.to(dtype).index_select(1, tables.triangle_parts)
     at_corners = product(tables.incidence, s.area * of_triangle[..., None], dtype)
     real = s.points.shape[1]
-    gradient = at_corners[:, :real] + product(tables.centres_back, at_corners[:, real:], dtype)
+    gradient = at_corners[:, :real]
+    if at_corners.shape[1] > real:
+        gradient = gradient + product(tables.centres_back, at_corners[:, real:], dtype)
 
     gradient = gradient + share[..., None] * d_com.to(dtype)[:, None] + s.load[..., None] * d_cop[:, None]
     gradient = gradient + d_height[..., None] * s.normal[:, None]
@@ -135,7 +137,7 @@ def _gradient(tables: Tables, o: Options, curve: str, s: Stage, weights: Tensor)
 def _corners(tables: Tables, points: Tensor) -> Tensor:
     """The triangles' corners, virtual ones included: (B, 3, T, 3)."""
     every = torch.cat([points, product(tables.centres, points, points.dtype)], dim=1)
-    return every.index_select(1, tables.corners).reshape(len(every), 3, -1, 3)
+    return every.index_select(1, tables.corners).reshape(len(every), 3, len(tables.triangle_parts), 3)
 
 
 def _weight(tables: Tables, volume: Tensor) -> Tensor:

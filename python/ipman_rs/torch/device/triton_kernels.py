@@ -324,7 +324,7 @@ def vertices(
     by_mass, by_height = tl.zeros([BLOCK], dtype), tl.zeros([BLOCK], dtype)
     slot = tl.load(on_starts + vertex, mask=inside, other=0)
     end = tl.load(on_starts + vertex + 1, mask=inside, other=0)
-    for _ in range(0, tl.max(end - slot)):
+    for _ in range(tl.max(end - slot)):
         real = slot < end
         sample = tl.load(on + slot, mask=real, other=0)
         weight = tl.load(on_weight + slot, mask=real, other=0)
@@ -338,7 +338,7 @@ def vertices(
 
     slot = tl.load(around_starts + vertex, mask=inside, other=0)
     end = tl.load(around_starts + vertex + 1, mask=inside, other=0)
-    for _ in range(0, tl.max(end - slot)):
+    for _ in range(tl.max(end - slot)):
         real = slot < end
         triangle = tl.load(around + slot, mask=real, other=0)
         d_volume = tl.load(of_part + tl.load(triangle_part + triangle, mask=real, other=0)).to(dtype)
