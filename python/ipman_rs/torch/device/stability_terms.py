@@ -49,7 +49,7 @@ class Stage(NamedTuple):
 
 
 def values(tables: Tables, o: Options, curve: str, vertices: Tensor, normal: Tensor, height: Tensor) -> Tensor:
-    """(B, 3): stability, pull, push; NaN for a body that is not finite. vertices (B, V, 3), normal (B, 3), height (B,)."""
+    """(B, 3): stability, pull, push; NaN if a vertex is not finite. vertices (B, V, 3), normal (B, 3), height (B,)."""
     return _values(tables, o, curve, vertices, normal, height)[0]
 
 
