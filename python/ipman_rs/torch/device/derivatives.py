@@ -41,10 +41,11 @@ class Terms(Function):
 
     @staticmethod
     def backward(ctx: Any, d_out: Tensor) -> tuple[Tensor | None, ...]:
+        vertices, normal, height = ctx.saved_tensors
         if _needs_graph():
-            gradient = _reference_gradient(ctx.problem, *ctx.saved_tensors, d_out)
+            gradient = _reference_gradient(ctx.problem, vertices, normal, height, d_out)
         else:
-            gradient = _values_and_gradient(ctx.problem, *ctx.saved_tensors, d_out)[1]
+            gradient = _values_and_gradient(ctx.problem, vertices, normal, height, d_out)[1]
         return gradient, None, None, None, None, None
 
 

@@ -1,3 +1,4 @@
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportGeneralTypeIssues=false
 """The kernels of `triton_terms`, where they are put together. Arrays are (B, …) and contiguous; axis 0 of the grid is
 the body. Upper-case arguments are compile-time constants. `Layout` explains the index arrays.
 """

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -166,8 +167,7 @@ def _launch(
     curve: str,
     options: list[float],
 ) -> tuple[Tensor, Tensor]:
-    from . import triton_kernels as k
-
+    k: Any = import_module(f"{__package__}.triton_kernels")
     template = by_key(template_key)
     layout: Layout = _layout(template, vertices.device, vertices.dtype)
     vertices = vertices.contiguous()
