@@ -226,21 +226,33 @@ impl<'a, T: Scalar> Batch<'a, T> {
         for _ in 0..self.len() {
             rows.push(rest.each_mut().map(|chunks| chunks.next().expect("one row a body")));
         }
-        let mut rows: Vec<_> = rows.into_iter().enumerate().collect();
+        let rows = rows.into_iter().enumerate().collect();
         let threads = if self.len() * self.template.mesh.num_vertices < INLINE_VERTICES { 1 } else { num_threads() };
-        while !rows.is_empty() {
-            if (self.interrupted)() {
-                return Err(Error::Interrupted);
-            }
-            let wave: Vec<_> = rows.drain(..rows.len().min(WAVE * threads)).collect();
-            if threads == 1 || wave.len() == 1 {
-                wave.into_iter().for_each(|(body, rows)| f(body, rows));
-            } else {
-                pool().install(|| wave.into_par_iter().for_each(|(body, rows)| f(body, rows)));
-            }
-        }
-        Ok(())
+        in_waves(rows, threads, WAVE * threads, self.interrupted, |(body, rows)| f(body, rows))
     }
+}
+
+/// Runs `work` on every piece over the pool's threads. Between two waves of `wave` pieces the calling thread asks for an
+/// interruption.
+pub(crate) fn in_waves<P: Send>(
+    mut pieces: Vec<P>,
+    threads: usize,
+    wave: usize,
+    interrupted: &(dyn Fn() -> bool + Sync),
+    work: impl Fn(P) + Sync,
+) -> Result<()> {
+    while !pieces.is_empty() {
+        if interrupted() {
+            return Err(Error::Interrupted);
+        }
+        let wave: Vec<_> = pieces.drain(..pieces.len().min(wave)).collect();
+        if threads == 1 || wave.len() == 1 {
+            wave.into_iter().for_each(&work);
+        } else {
+            pool().install(|| wave.into_par_iter().for_each(&work));
+        }
+    }
+    Ok(())
 }
 
 /// Forward and backward of one body; the gradient by all points, then folded onto the mesh's vertices.

@@ -35,6 +35,11 @@ pub mod quantity;
 /// Many bodies over threads.
 pub mod batch;
 
+/// Linear blend skinning: from a body model's parameters to its vertices and joints.
+pub mod skinning;
+/// Many posed bodies over threads.
+pub mod posing;
+
 pub use batch::Batch;
 pub use error::{Error, Result};
 pub use ground::Ground;

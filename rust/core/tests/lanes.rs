@@ -72,6 +72,9 @@ impl Real for Pair {
     fn tanh(self) -> Self {
         self.map(Real::tanh)
     }
+    fn nearest(self) -> Self {
+        self.map(Real::nearest)
+    }
     fn widen(self) -> Self {
         self
     }

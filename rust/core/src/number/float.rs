@@ -43,6 +43,11 @@ macro_rules! float {
                 curves::tanh(self)
             }
             #[inline(always)]
+            fn nearest(self) -> Self {
+                let rounder = <$float as Format>::ROUNDER as $float;
+                (self + rounder) - rounder
+            }
+            #[inline(always)]
             fn widen(self) -> f64 {
                 self as f64
             }

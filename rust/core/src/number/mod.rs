@@ -42,6 +42,8 @@ pub trait Real:
     /// 2^self, relative error of a few ulp, within the type's normal range (no underflow to 0, no infinity).
     fn exp2(self) -> Self;
     fn tanh(self) -> Self;
+    /// The nearest integer, with slope zero; |self| below 2^22 (2^51 in double precision).
+    fn nearest(self) -> Self;
     fn widen(self) -> Self::Wide;
     fn narrow(wide: Self::Wide) -> Self;
     fn lane(self, lane: usize) -> Self::Scalar;
