@@ -254,6 +254,18 @@ fn wide(work: impl Work) {
         fn with_avx2(work: impl Work) {
             work.run();
         }
+        #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+        fn with_avx512(work: impl Work) {
+            work.run();
+        }
+        let has_avx512 = std::arch::is_x86_feature_detected!("avx512f")
+            && std::arch::is_x86_feature_detected!("avx512bw")
+            && std::arch::is_x86_feature_detected!("avx512dq")
+            && std::arch::is_x86_feature_detected!("avx512vl");
+        if has_avx512 && std::env::var_os("SKIN_AVX2").is_none() {
+            // SAFETY: the machine has what the function is compiled for.
+            return unsafe { with_avx512(work) };
+        }
         if std::arch::is_x86_feature_detected!("avx2") {
             // SAFETY: the machine has what the function is compiled for.
             return unsafe { with_avx2(work) };

@@ -65,12 +65,13 @@ impl<C: Scalar, const W: usize> Blend<C, W> {
     #[inline(always)]
     pub fn backward<R: Real>(&self, tile: usize, d_points: &Tile<R, W>, d_amounts: &mut [[R; W]]) {
         let directions = &self.directions[tile * self.count..][..d_amounts.len()];
-        let [d_x, d_y, d_z] = *d_points;
-        for ([x, y, z], d_amount) in directions.iter().zip(d_amounts) {
+        let d_points = *d_points;
+        for (direction, d_amount) in directions.iter().zip(d_amounts) {
             let mut sum = *d_amount;
-            for i in 0..W {
-                let slope = |direction: &[C; W], d: &[R; W]| R::of(direction[i].value()) * d[i];
-                sum[i] = sum[i] + (slope(x, &d_x) + slope(y, &d_y) + slope(z, &d_z));
+            for axis in 0..3 {
+                for i in 0..W {
+                    sum[i] = sum[i] + R::of(direction[axis][i].value()) * d_points[axis][i];
+                }
             }
             *d_amount = sum;
         }

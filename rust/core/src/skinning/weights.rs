@@ -42,23 +42,26 @@ impl<C: Scalar, const W: usize> Weights<C, W> {
     pub fn forward<R: Real>(&self, tile: usize, transforms: &[Transform<R>], rest: &Tile<R, W>) -> Tile<R, W> {
         let mut posed = [[R::zero(); W]; 3];
         for row in 0..3 {
-            let mut blended = [[R::zero(); W]; 4];
-            for (joint, weights) in self.of_tile(tile) {
-                let transform = &transforms[joint][row];
-                for column in 0..4 {
-                    for i in 0..W {
-                        blended[column][i] = blended[column][i] + R::of(weights[i].value()) * transform[column];
-                    }
-                }
-            }
+            let blended = |column: usize| self.blended(tile, transforms, row, column);
+            let [x, y, z, offset] = [blended(0), blended(1), blended(2), blended(3)];
             for i in 0..W {
-                posed[row][i] = blended[0][i] * rest[0][i]
-                    + blended[1][i] * rest[1][i]
-                    + blended[2][i] * rest[2][i]
-                    + blended[3][i];
+                posed[row][i] = x[i] * rest[0][i] + y[i] * rest[1][i] + z[i] * rest[2][i] + offset[i];
             }
         }
         posed
+    }
+
+    /// One number of each vertex's blended transform.
+    #[inline(always)]
+    fn blended<R: Real>(&self, tile: usize, transforms: &[Transform<R>], row: usize, column: usize) -> [R; W] {
+        let mut sum = [R::zero(); W];
+        for (joint, weights) in self.of_tile(tile) {
+            let number = transforms[joint][row][column];
+            for i in 0..W {
+                sum[i] = sum[i] + R::of(weights[i].value()) * number;
+            }
+        }
+        sum
     }
 
     /// The gradient by the resting vertices.
