@@ -47,6 +47,7 @@ class BodyModel(nn.Module):
     def __init__(self, body: numpy_body.BodyModel | str | os.PathLike[str], dtype: torch.dtype | None = None):
         super().__init__()
         self.body = body if isinstance(body, numpy_body.BodyModel) else numpy_body.load_body(body)
+        self.parents: tuple[int, ...] = tuple(self.body.parents.tolist())  # torch.compile reads no arrays
         dtype = dtype or torch.get_default_dtype()
         for name in BodyModel.__annotations__:
             array = getattr(self.body, name)

@@ -31,7 +31,7 @@ def posed(
     world: list[Tensor] = []
     turned: list[Tensor] = []
     joints: list[Tensor] = []
-    for j, parent in enumerate(model.body.parents.tolist()):
+    for j, parent in enumerate(model.parents):
         if parent < 0:
             world.append(local[..., j, :, :])
             joints.append(rest_joints[..., j, :])

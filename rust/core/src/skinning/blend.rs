@@ -46,11 +46,11 @@ impl<C: Scalar, const W: usize> Blend<C, W> {
         self.count
     }
 
-    /// points += Σ amounts · directions; amounts left out are zero.
+    /// total += Σ amounts · directions; amounts left out are zero.
     #[inline(always)]
-    pub fn forward<R: Real>(&self, tile: usize, amounts: &[R], points: &mut Tile<R, W>) {
+    pub fn forward<R: Real>(&self, tile: usize, amounts: &[R], total: &mut Tile<R, W>) {
         let directions = &self.directions[tile * self.count..][..amounts.len()];
-        let mut sum = *points;
+        let mut sum = *total;
         for (direction, &amount) in directions.iter().zip(amounts) {
             for axis in 0..3 {
                 for i in 0..W {
@@ -58,7 +58,7 @@ impl<C: Scalar, const W: usize> Blend<C, W> {
                 }
             }
         }
-        *points = sum;
+        *total = sum;
     }
 
     /// The gradient by the amounts, as W sums each.

@@ -74,7 +74,7 @@ pub struct Body<R: Real> {
     transforms: Vec<Transform<R>>,
     features: Vec<R>,
     /// The translation; NaN if any parameter is not finite, so that the whole body becomes NaN.
-    shift: Vec3<R>,
+    pub shift: Vec3<R>,
 }
 
 /// The resting body before the pose shapes: the template, or with `shaped` a shape that all bodies share.
@@ -93,12 +93,12 @@ pub struct Wanted {
 }
 
 /// The gradient of one body, gathered tile by tile; W sums each.
-pub struct Sums<R, const W: usize> {
+pub struct Sums<R: Real, const W: usize> {
     transforms: Vec<Transform<[R; W]>>,
     betas: Vec<[R; W]>,
     expression: Vec<[R; W]>,
     features: Vec<[R; W]>,
-    transl: Tile<R, W>,
+    transl: Tile<R::Wide, W>,
 }
 
 /// The gradient of one body by its parameters.
@@ -153,12 +153,8 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
 
     /// The resting tiles of one shape, for bodies that all have it.
     pub fn shaped(&self, betas: &[C], expression: &[C]) -> Vec<Tile<C, W>> {
-        let mut tiles = self.template.clone();
-        for (tile, points) in tiles.iter_mut().enumerate() {
-            self.betas.surface.forward(tile, betas, points);
-            self.expression.surface.forward(tile, expression, points);
-        }
-        tiles
+        let shaped = |(tile, &points)| plus(points, self.shape(tile, betas, expression));
+        self.template.iter().enumerate().map(shaped).collect()
     }
 
     /// Puts the joints of one body in their places.
@@ -201,18 +197,27 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
     /// The resting vertices of one tile.
     #[inline(always)]
     fn rest<R: Real>(&self, start: Start<C, W>, tile: usize, body: &Body<R>) -> Tile<R, W> {
-        let mut points = [[R::zero(); W]; 3];
-        for axis in 0..3 {
-            for i in 0..W {
-                points[axis][i] = R::of(start.tiles[tile][axis][i].value());
-            }
-        }
+        // Displacements are summed by themselves: beside the template's metres each addition would round.
+        let mut rest = constants(&start.tiles[tile]);
         if !start.shaped {
-            self.betas.surface.forward(tile, &body.parameters.betas, &mut points);
-            self.expression.surface.forward(tile, &body.parameters.expression, &mut points);
+            let Parameters { betas, expression, .. } = &body.parameters;
+            rest = plus(rest, self.shape(tile, betas, expression));
         }
-        self.pose.forward(tile, &body.features, &mut points);
-        points
+        if !body.features.is_empty() {
+            let mut displacement = [[R::zero(); W]; 3];
+            self.pose.forward(tile, &body.features, &mut displacement);
+            rest = plus(rest, displacement);
+        }
+        rest
+    }
+
+    /// The displacements of one tile by the shape.
+    #[inline(always)]
+    fn shape<R: Real>(&self, tile: usize, betas: &[R], expression: &[R]) -> Tile<R, W> {
+        let mut displacement = [[R::zero(); W]; 3];
+        self.betas.surface.forward(tile, betas, &mut displacement);
+        self.expression.surface.forward(tile, expression, &mut displacement);
+        displacement
     }
 
     /// The posed vertices of one tile.
@@ -236,7 +241,7 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
             betas: vec![none; wanted.betas],
             expression: vec![none; wanted.expression],
             features: vec![none; if wanted.pose { self.pose.count() } else { 0 }],
-            transl: [none; 3],
+            transl: [[R::Wide::zero(); W]; 3],
         }
     }
 
@@ -254,7 +259,7 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
         self.weights.backward(tile, &rest, d, &mut sums.transforms);
         for axis in 0..3 {
             for i in 0..W {
-                sums.transl[axis][i] = sums.transl[axis][i] + d[axis][i];
+                d[axis][i].add_to(&mut sums.transl[axis][i]);
             }
         }
         if sums.betas.len() + sums.expression.len() + sums.features.len() > 0 {
@@ -268,7 +273,7 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
     /// From the sums over all tiles, and the gradient `d_joints` (J, 3) by the posed joints, to the parameters.
     #[inline(always)]
     pub fn gradient<R: Real>(&self, body: &Body<R>, sums: &Sums<R, W>, d_joints: &[R]) -> Gradient<R> {
-        let mut transl = sums.transl.map(total);
+        let mut transl = sums.transl.map(total::<R::Wide, W>);
         let mut d_turned = Vec::with_capacity(self.num_joints());
         let mut d_offsets = Vec::with_capacity(self.num_joints());
         for transform in &sums.transforms {
@@ -364,6 +369,27 @@ fn features<R: Real>(local: &[Mat3<R::Wide>]) -> Vec<R> {
         }
     }
     features
+}
+
+#[inline(always)]
+fn constants<R: Real, C: Scalar, const W: usize>(tile: &Tile<C, W>) -> Tile<R, W> {
+    let mut numbers = [[R::zero(); W]; 3];
+    for axis in 0..3 {
+        for i in 0..W {
+            numbers[axis][i] = R::of(tile[axis][i].value());
+        }
+    }
+    numbers
+}
+
+#[inline(always)]
+fn plus<R: Real, const W: usize>(mut a: Tile<R, W>, b: Tile<R, W>) -> Tile<R, W> {
+    for axis in 0..3 {
+        for i in 0..W {
+            a[axis][i] = a[axis][i] + b[axis][i];
+        }
+    }
+    a
 }
 
 #[inline(always)]
