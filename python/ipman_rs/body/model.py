@@ -140,10 +140,13 @@ class BodyModel:
         shapes = {name: array.shape[: -tails[name]] for name, array in arrays.items() if array is not None}
         batch = _common_batch(**shapes)
         count = math.prod(batch)
-        parameters = [array if array is None else _rows(array, batch, tails[name]) for name, array in arrays.items()]
+        given_pose, given_betas, given_expression, given_transl = (
+            None if array is None else _rows(array, batch, tails[name]) for name, array in arrays.items()
+        )
+        parameters = given_pose, given_betas, given_expression, given_transl
         vertices = np.empty((count, self.num_vertices, 3), dtype)
         joints = np.empty((count, self.num_joints, 3), dtype)
-        self._skin(dtype).forward(count, tuple(parameters), vertices, joints)
+        self._skin(dtype).forward(count, parameters, vertices, joints)
         return BodyOutput(vertices.reshape(*batch, *vertices.shape[1:]), joints.reshape(*batch, *joints.shape[1:]))
 
     __call__ = forward
@@ -171,20 +174,23 @@ class BodyModel:
         return self._compiled(single=False)
 
     def _compiled(self, single: bool) -> _core.Skin:
-        arrays = [
-            self.v_template,
-            self.shapedirs,
-            self.expressiondirs,
-            np.zeros(0) if self.posedirs is None else self.posedirs,
-            self.J_template,
-            self.J_shapedirs,
-            self.J_expressiondirs,
-            self.rest_rotation,
-            self.pose_mean,
-            self.weights,
-        ]
-        arrays = [np.require(array, np.float64, ["C", "A"]) for array in arrays]
-        return _core.Skin(*arrays, np.require(self.parents, np.int64, ["C", "A"]), single)
+        def plain(array: NDArray[np.floating]) -> NDArray[np.float64]:
+            return np.require(array, np.float64, ["C", "A"])
+
+        return _core.Skin(
+            plain(self.v_template),
+            plain(self.shapedirs),
+            plain(self.expressiondirs),
+            np.zeros(0) if self.posedirs is None else plain(self.posedirs),
+            plain(self.J_template),
+            plain(self.J_shapedirs),
+            plain(self.J_expressiondirs),
+            plain(self.rest_rotation),
+            plain(self.pose_mean),
+            plain(self.weights),
+            np.require(self.parents, np.int64, ["C", "A"]),
+            single,
+        )
 
 
 def by_key(key: int) -> BodyModel:

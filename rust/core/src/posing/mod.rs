@@ -1,12 +1,15 @@
 //! Many posed bodies of one model, over threads. A few bodies at a time share each pass over the model's tables; the
 //! bits of a body depend neither on the number of threads nor on its neighbours.
 
+mod passes;
+
 use crate::batch::{in_waves, num_threads};
 use crate::error::{Error, Result};
 use crate::number::{Dual, Real, Scalar};
 use crate::skinning::blend::Tile;
 use crate::skinning::rotation::Form;
-use crate::skinning::{Body, Gradient, Parameters, Skin, Start, Sums, Wanted};
+use crate::skinning::{Body, Gradient, Parameters, Skin, Start, Wanted};
+use passes::{Backward, Forward, wide};
 use std::mem::take;
 use std::ops::Range;
 
@@ -240,121 +243,6 @@ impl<'a, T: Scalar> Posing<'a, T> {
     fn run<P: Send>(&self, groups: Vec<P>, work: impl Fn(P) + Sync) -> Result<()> {
         in_waves(groups, num_threads(), num_threads(), self.interrupted, work)
     }
-}
-
-/// Work that runs with the widest registers of the machine. No fused operations are used, so that every width gives the
-/// same bits.
-trait Work {
-    /// Whether the 512-bit registers pay.
-    const IN_AVX512: bool;
-    fn run(self);
-}
-
-fn wide<W: Work>(work: W) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2")]
-        fn with_avx2(work: impl Work) {
-            work.run();
-        }
-        #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-        fn with_avx512(work: impl Work) {
-            work.run();
-        }
-        let has_avx512 = || {
-            std::arch::is_x86_feature_detected!("avx512f")
-                && std::arch::is_x86_feature_detected!("avx512bw")
-                && std::arch::is_x86_feature_detected!("avx512dq")
-                && std::arch::is_x86_feature_detected!("avx512vl")
-        };
-        if W::IN_AVX512 && has_avx512() {
-            // SAFETY: the machine has what the function is compiled for.
-            return unsafe { with_avx512(work) };
-        }
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the machine has what the function is compiled for.
-            return unsafe { with_avx2(work) };
-        }
-    }
-    work.run();
-}
-
-struct Forward<'a, T, R: Real, F> {
-    skin: &'a Skin<T, TILE>,
-    start: Start<'a, T, TILE>,
-    bodies: &'a [Body<R>],
-    vertices: &'a mut [T],
-    number: F,
-}
-
-impl<T: Scalar, R: Scalar, F: Fn(R) -> T> Work for Forward<'_, T, R, F> {
-    const IN_AVX512: bool = true;
-
-    #[inline(always)]
-    fn run(self) {
-        let row = 3 * self.skin.num_vertices;
-        for tile in 0..self.skin.num_tiles() {
-            for (body, vertices) in self.bodies.iter().zip(self.vertices.chunks_exact_mut(row)) {
-                let posed = self.skin.forward(self.start, tile, body);
-                let out = &mut vertices[3 * TILE * tile..];
-                // A constant length lets the compiler unroll.
-                match out.first_chunk_mut::<{ 3 * TILE }>() {
-                    Some(out) => interleave(&posed, out, &self.number),
-                    None => interleave(&posed, out, &self.number),
-                }
-            }
-        }
-    }
-}
-
-struct Backward<'a, T, R: Real, F> {
-    skin: &'a Skin<T, TILE>,
-    start: Start<'a, T, TILE>,
-    bodies: &'a [Body<R>],
-    d_vertices: &'a [T],
-    constant: F,
-    sums: &'a mut [Sums<R, TILE>],
-}
-
-impl<T: Scalar, R: Scalar, F: Fn(T) -> R> Work for Backward<'_, T, R, F> {
-    /// The compiler would vectorise over the blend shapes, with scatters: three times slower than AVX2.
-    const IN_AVX512: bool = false;
-
-    #[inline(always)]
-    fn run(self) {
-        let row = 3 * self.skin.num_vertices;
-        for tile in 0..self.skin.num_tiles() {
-            let bodies = self.bodies.iter().zip(self.sums.iter_mut());
-            for ((body, sums), d) in bodies.zip(self.d_vertices.chunks_exact(row)) {
-                let d = &d[3 * TILE * tile..];
-                let d = match d.first_chunk::<{ 3 * TILE }>() {
-                    Some(d) => separate(d, &self.constant),
-                    None => separate(d, &self.constant),
-                };
-                self.skin.backward(self.start, tile, body, &d, sums);
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn interleave<R: Real, T>(tile: &Tile<R, TILE>, out: &mut [T], number: impl Fn(R) -> T) {
-    for (i, out) in out.chunks_exact_mut(3).enumerate() {
-        for axis in 0..3 {
-            out[axis] = number(tile[axis][i]);
-        }
-    }
-}
-
-#[inline(always)]
-fn separate<R: Real, T: Copy>(points: &[T], number: impl Fn(T) -> R) -> Tile<R, TILE> {
-    let mut tile = [[R::zero(); TILE]; 3];
-    for (i, point) in points.chunks_exact(3).take(TILE).enumerate() {
-        for axis in 0..3 {
-            tile[axis][i] = number(point[axis]);
-        }
-    }
-    tile
 }
 
 /// Writes one body's gradient: zero for a body that is not finite, unless the upstream gradient is to blame.
