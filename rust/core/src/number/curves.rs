@@ -50,6 +50,12 @@ fn split<T: Format>(x: T) -> (T, T) {
     (rounded.low_bits_as_power(), series * f)
 }
 
+/// The nearest integer, halves to even.
+#[inline(always)]
+pub(super) fn nearest<T: Format>(x: T) -> T {
+    (x + T::of(T::ROUNDER)) - T::of(T::ROUNDER)
+}
+
 #[inline(always)]
 pub(super) fn exp2<T: Format>(x: T) -> T {
     let (power, fraction) = split(x.at_least(T::of(T::EXPONENTS.0)).at_most(T::of(T::EXPONENTS.1)));

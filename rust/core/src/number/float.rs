@@ -48,6 +48,10 @@ macro_rules! float {
                 curves::tanh(self)
             }
             #[inline(always)]
+            fn nearest(self) -> Self {
+                curves::nearest(self)
+            }
+            #[inline(always)]
             fn widen(self) -> f64 {
                 self as f64
             }

@@ -69,6 +69,8 @@ pub trait Real:
     /// 2^self, relative error of a few ulp, within the type's normal range (no underflow to 0, no infinity).
     fn exp2(self) -> Self;
     fn tanh(self) -> Self;
+    /// The nearest integer, with slope zero; |self| below 2^22 (2^51 in double precision).
+    fn nearest(self) -> Self;
     fn widen(self) -> Self::Wide;
     fn narrow(wide: Self::Wide) -> Self;
     /// Enters `F` in a function of its own that may use the CPU's instructions for this number. Gates inline all that they

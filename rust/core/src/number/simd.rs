@@ -192,6 +192,10 @@ macro_rules! arithmetic {
             curves::tanh(self)
         }
         #[inline(always)]
+        fn nearest(self) -> Self {
+            curves::nearest(self)
+        }
+        #[inline(always)]
         fn lane(self, lane: usize) -> Fused<$float> {
             Fused(self.array()[lane])
         }
