@@ -1,12 +1,15 @@
 //! What lane types share: rows of many bodies turned into rows of lanes, one number at a time.
 
-use super::{Data, Real, Scalar};
+use super::{Real, Scalar};
 
 /// See [`Real::read_rows`].
 #[inline(always)]
 pub(super) fn read_rows_one_by_one<R: Real>(rows: &[&[R::Data]], origin: &[[R::Data; 3]], out: &mut [R]) {
-    for (i, out) in out.iter_mut().enumerate() {
-        *out = R::from_lanes(|lane| R::Scalar::read(less(rows[lane][i], origin[lane][i % 3])));
+    let origin: [R; 3] = [0, 1, 2].map(|k| R::from_lanes(|lane| R::Scalar::read(origin[lane][k])));
+    for (i, out) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+        for k in 0..3 {
+            out[k] = R::from_lanes(|lane| R::Scalar::read(rows[lane][3 * i + k])) - origin[k];
+        }
     }
 }
 
@@ -18,9 +21,4 @@ pub(super) fn write_rows_one_by_one<R: Real>(numbers: &[R], rows: &mut [&mut [R:
             *out = number.lane(lane).data();
         }
     }
-}
-
-#[inline(always)]
-fn less<D: Data>(number: D, origin: D) -> D {
-    number - origin
 }

@@ -192,6 +192,10 @@ macro_rules! arithmetic {
             curves::tanh(self)
         }
         #[inline(always)]
+        fn tanh_of_positive(self) -> Self {
+            curves::tanh_of_positive(self)
+        }
+        #[inline(always)]
         fn nearest(self) -> Self {
             curves::nearest(self)
         }
@@ -326,7 +330,9 @@ fn write_squares<S: Square, const N: usize>(numbers: &[S], rows: &mut [&mut [f32
     let whole = numbers.len() / N * N;
     for start in (0..whole).step_by(N) {
         let mut block = [S::zero(); N];
-        block.copy_from_slice(&numbers[start..start + N]);
+        for (i, number) in block.iter_mut().enumerate() {
+            *number = numbers[start + i];
+        }
         S::turn(&mut block);
         for (number, row) in block.iter().zip(rows.iter_mut()) {
             // start + N ≤ numbers.len() = row.len()
