@@ -205,3 +205,21 @@ def get_num_threads() -> int:
 
 def set_num_threads(threads: int) -> None:
     """Sets the number of threads that batches use, 1 to 1024."""
+
+def weighted(
+    template: Template,
+    quantity: str,
+    options: Sequence[float],
+    vertices: NDArray[_Float],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+    weights: Sequence[float],
+    valid: NDArray[np.bool_] | None,
+    reduction: str,
+) -> tuple[NDArray[_Float], NDArray[_Float], NDArray[_Float], NDArray[_Float]]:
+    """(totals, terms, shares, gradient): Σ weight · term, one number or (B,) where the reduction is "none"; the
+    unweighted terms (K,) or (B, K); what each body counts for (B,); the gradient of the totals' sum (B, V, 3).
+    """
+
+def simd_level() -> str:
+    """The CPU level that batches run on: avx512, avx2, neon or scalar. IPMAN_SIMD forces one."""

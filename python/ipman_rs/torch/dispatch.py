@@ -46,6 +46,11 @@ def _device_path() -> AbstractContextManager[None]:
     return _forced_to("device")
 
 
+def forced() -> bool:
+    """Whether CPU tensors are sent along another path now."""
+    return _forced is not None
+
+
 class Bodies(NamedTuple):
     """Arguments in the shape of the ops: vertices (B, V, 3) in the computing dtype, normal (B, 3), height (B,)."""
 
@@ -58,8 +63,10 @@ class Bodies(NamedTuple):
 _ANY_GROUND = Ground((0.0, 1.0, 0.0), 0.0)
 
 
-def bodies(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround | None) -> Bodies:
-    """Check the arguments and fold the batch dimensions into one.
+def check(
+    vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround | None
+) -> tuple[torch.Size, Ground]:
+    """The batch shape and the ground of arguments that fit together.
 
     Raises:
         TypeError: vertices is no floating-point tensor.
@@ -68,26 +75,37 @@ def bodies(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGroun
     if not isinstance(vertices, Tensor) or not vertices.is_floating_point():
         got = vertices.dtype if isinstance(vertices, Tensor) else type(vertices).__name__
         raise TypeError(f"vertices: expected a floating-point tensor, got {got}; numpy arrays go to ipman_rs itself")
-    if vertices.ndim < 2 or vertices.shape[-2:] != (template.num_vertices, 3):
+    shape = vertices.shape
+    if len(shape) < 2 or shape[-1] != 3 or shape[-2] != template.num_vertices:
         raise ValueError(
-            f"vertices: expected shape (..., {template.num_vertices}, 3) for this template, got {tuple(vertices.shape)}"
+            f"vertices: expected shape (..., {template.num_vertices}, 3) for this template, got {tuple(shape)}"
         )
-    batch_shape = vertices.shape[:-2]
     plane = _ANY_GROUND if ground is None else as_ground(ground)
     if plane.normal.requires_grad or plane.height.requires_grad:
         raise ValueError("ground: a ground that requires grad is not differentiable here; detach its tensors")
+    if not (_broadcasts(plane.normal.shape[:-1], shape[:-2]) and _broadcasts(plane.height.shape, shape[:-2])):
+        raise ValueError(
+            f"ground: normal {tuple(plane.normal.shape)} and height {tuple(plane.height.shape)} do not broadcast to "
+            f"the batch {tuple(shape[:-2])}; give one plane, or one a body"
+        )
+    return shape[:-2], plane
+
+
+def _broadcasts(shape: torch.Size, batch_shape: torch.Size) -> bool:
+    """Whether it broadcasts to the batch without making it larger."""
+    sizes = zip(reversed(shape), reversed(batch_shape), strict=False)
+    return len(shape) <= len(batch_shape) and all(size in (1, wanted) for size, wanted in sizes)
+
+
+def bodies(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround | None) -> Bodies:
+    """Check the arguments and fold the batch dimensions into one; raises as `check`."""
+    batch_shape, plane = check(vertices, template, ground)
     floating = torch.promote_types(vertices.dtype, torch.float32)
     if vertices.dtype != floating:
         vertices = vertices.to(floating)
     if vertices.ndim != 3:
         vertices = vertices.reshape(math.prod(batch_shape), *vertices.shape[-2:])
-    try:
-        normal, height = plane.normal.expand(*batch_shape, 3), plane.height.expand(batch_shape)
-    except RuntimeError:
-        raise ValueError(
-            f"ground: normal {tuple(plane.normal.shape)} and height {tuple(plane.height.shape)} do not broadcast to "
-            f"the batch {tuple(batch_shape)}; give one plane, or one a body"
-        ) from None
+    normal, height = plane.normal.expand(*batch_shape, 3), plane.height.expand(batch_shape)
     if len(batch_shape) != 1:
         normal, height = normal.reshape(len(vertices), 3), height.reshape(len(vertices))
     return Bodies(vertices, normal, height, batch_shape)

@@ -14,7 +14,8 @@ from ipman_rs.checks import choice
 from ipman_rs.losses import Curve, Points, Wrap
 from ipman_rs.mass import Method
 
-from .dispatch import Bodies, bodies, values_of, weighted_values_of
+from . import one_pass
+from .dispatch import Bodies, bodies, check, forced, values_of, weighted_values_of
 from .ground import Ground
 
 Reduction = Literal["mean", "sum", "none"]
@@ -79,7 +80,9 @@ class IntuitivePhysicsLoss(nn.Module):
         """Unweighted terms: vertices (..., V, 3), valid bool (...) -> {name: scalar}, or {name: (...)} unreduced."""
         batch = bodies(vertices, self.template, ground)
         values = values_of(batch, self.template, self._quantity, self._options)
-        counted = _finite(values.detach()) if valid is None else _finite(values.detach()) & _mask(batch, valid)
+        counted = _finite(values.detach())
+        if valid is not None:
+            counted = counted & _mask(batch.batch_shape, valid, vertices)
         return self._named(values, counted, _number(counted, values), batch)
 
     def weighted(
@@ -90,8 +93,10 @@ class IntuitivePhysicsLoss(nn.Module):
         Values and gradient come from one pass, so the backward only scales; it may be run once more with create_graph
         for second derivatives.
         """
+        if one_pass.serves(vertices) and not forced():
+            return self._in_one_pass(vertices, ground, valid)
         batch = bodies(vertices, self.template, ground)
-        mask = None if valid is None else _mask(batch, valid)
+        mask = None if valid is None else _mask(batch.batch_shape, valid, vertices)
         shares = self._shares(batch, mask)
         totals, values = weighted_values_of(batch, self.template, self._quantity, self._options, shares)
 
@@ -108,6 +113,20 @@ class IntuitivePhysicsLoss(nn.Module):
             dealt = len(values) if mask is None else mask.sum(dtype=values.dtype)
             total = totals.sum() * (dealt / number)
         return total, self._named(values, counted, number, batch)
+
+    def _in_one_pass(
+        self, vertices: Tensor, ground: Ground | NumpyGround, valid: Tensor | None
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        shape, plane = check(vertices, self.template, ground)
+        mask = None if valid is None else _mask(shape, valid, vertices)
+        if len(shape) != 1:
+            plane = Ground.of_unit(plane.normal.expand(*shape, 3), plane.height.expand(shape))
+            vertices = vertices.reshape(-1, *vertices.shape[-2:])
+        call = one_pass.Call(self.template, self._quantity, self._options, tuple(self.weights.values()), self.reduction)
+        total, terms = one_pass.OnePass.apply(vertices, plane, mask, call)
+        if self.reduction == "none":
+            total, terms = total.reshape(shape), terms.reshape(*shape, len(self.terms))
+        return total, dict(zip(self.terms, terms.unbind(dim=-1), strict=True))
 
     def _shares(self, batch: Bodies, mask: Tensor | None) -> Tensor:
         """What each term of each body weighs in the total: (B, K)."""
@@ -151,11 +170,11 @@ def _number(counted: Tensor, values: Tensor) -> Tensor:
     return counted.sum(dtype=values.dtype).clamp(min=1)
 
 
-def _mask(batch: Bodies, valid: Tensor) -> Tensor:
-    """valid (...) as bool (B,)."""
-    if valid.dtype != torch.bool or valid.shape != batch.batch_shape:
+def _mask(batch_shape: torch.Size, valid: Tensor, vertices: Tensor) -> Tensor:
+    """valid (...) as bool (B,) beside the vertices."""
+    if valid.dtype != torch.bool or valid.shape != batch_shape:
         raise ValueError(
-            f"valid: expected a bool tensor of shape {tuple(batch.batch_shape)}, one a body, "
+            f"valid: expected a bool tensor of shape {tuple(batch_shape)}, one a body, "
             f"got {valid.dtype} of shape {tuple(valid.shape)}"
         )
-    return valid.reshape(-1).to(batch.vertices.device)
+    return valid.reshape(-1).to(vertices.device)

@@ -15,6 +15,7 @@ use crate::support::{BaseOfSupport, Contact};
 use crate::template::Template;
 use crate::threads;
 use crate::volume::SignedVolumes;
+use std::mem::MaybeUninit;
 
 /// `num_bodies` poses of one template, each over its ground.
 pub struct Batch<'a, T> {
@@ -65,6 +66,10 @@ impl<'a, T: Data> Batch<'a, T> {
     pub fn at_level(self, level: Level) -> Self {
         assert!(Level::available().contains(&level), "this machine has no {}", level.name());
         Batch { level, ..self }
+    }
+
+    pub fn template(&self) -> &'a Template {
+        self.template
     }
 
     pub fn len(&self) -> usize {
@@ -352,9 +357,14 @@ impl<T: Data, W: OnLanes<T>> Work<T> for ReadBodies<'_, T, W> {
             grounds.push(batch.grounds[group.bodies[lane]]);
             origins.push(origin);
         }
-        let mut points = Vec::with_capacity(template.closing.num_points());
-        points.resize(template.mesh.num_vertices, [R::zero(); 3]);
-        R::read_rows(&rows, &local, points.as_flattened_mut());
+        let mut points: Vec<Vec3<R>> = Vec::with_capacity(template.closing.num_points());
+        let count = template.mesh.num_vertices;
+        // SAFETY: as many points as are written, each three numbers in a row, and `read_rows` writes all that it is given.
+        unsafe {
+            let numbers = points.as_mut_ptr().cast::<MaybeUninit<R>>();
+            R::read_rows(&rows, &local, std::slice::from_raw_parts_mut(numbers, 3 * count));
+            points.set_len(count);
+        }
         template.closing.forward(&mut points);
         work.run(&Scene::new(template, &points, &grounds, &origins));
     }

@@ -36,6 +36,8 @@ pub mod scene;
 pub mod quantity;
 /// Many bodies over lanes and threads.
 pub mod batch;
+/// The weighted total of a training step, reduced over a batch, with its gradient.
+pub mod weighted;
 /// How many threads, and the pool.
 pub mod threads;
 

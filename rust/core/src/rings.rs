@@ -28,7 +28,8 @@ pub struct Block {
     start: usize,
 }
 
-const BLOCK: usize = 16;
+/// Rings of a block at most.
+pub const BLOCK: usize = 16;
 
 impl Rings {
     pub fn new(faces: &[[u32; 3]]) -> Self {
@@ -61,9 +62,9 @@ impl Rings {
         &self.blocks
     }
 
-    /// Twice the area vector of each ring of a block.
+    /// Twice the area vector of each ring of a block; behind the block's end nothing is written.
     #[inline(always)]
-    pub fn area_vectors<R: Real>(&self, block: &Block, points: &[Vec3<R>], doubled: &mut [Vec3<R>]) {
+    pub fn area_vectors<R: Real>(&self, block: &Block, points: &[Vec3<R>], doubled: &mut [Vec3<R>; BLOCK]) {
         match block.size {
             3 => self.of_size::<R, 3>(block, points, doubled),
             4 => self.of_size::<R, 4>(block, points, doubled),
@@ -72,7 +73,7 @@ impl Rings {
             7 => self.of_size::<R, 7>(block, points, doubled),
             8 => self.of_size::<R, 8>(block, points, doubled),
             size => {
-                let rings = self.neighbours[block.start..].chunks_exact(size);
+                let rings = self.neighbours[block.start..].chunks_exact(size).take(block.rings.len());
                 for (doubled, ring) in doubled.iter_mut().zip(rings) {
                     *doubled = area_vector(ring, points);
                 }
@@ -82,9 +83,9 @@ impl Rings {
 
     /// The same with a size that the compiler knows.
     #[inline(always)]
-    fn of_size<R: Real, const N: usize>(&self, block: &Block, points: &[Vec3<R>], doubled: &mut [Vec3<R>]) {
+    fn of_size<R: Real, const N: usize>(&self, block: &Block, points: &[Vec3<R>], doubled: &mut [Vec3<R>; BLOCK]) {
         let rings = self.neighbours[block.start..].as_chunks::<N>().0;
-        for (doubled, ring) in doubled.iter_mut().zip(rings) {
+        for (doubled, ring) in doubled.iter_mut().zip(&rings[..block.rings.len()]) {
             *doubled = area_vector(ring, points);
         }
     }

@@ -9,7 +9,7 @@ use crate::closing::Closing;
 use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, widen};
 use crate::number::{Real, Room};
 use crate::quantity::Quantity;
-use crate::rings::Rings;
+use crate::rings::{BLOCK, Rings};
 use crate::scene::Scene;
 use crate::template::Template;
 
@@ -41,20 +41,18 @@ impl<R: Real> Room<(&Closing, &[Vec3<R>])> for Forward {
     #[inline(always)]
     fn enter((closing, points): (&Closing, &[Vec3<R>])) -> SignedVolumes<R> {
         let mut of_parts = Vec::with_capacity(closing.rings.len());
-        let mut all_doubled = vec![[R::zero(); 3]; closing.rings.iter().map(Rings::len).sum()];
-        let mut rest = all_doubled.as_mut_slice();
+        let mut all_doubled = Vec::with_capacity(closing.rings.iter().map(Rings::len).sum());
+        let mut doubled = [[R::zero(); 3]; BLOCK];
         for rings in &closing.rings {
-            let (doubled, others) = rest.split_at_mut(rings.len());
-            rest = others;
             let mut sum = R::Wide::zero();
             for block in rings.blocks() {
-                let doubled = &mut doubled[block.rings.clone()];
-                rings.area_vectors(block, points, doubled);
+                rings.area_vectors(block, points, &mut doubled);
                 let mut partial = R::zero();
-                for (&point, &doubled) in rings.points[block.rings.clone()].iter().zip(doubled.iter()) {
+                for (&point, &doubled) in rings.points[block.rings.clone()].iter().zip(&doubled) {
                     partial = partial + dot(points[point as usize], doubled);
                 }
                 partial.add_to(&mut sum);
+                all_doubled.extend_from_slice(&doubled[..block.rings.len()]);
             }
             of_parts.push(sum * R::Wide::of(1.0 / 18.0));
         }

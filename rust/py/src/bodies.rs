@@ -8,7 +8,7 @@ use numpy::{Element, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUnt
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Where the bodies stand: the ground's normals (B, 3) and heights (B,).
+/// Where the bodies stand: the ground's normals (B, 3) and heights (B,), or one of each.
 pub struct Grounds<'py> {
     normal: PyReadonlyArray2<'py, f64>,
     height: PyReadonlyArray1<'py, f64>,
@@ -29,13 +29,16 @@ pub fn on_batch<T: Data + Element, O: Send>(
     grounds: &Grounds<'_>,
     work: impl FnOnce(&Batch<'_, T>) -> ipman::Result<O> + Send,
 ) -> PyResult<O> {
-    let (normals, heights) = (grounds.normal.as_slice()?, grounds.height.as_slice()?);
-    let (num_bodies, num_vertices) = (heights.len(), template.inner.mesh.num_vertices);
     let shape = vertices.shape();
+    let (normals, heights) = (grounds.normal.as_slice()?, grounds.height.as_slice()?);
+    // One ground may stand for all bodies.
+    let copies = if heights.len() == 1 && normals.len() == 3 { shape[0] } else { 1 };
+    let (normals, heights) = (normals.repeat(copies), heights.repeat(copies));
+    let (num_bodies, num_vertices) = (heights.len(), template.inner.mesh.num_vertices);
     if shape != [num_bodies, num_vertices, 3] {
         let message = format!("vertices: expected ({num_bodies}, {num_vertices}, 3), got {shape:?}");
         return Err(PyValueError::new_err(message));
     }
     let (vertices, template) = (vertices.as_slice()?, &template.inner);
-    detached(py, |interrupted| work(&Batch::new(template, vertices, normals, heights, interrupted)?))
+    detached(py, |interrupted| work(&Batch::new(template, vertices, &normals, &heights, interrupted)?))
 }

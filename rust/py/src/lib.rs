@@ -7,6 +7,7 @@ mod evaluate;
 mod skinning;
 mod support;
 mod template;
+mod weighted;
 
 use pyo3::prelude::*;
 
@@ -22,7 +23,9 @@ mod _core {
     #[pymodule_export]
     use crate::template::Template;
     #[pymodule_export]
-    use crate::threads::{get_num_threads, set_num_threads};
+    use crate::threads::{get_num_threads, set_num_threads, simd_level};
+    #[pymodule_export]
+    use crate::weighted::weighted;
 
     use pyo3::prelude::*;
 
@@ -33,8 +36,16 @@ mod _core {
 }
 
 mod threads {
+    use crate::error::value_error;
+    use ipman::number::gate::Level;
     use pyo3::exceptions::PyValueError;
     use pyo3::prelude::*;
+
+    /// The CPU level that batches run on: avx512, avx2, neon or scalar. IPMAN_SIMD forces one.
+    #[pyfunction]
+    pub fn simd_level() -> PyResult<&'static str> {
+        Ok(Level::current().map_err(value_error)?.name())
+    }
 
     /// The number of threads that batches use.
     #[pyfunction]

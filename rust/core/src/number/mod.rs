@@ -22,6 +22,7 @@ pub mod vector;
 pub use dual::Dual;
 pub use fused::Fused;
 
+use std::mem::MaybeUninit;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A function that is compiled once for each number, see [`Real::apart`].
@@ -114,8 +115,9 @@ pub trait Real:
         (self * Self::of(std::f64::consts::LOG2_E)).exp2()
     }
 
-    /// Rows of numbers, one row a lane and all as long as `out`, as one row of lanes, each less its lane's `origin[k % 3]`.
-    fn read_rows(rows: &[&[Self::Data]], origin: &[[Self::Data; 3]], out: &mut [Self]) {
+    /// Rows of coordinates, one row a lane and all as long as `out`, as one row of lanes, each coordinate k less its lane's
+    /// `origin[k % 3]`. Writes all of `out`.
+    fn read_rows(rows: &[&[Self::Data]], origin: &[[Self::Data; 3]], out: &mut [MaybeUninit<Self>]) {
         lanes::read_rows_one_by_one(rows, origin, out);
     }
 

@@ -7,6 +7,7 @@
 use super::curves::{self, Format};
 use super::{Fused, Real, Room, Scalar};
 use core::arch::x86_64::*;
+use std::mem::MaybeUninit;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// One intrinsic for each operation of a register, by the operation's name.
@@ -267,7 +268,7 @@ macro_rules! single {
                 unsafe { $border::add_to(self, sum) }
             }
             #[inline(always)]
-            fn read_rows(rows: &[&[f32]], origin: &[[f32; 3]], out: &mut [Self]) {
+            fn read_rows(rows: &[&[f32]], origin: &[[f32; 3]], out: &mut [MaybeUninit<Self>]) {
                 unsafe { $border::read_rows(rows, origin, out) }
             }
             #[inline(always)]
@@ -304,7 +305,7 @@ trait Square: Real<Data = f32> {
 }
 
 #[inline(always)]
-fn read_squares<S: Square, const N: usize>(rows: &[&[f32]], origin: &[[f32; 3]], out: &mut [S]) {
+fn read_squares<S: Square, const N: usize>(rows: &[&[f32]], origin: &[[f32; 3]], out: &mut [MaybeUninit<S>]) {
     assert!(rows.len() == N && rows.iter().all(|row| row.len() == out.len()));
     let origins: [S; 3] = std::array::from_fn(|k| S::from_lanes(|lane| S::Scalar::read(origin[lane][k])));
     let whole = out.len() / N * N;
@@ -316,11 +317,11 @@ fn read_squares<S: Square, const N: usize>(rows: &[&[f32]], origin: &[[f32; 3]],
         }
         S::turn(&mut block);
         for (i, &number) in block.iter().enumerate() {
-            out[start + i] = number - origins[(start + i) % 3];
+            out[start + i].write(number - origins[(start + i) % 3]);
         }
     }
     for i in whole..out.len() {
-        out[i] = S::from_lanes(|lane| S::Scalar::read(rows[lane][i])) - origins[i % 3];
+        out[i].write(S::from_lanes(|lane| S::Scalar::read(rows[lane][i])) - origins[i % 3]);
     }
 }
 
@@ -369,7 +370,7 @@ macro_rules! border {
             }
             #[inline(never)]
             #[target_feature(enable = $features)]
-            pub fn read_rows(rows: &[&[f32]], origin: &[[f32; 3]], out: &mut [$single]) {
+            pub fn read_rows(rows: &[&[f32]], origin: &[[f32; 3]], out: &mut [MaybeUninit<$single>]) {
                 read_squares::<$single, $lanes>(rows, origin, out);
             }
             #[inline(never)]
