@@ -203,8 +203,13 @@ def status(
 def get_num_threads() -> int:
     """The number of threads that batches use."""
 
-def set_num_threads(threads: int) -> None:
-    """Sets the number of threads that batches use, 1 to 1024."""
+def set_num_threads(threads: int | None) -> None:
+    """Sets the number of threads that batches use, 1 to 1024. None: as RAYON_NUM_THREADS says, else as many as torch uses
+    once ipman_rs.torch has been used, else one a core.
+    """
+
+def follow_threads(threads: int) -> None:
+    """Uses as many threads as torch, unless `set_num_threads` or RAYON_NUM_THREADS say otherwise."""
 
 def weighted(
     template: Template,

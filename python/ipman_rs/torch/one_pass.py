@@ -17,6 +17,7 @@ from ipman_rs import BodyTemplate, _core
 
 from .autograd import Vjp
 from .ground import Ground
+from .threads import follow_torch
 
 
 class Call(NamedTuple):
@@ -57,6 +58,7 @@ class OnePass(Function):
         normal, height = ground.normal.reshape(-1, 3), ground.height.reshape(-1)
         if len(normal) != len(height):
             normal, height = (given.expand(len(vertices), *given.shape[1:]) for given in (normal, height))
+        follow_torch()
         total, terms, shares, gradient = _core.weighted(
             call.template._core,
             call.quantity,

@@ -17,6 +17,7 @@ from ipman_rs import _core
 from ipman_rs.template import by_key
 
 from .folding import fold, unfold
+from .threads import follow_torch
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,6 +46,7 @@ def _compiled(verb: Callable[..., Any]) -> Callable[..., Any]:
         *tensors, template_key, quantity, options = args
         vertices, normal, height, *directions = (_array(tensor) for tensor in tensors)
         core = by_key(template_key)._core
+        follow_torch()
         result = verb(core, quantity, options, vertices, normal, height, *directions)
         if isinstance(result, tuple):
             return tuple(torch.from_numpy(array) for array in result)

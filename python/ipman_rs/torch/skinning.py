@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.autograd import Function
@@ -22,6 +23,7 @@ from ipman_rs.body.model import by_key
 
 from .autograd import THIRD
 from .folding import fold, unfold
+from .threads import follow_torch
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,7 +47,7 @@ SCHEMAS = {
 def _skin(*args: Any) -> tuple[Tensor, Tensor]:
     *parameters, key = args
     vertices, joints = _outputs(*args)
-    core = by_key(key)._skin(_dtype(parameters[0]))
+    core = _core_of(key, parameters[0])
     core.forward(len(vertices), _arrays(parameters), vertices.numpy(), joints.numpy())
     return vertices, joints
 
@@ -53,7 +55,7 @@ def _skin(*args: Any) -> tuple[Tensor, Tensor]:
 def _skin_vjp(*args: Any) -> tuple[Tensor, ...]:
     parameters, (d_vertices, d_joints, needs, key) = args[:4], args[4:]
     gradients = _gradients(parameters, needs)
-    core = by_key(key)._skin(_dtype(parameters[0]))
+    core = _core_of(key, parameters[0])
     upstream = _array(d_vertices), _array(d_joints)
     core.vjp(len(parameters[0]), _arrays(parameters), *upstream, _written(gradients))
     return gradients
@@ -62,7 +64,7 @@ def _skin_vjp(*args: Any) -> tuple[Tensor, ...]:
 def _skin_jvp(*args: Any) -> tuple[Tensor, Tensor]:
     parameters, along, key = args[:4], args[4:8], args[8]
     vertices, joints = _outputs(*parameters, key)
-    core = by_key(key)._skin(_dtype(parameters[0]))
+    core = _core_of(key, parameters[0])
     core.jvp(len(vertices), _arrays(parameters), _arrays(along), vertices.numpy(), joints.numpy())
     return vertices, joints
 
@@ -70,16 +72,16 @@ def _skin_jvp(*args: Any) -> tuple[Tensor, Tensor]:
 def _skin_vjp_jvp(*args: Any) -> tuple[Tensor, ...]:
     parameters, (d_vertices, d_joints), along, (needs, key) = args[:4], args[4:6], args[6:10], args[10:]
     gradients = _gradients(parameters, needs)
-    core = by_key(key)._skin(_dtype(parameters[0]))
+    core = _core_of(key, parameters[0])
     upstream = _array(d_vertices), _array(d_joints)
     core.vjp_jvp(len(parameters[0]), _arrays(parameters), *upstream, _arrays(along), _written(gradients))
     return gradients
 
 
-def _dtype(tensor: Tensor) -> Any:
-    import numpy as np
-
-    return np.float32 if tensor.dtype == torch.float32 else np.float64
+def _core_of(key: int, pose: Tensor) -> Any:
+    """The compiled body of that key in the pose's dtype."""
+    follow_torch()
+    return by_key(key)._skin(np.float32 if pose.dtype == torch.float32 else np.float64)
 
 
 def _arrays(tensors: Four) -> tuple[Any, Any, Any, Any]:

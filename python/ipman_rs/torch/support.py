@@ -17,6 +17,7 @@ from ipman_rs.support import Contact, Solver
 
 from .dispatch import evaluate
 from .ground import Ground, as_numpy_ground
+from .threads import follow_torch
 
 
 def support_margin(
@@ -78,4 +79,5 @@ def bose(
 
 def as_array(vertices: Tensor) -> Any:
     """Detached, on the CPU, in a dtype numpy has."""
+    follow_torch()
     return vertices.detach().to(torch.promote_types(vertices.dtype, torch.float32)).numpy(force=True)

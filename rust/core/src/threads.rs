@@ -5,8 +5,8 @@
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, OnceLock};
 
 /// Items a thread does between two questions for an interruption.
 const WAVE: usize = 4;
@@ -34,39 +34,47 @@ pub fn each<I: Send>(
     Ok(())
 }
 
-static NUM_THREADS: AtomicUsize = AtomicUsize::new(0);
+/// What was asked for, and what another library of this process uses; 0 where nothing is known.
+static ASKED: AtomicUsize = AtomicUsize::new(0);
+static FOLLOWED: AtomicUsize = AtomicUsize::new(0);
 
-/// The threads that batches use: [`set_num_threads`], else `RAYON_NUM_THREADS`, else the machine's cores.
+/// The threads that batches use: [`set_num_threads`], else `RAYON_NUM_THREADS`, else as [`follow`] says, else the
+/// machine's cores.
 pub fn num_threads() -> usize {
-    match NUM_THREADS.load(Ordering::Relaxed) {
-        0 => {
-            let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.trim().parse().ok());
-            let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
-            let threads = asked.filter(|&n: &usize| n > 0).unwrap_or_else(cores);
-            NUM_THREADS.store(threads, Ordering::Relaxed);
-            threads
-        }
-        threads => threads,
-    }
+    static ENVIRONMENT: OnceLock<usize> = OnceLock::new();
+    static CORES: OnceLock<usize> = OnceLock::new();
+    let environment = || {
+        let text = std::env::var("RAYON_NUM_THREADS").unwrap_or_default();
+        text.trim().parse().unwrap_or(0).min(MOST)
+    };
+    let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
+    let known = [ASKED.load(Relaxed), *ENVIRONMENT.get_or_init(environment), FOLLOWED.load(Relaxed)];
+    known.into_iter().find(|&threads| threads > 0).unwrap_or_else(|| *CORES.get_or_init(cores))
 }
 
-pub fn set_num_threads(threads: usize) {
-    NUM_THREADS.store(threads.clamp(1, 1024), Ordering::Relaxed);
+const MOST: usize = 1024;
+
+/// None goes back to what the environment or another library says.
+pub fn set_num_threads(threads: Option<usize>) {
+    ASKED.store(threads.map_or(0, |threads| threads.clamp(1, MOST)), Relaxed);
+}
+
+/// Uses as many threads as another library of this process, so that the two together do not ask for more than there are.
+pub fn follow(threads: usize) {
+    FOLLOWED.store(threads.clamp(1, MOST), Relaxed);
 }
 
 /// The pool of this process with the wanted number of threads. Pools are leaked: a forked child must not even drop its
 /// parent's.
 fn pool() -> &'static ThreadPool {
-    static POOL: Mutex<Option<(u32, usize, &'static ThreadPool)>> = Mutex::new(None);
-    let wanted = (std::process::id(), num_threads());
-    let mut pool = POOL.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    match *pool {
-        Some((process, threads, pool)) if (process, threads) == wanted => pool,
-        _ => {
-            let made = ThreadPoolBuilder::new().num_threads(wanted.1).thread_name(|i| format!("ipman-{i}")).build();
-            let made = Box::leak(Box::new(made.expect("the system refuses new threads")));
-            *pool = Some((wanted.0, wanted.1, made));
-            made
-        }
+    static POOLS: Mutex<Vec<(u32, usize, &'static ThreadPool)>> = Mutex::new(Vec::new());
+    let (process, wanted) = (std::process::id(), num_threads());
+    let mut pools = POOLS.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    if let Some((.., pool)) = pools.iter().find(|(owner, threads, _)| (*owner, *threads) == (process, wanted)) {
+        return pool;
     }
+    let made = ThreadPoolBuilder::new().num_threads(wanted).thread_name(|i| format!("ipman-{i}")).build();
+    let made = Box::leak(Box::new(made.expect("the system refuses new threads")));
+    pools.push((process, wanted, made));
+    made
 }

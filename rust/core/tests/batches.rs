@@ -46,10 +46,10 @@ fn evaluate(template: &Template, data: &[f32], count: usize) -> (Vec<f32>, Vec<f
 fn bits_do_not_depend_on_threads_or_place() {
     let (template, data) = bodies(37);
     let row = data.len() / 37;
-    ipman::threads::set_num_threads(1);
+    ipman::threads::set_num_threads(Some(1));
     let alone = evaluate(&template, &data, 37);
     for threads in [2, 3, 8] {
-        ipman::threads::set_num_threads(threads);
+        ipman::threads::set_num_threads(Some(threads));
         assert!(evaluate(&template, &data, 37) == alone, "{threads} threads");
     }
     for body in [0, 5, 36] {

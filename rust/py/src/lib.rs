@@ -23,7 +23,7 @@ mod _core {
     #[pymodule_export]
     use crate::template::Template;
     #[pymodule_export]
-    use crate::threads::{get_num_threads, set_num_threads, simd_level};
+    use crate::threads::{follow_threads, get_num_threads, set_num_threads, simd_level};
     #[pymodule_export]
     use crate::weighted::weighted;
 
@@ -53,15 +53,22 @@ mod threads {
         ipman::threads::num_threads()
     }
 
-    /// Sets the number of threads that batches use, 1 to 1024.
+    /// Sets the number of threads that batches use, 1 to 1024. None: as RAYON_NUM_THREADS says, else as many as torch uses
+    /// once ipman_rs.torch has been used, else one a core.
     #[pyfunction]
     pub fn set_num_threads(threads: Bound<'_, PyAny>) -> PyResult<()> {
         match threads.extract() {
-            Ok(number @ 1..=1024) => {
+            Ok(number @ (None | Some(1..=1024))) => {
                 ipman::threads::set_num_threads(number);
                 Ok(())
             }
-            _ => Err(PyValueError::new_err(format!("threads: expected 1 to 1024, got {threads}"))),
+            _ => Err(PyValueError::new_err(format!("threads: expected 1 to 1024 or None, got {threads}"))),
         }
+    }
+
+    /// Uses as many threads as torch, unless `set_num_threads` or RAYON_NUM_THREADS say otherwise.
+    #[pyfunction]
+    pub fn follow_threads(threads: usize) {
+        ipman::threads::follow(threads);
     }
 }
