@@ -49,6 +49,65 @@ class Template:
     def sample_barycentric(self) -> NDArray[np.float64]:
         """The weights of each sample on its face's vertices, (S, 3)."""
 
+# Pose (n, J, 3 or 6), betas (n, k), expression (n, k) and translation (n, 3), or directions or gradients of these, in
+# the skin's dtype; n is the batch, or 1 where all bodies share a parameter. None: not given, or not asked for.
+_Parameters = tuple[NDArray[Any] | None, NDArray[Any] | None, NDArray[Any] | None, NDArray[Any] | None]
+
+@final
+class Skin:
+    """A body model ready for skinning, in one of the two precisions."""
+
+    def __new__(
+        cls,
+        v_template: NDArray[np.float64],
+        shapedirs: NDArray[np.float64],
+        expressiondirs: NDArray[np.float64],
+        posedirs: NDArray[np.float64],
+        joints: NDArray[np.float64],
+        joint_shapes: NDArray[np.float64],
+        joint_expressions: NDArray[np.float64],
+        rest_rotation: NDArray[np.float64],
+        pose_mean: NDArray[np.float64],
+        weights: NDArray[np.float64],
+        parents: NDArray[np.int64],
+        single: bool,
+    ) -> Skin:
+        """Shapes as in `ipman_rs.body.BodyModel`; posedirs may be empty. `single` keeps the large arrays in float32."""
+
+    def forward(self, batch: int, parameters: _Parameters, vertices: NDArray[Any], joints: NDArray[Any]) -> None:
+        """Fills vertices (batch, V, 3) and joints (batch, J, 3)."""
+
+    def vjp(
+        self,
+        batch: int,
+        parameters: _Parameters,
+        d_vertices: NDArray[Any] | None,
+        d_joints: NDArray[Any] | None,
+        gradients: _Parameters,
+    ) -> None:
+        """Fills the gradients by the parameters that are asked for, given those by vertices and joints (None: zero)."""
+
+    def jvp(
+        self,
+        batch: int,
+        parameters: _Parameters,
+        along: _Parameters,
+        vertices: NDArray[Any],
+        joints: NDArray[Any],
+    ) -> None:
+        """Fills vertices and joints with their derivatives along a direction of the parameters."""
+
+    def vjp_jvp(
+        self,
+        batch: int,
+        parameters: _Parameters,
+        d_vertices: NDArray[Any] | None,
+        d_joints: NDArray[Any] | None,
+        along: _Parameters,
+        gradients: _Parameters,
+    ) -> None:
+        """Fills the gradients' derivatives along a direction of the parameters."""
+
 # A quantity is a name and its options; the list is `named` in rust/core/src/quantity.rs.
 
 def output_size(template: Template, quantity: str, options: Sequence[float]) -> int:

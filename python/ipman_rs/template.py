@@ -111,7 +111,8 @@ class BodyTemplate:
 
         columns = self.faces[self.sample_faces].ravel()
         rows = np.arange(0, 3 * self.num_samples + 1, 3)
-        return csr_array((self.sample_barycentric.ravel(), columns, rows), shape=(self.num_samples, self.num_vertices))
+        weights = self.sample_barycentric.flatten()  # a copy: scipy sorts in place
+        return csr_array((weights, columns, rows), shape=(self.num_samples, self.num_vertices))
 
     def __repr__(self) -> str:
         return (

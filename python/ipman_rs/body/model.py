@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+import math
+import weakref
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import rotations
+from ipman_rs import _core
+
 from .hands import JOINTS_PER_HAND, Hands
 from .parts import PART_NAMES, face_parts
 
 if TYPE_CHECKING:
     from ..template import BodyTemplate
 
-BODIES_AT_ONCE = 64  # a long sequence is skinned in pieces: the blended transforms take twelve numbers a vertex
+_KEYS = itertools.count()
+_BY_KEY: weakref.WeakValueDictionary[int, BodyModel] = weakref.WeakValueDictionary()
 
 
 @dataclass(frozen=True)
@@ -51,8 +56,16 @@ class BodyModel:
     joint_names: tuple[str, ...]
     hands: Hands | None = None
     up: str = "y"
+    _key: int = field(init=False, repr=False)
 
     part_names = PART_NAMES
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_key", next(_KEYS))
+        _BY_KEY[self._key] = self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return BodyModel, tuple(getattr(self, given.name) for given in fields(self) if given.init)
 
     def __repr__(self) -> str:
         return (
@@ -117,85 +130,97 @@ class BodyModel:
         """
         given = [value for value in (pose, betas, transl, expression) if value is not None]
         dtype = np.float32 if given and np.result_type(*map(np.asarray, given)) == np.float32 else np.float64
-        local = self._rotations(pose)
-        shape = _components("betas", betas, self.num_betas)
-        expressed = _components("expression", expression, self.num_expressions)
-        shift = _components("transl", transl, 3, exact=True)
-
-        batch = _common_batch(
-            pose=local.shape[:-3], betas=shape.shape[:-1], transl=shift.shape[:-1], expression=expressed.shape[:-1]
+        arrays = {
+            "pose": self._pose(pose, dtype),
+            "betas": _components("betas", betas, self.num_betas, dtype),
+            "expression": _components("expression", expression, self.num_expressions, dtype),
+            "transl": _components("transl", transl, 3, dtype, exact=True),
+        }
+        tails = {name: 2 if name == "pose" else 1 for name in arrays}
+        shapes = {name: array.shape[: -tails[name]] for name, array in arrays.items() if array is not None}
+        batch = _common_batch(**shapes)
+        count = math.prod(batch)
+        given_pose, given_betas, given_expression, given_transl = (
+            None if array is None else _rows(array, batch, tails[name]) for name, array in arrays.items()
         )
-        local = np.broadcast_to(local, (*batch, self.num_joints, 3, 3)).reshape(-1, self.num_joints, 3, 3)
-        shape, expressed, shift = (
-            np.broadcast_to(value, (*batch, value.shape[-1])).reshape(len(local), value.shape[-1])
-            for value in (shape, expressed, shift)
-        )
-        vertices = np.empty((len(local), self.num_vertices, 3), dtype)
-        joints = np.empty((len(local), self.num_joints, 3), dtype)
-        for start in range(0, len(local), BODIES_AT_ONCE):
-            piece = slice(start, start + BODIES_AT_ONCE)
-            posed = self._skin(local[piece], shape[piece], expressed[piece])
-            vertices[piece], joints[piece] = (points + shift[piece, None] for points in posed)
+        parameters = given_pose, given_betas, given_expression, given_transl
+        vertices = np.empty((count, self.num_vertices, 3), dtype)
+        joints = np.empty((count, self.num_joints, 3), dtype)
+        self._skin(dtype).forward(count, parameters, vertices, joints)
         return BodyOutput(vertices.reshape(*batch, *vertices.shape[1:]), joints.reshape(*batch, *joints.shape[1:]))
 
     __call__ = forward
 
-    def _rotations(self, pose: ArrayLike | None) -> NDArray[np.float64]:
-        """Local rotation matrices (..., J, 3, 3) of a pose in either form."""
-        array = np.zeros((self.num_joints, 3)) if pose is None else np.asarray(pose, float)
-        if array.shape[-2:] == (self.num_joints, 3):
-            return rotations.from_axis_angle(array + self.pose_mean)
-        if array.shape[-2:] == (self.num_joints, 6):
-            return rotations.from_6d(array)
+    def _pose(self, pose: ArrayLike | None, dtype: type[np.floating]) -> NDArray[np.floating]:
+        """A pose in either form, with at least the dimensions (J, 3) or (J, 6)."""
+        array = np.zeros((self.num_joints, 3), dtype) if pose is None else np.asarray(pose, dtype)
+        if array.shape[-2:] in ((self.num_joints, 3), (self.num_joints, 6)):
+            return array
         raise ValueError(
             f"pose: expected (..., {self.num_joints}, 3) axis-angle or (..., {self.num_joints}, 6) 6D for the body "
             f"{self.name!r}, got shape {array.shape}; reshape a flat pose with pose.reshape(..., {self.num_joints}, 3)"
         )
 
-    def _skin(
-        self, local: NDArray[np.float64], betas: NDArray[np.float64], expression: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Vertices (N, V, 3), joints (N, J, 3) of local rotations (N, J, 3, 3), betas (N, B), expression (N, E)."""
-        count = len(local)
-        rest = self.v_template + _blend(self.shapedirs, betas) + _blend(self.expressiondirs, expression)
-        rest_joints = self.J_template + _blend(self.J_shapedirs, betas) + _blend(self.J_expressiondirs, expression)
-        if self.posedirs is not None:
-            rest = rest + _blend(self.posedirs, (local[:, 1:] - np.eye(3)).reshape(count, 9 * (self.num_joints - 1)))
+    def _skin(self, dtype: type[np.floating]) -> _core.Skin:
+        """The compiled form in one precision, made at its first use."""
+        return self._single if dtype == np.float32 else self._double
 
-        # Down the tree: `turned` takes a resting bone to the world.
-        world = np.empty_like(local)
-        joints = np.empty_like(rest_joints)
-        turned = np.empty_like(local)
-        for j, parent in enumerate(self.parents):
-            if parent < 0:
-                world[:, j], joints[:, j] = local[:, j], rest_joints[:, j]
-            else:
-                world[:, j] = world[:, parent] @ local[:, j]
-                bone = (rest_joints[:, j] - rest_joints[:, parent])[..., None]
-                joints[:, j] = joints[:, parent] + (turned[:, parent] @ bone)[..., 0]
-            turned[:, j] = world[:, j] @ self.rest_rotation[j]
+    @cached_property
+    def _single(self) -> _core.Skin:
+        return self._compiled(single=True)
 
-        offset = joints - (turned @ rest_joints[..., None])[..., 0]
-        transforms = np.concatenate([turned, offset[..., None]], -1).reshape(count, self.num_joints, 12)
-        blended = (self.weights @ transforms).reshape(count, self.num_vertices, 3, 4)
-        return (blended[..., :3] @ rest[..., None])[..., 0] + blended[..., 3], joints
+    @cached_property
+    def _double(self) -> _core.Skin:
+        return self._compiled(single=False)
 
+    def _compiled(self, single: bool) -> _core.Skin:
+        def plain(array: NDArray[np.floating]) -> NDArray[np.float64]:
+            return np.require(array, np.float64, ["C", "A"])
 
-def _blend(directions: NDArray[np.float64], amounts: NDArray[np.float64]) -> NDArray[np.float64]:
-    """sum_k amounts[n, k] directions[v, :, k] -> (N, V, 3)."""
-    points, axes, count = directions.shape
-    return (amounts @ directions.reshape(points * axes, count).T).reshape(len(amounts), points, axes)
+        return _core.Skin(
+            plain(self.v_template),
+            plain(self.shapedirs),
+            plain(self.expressiondirs),
+            np.zeros(0) if self.posedirs is None else plain(self.posedirs),
+            plain(self.J_template),
+            plain(self.J_shapedirs),
+            plain(self.J_expressiondirs),
+            plain(self.rest_rotation),
+            plain(self.pose_mean),
+            plain(self.weights),
+            np.require(self.parents, np.int64, ["C", "A"]),
+            single,
+        )
 
 
-def _components(name: str, value: ArrayLike | None, size: int, exact: bool = False) -> NDArray[np.float64]:
-    """`value` (..., k) filled up with zeros to (..., size); None gives zeros. ValueError unless k fits."""
+def by_key(key: int) -> BodyModel:
+    """The living body with this `_key`: torch operators carry numbers, not objects."""
+    try:
+        return _BY_KEY[key]
+    except KeyError:
+        raise ValueError(f"body: number {key} does not live in this process (any more)") from None
+
+
+def _rows(array: NDArray[np.floating], batch: tuple[int, ...], tail: int) -> NDArray[np.floating]:
+    """An array as rows (count, ...), a single one if all bodies share it."""
+    own, shape = array.shape[:-tail], array.shape[-tail:]
+    if math.prod(own) != 1:
+        array = np.broadcast_to(array, (*batch, *shape))
+        own = batch
+    return np.require(array.reshape(math.prod(own), *shape), requirements=["C", "A"])
+
+
+def _components(
+    name: str, value: ArrayLike | None, size: int, dtype: type[np.floating], exact: bool = False
+) -> NDArray[np.floating] | None:
+    """`value` (..., k), k up to size. ValueError unless k fits."""
     if value is None:
-        return np.zeros(size)
-    array = np.asarray(value, float)
+        return None
+    array = np.asarray(value, dtype)
     count = array.shape[-1] if array.ndim else -1
     if not 0 <= count <= size or (exact and count != size):
         raise ValueError(f"{name}: expected shape (..., {'' if exact else 'up to '}{size}), got {array.shape}")
-    return np.concatenate([array, np.zeros((*array.shape[:-1], size - count))], -1)
+    return array
 
 
 def _common_batch(**shapes: tuple[int, ...]) -> tuple[int, ...]:

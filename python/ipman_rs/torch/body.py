@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import functools
+import math
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-import roma
 import torch
 from torch import Tensor, nn
 
 from ipman_rs import BodyTemplate
 from ipman_rs import body as numpy_body
+
+from . import dispatch, reference, skinning
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,7 @@ class BodyModel(nn.Module):
     def __init__(self, body: numpy_body.BodyModel | str | os.PathLike[str], dtype: torch.dtype | None = None):
         super().__init__()
         self.body = body if isinstance(body, numpy_body.BodyModel) else numpy_body.load_body(body)
+        self.parents: tuple[int, ...] = tuple(self.body.parents.tolist())  # torch.compile reads no arrays
         dtype = dtype or torch.get_default_dtype()
         for name in BodyModel.__annotations__:
             array = getattr(self.body, name)
@@ -62,69 +67,75 @@ class BodyModel(nn.Module):
         expression: Tensor | None = None,
     ) -> BodyOutput:
         """Posed bodies; arguments, shapes, broadcasting and errors as in `ipman_rs.body.BodyModel.forward`."""
-        local = self._rotations(pose)
-        betas = self._components("betas", betas, self.body.num_betas)
-        expression = self._components("expression", expression, self.body.num_expressions)
-        if transl is None:
-            transl = self.v_template.new_zeros(3)
-        elif transl.shape[-1:] != (3,):
-            raise ValueError(f"transl: expected shape (..., 3), got {tuple(transl.shape)}")
+        given = [self._pose(pose), self._components("betas", betas, self.body.num_betas)]
+        given += [self._components("expression", expression, self.body.num_expressions)]
+        given += [self._components("transl", transl, 3, exact=True)]
+        batch = _common_batch(given)
+        if not self._on_core(given):
+            vertices, joints = reference.skinning.posed(self, *given)
+            return BodyOutput(vertices.expand(*batch, -1, -1), joints.expand(*batch, -1, -1))
+        dtype = functools.reduce(torch.promote_types, (value.dtype for value in given if value is not None), self.dtype)
+        rows = [_rows(value, batch, tail, dtype) for value, tail in zip(given, _TAILS, strict=True)]
+        vertices, joints = skinning.posed(rows, self.body)
+        if len(batch) != 1:
+            vertices, joints = vertices.reshape(*batch, *vertices.shape[1:]), joints.reshape(*batch, *joints.shape[1:])
+        return BodyOutput(vertices, joints)
 
-        rest = self.v_template + _blend(self.shapedirs, betas) + _blend(self.expressiondirs, expression)
-        rest_joints = self.J_template + _blend(self.J_shapedirs, betas) + _blend(self.J_expressiondirs, expression)
-        if self.posedirs is not None:
-            rest = rest + _blend(self.posedirs, (local[..., 1:, :, :] - torch.eye(3).to(local)).flatten(-3))
+    @property
+    def dtype(self) -> torch.dtype:
+        """Of the buffers."""
+        return self.v_template.dtype
 
-        # Down the tree: `turned` takes a resting bone to the world.
-        world: list[Tensor] = []
-        turned: list[Tensor] = []
-        joints: list[Tensor] = []
-        for j, parent in enumerate(self.body.parents.tolist()):
-            if parent < 0:
-                world.append(local[..., j, :, :])
-                joints.append(rest_joints[..., j, :])
-            else:
-                world.append(world[parent] @ local[..., j, :, :])
-                bone = rest_joints[..., j, :] - rest_joints[..., parent, :]
-                joints.append(joints[parent] + _apply(turned[parent], bone))
-            turned.append(world[j] @ self.rest_rotation[j])
+    def _on_core(self, given: Sequence[Tensor | None]) -> bool:
+        """Whether the compiled core computes: on CPU, in one of its two precisions."""
+        if dispatch._forced or self.dtype not in (torch.float32, torch.float64):
+            return False
+        return all(value is None or value.device.type == "cpu" for value in (self.v_template, *given))
 
-        joint_batch = torch.broadcast_shapes(local.shape[:-3], rest_joints.shape[:-2])
-        placed = torch.stack([joint.expand(*joint_batch, 3) for joint in joints], -2)
-        rotation = torch.stack(turned, -3)
-        offset = placed - _apply(rotation, rest_joints)
-        transforms = torch.cat([rotation.flatten(-2).expand(*joint_batch, -1, 9), offset], -1)
-        blended = self.weights @ transforms
-        vertices = _apply(blended[..., :9].unflatten(-1, (3, 3)), rest) + blended[..., 9:]
-        return BodyOutput(vertices + transl[..., None, :], placed + transl[..., None, :])
-
-    def _rotations(self, pose: Tensor | None) -> Tensor:
-        """Local rotation matrices (..., J, 3, 3) of a pose in either form."""
+    def _pose(self, pose: Tensor | None) -> Tensor:
+        """The pose in either form, (..., J, 3) or (..., J, 6). ValueError if it is neither."""
         count = self.body.num_joints
         if pose is None:
-            pose = torch.zeros_like(self.pose_mean)
-        if pose.shape[-2:] == (count, 3):
-            return roma.rotvec_to_rotmat(pose + self.pose_mean)
-        if pose.shape[-2:] == (count, 6):
-            return roma.special_gramschmidt(pose.unflatten(-1, (2, 3)).transpose(-1, -2))
+            return torch.zeros_like(self.pose_mean)
+        if pose.shape[-2:] in ((count, 3), (count, 6)):
+            return pose
         raise ValueError(
             f"pose: expected (..., {count}, 3) axis-angle or (..., {count}, 6) 6D for the body {self.body.name!r}, got "
             f"shape {tuple(pose.shape)}; reshape a flat pose with pose.reshape(..., {count}, 3)"
         )
 
-    def _components(self, name: str, value: Tensor | None, size: int) -> Tensor:
-        """`value` (..., k) filled up with zeros to (..., size); None gives zeros. ValueError unless k fits."""
-        if value is None:
-            return self.v_template.new_zeros(size)
-        if value.ndim == 0 or value.shape[-1] > size:
-            raise ValueError(f"{name}: expected shape (..., up to {size}), got {tuple(value.shape)}")
-        return nn.functional.pad(value, (0, size - value.shape[-1]))
+    def _components(self, name: str, value: Tensor | None, size: int, exact: bool = False) -> Tensor | None:
+        """`value` (..., k), k up to size. ValueError unless k fits."""
+        if value is None or (value.ndim > 0 and (value.shape[-1] == size or (value.shape[-1] < size and not exact))):
+            return value
+        expected = f"(..., {'' if exact else 'up to '}{size})"
+        raise ValueError(f"{name}: expected shape {expected}, got {tuple(value.shape)}")
 
 
-def _apply(matrices: Tensor, points: Tensor) -> Tensor:
-    return (matrices @ points[..., None])[..., 0]
+_NAMES = ("pose", "betas", "expression", "transl")
+_TAILS = (2, 1, 1, 1)  # dimensions of one body's share
 
 
-def _blend(directions: Tensor, amounts: Tensor) -> Tensor:
-    """sum_k amounts[..., k] directions[v, :, k] -> (..., V, 3)."""
-    return (amounts @ directions.flatten(0, 1).T).unflatten(-1, directions.shape[:2])
+def _common_batch(given: Sequence[Tensor | None]) -> tuple[int, ...]:
+    shapes = [None if value is None else value.shape[:-tail] for value, tail in zip(given, _TAILS, strict=True)]
+    first = shapes[0]
+    if all(shape is None or shape == first for shape in shapes):
+        return tuple(first or ())
+    try:
+        return tuple(torch.broadcast_shapes(*(shape for shape in shapes if shape is not None)))
+    except RuntimeError:
+        named = zip(_NAMES, shapes, strict=True)
+        listed = ", ".join(f"{name} {tuple(shape)}" for name, shape in named if shape is not None)
+        raise ValueError(f"batch dimensions do not fit together: {listed}") from None
+
+
+def _rows(value: Tensor | None, batch: tuple[int, ...], tail: int, dtype: torch.dtype) -> Tensor | None:
+    """`value` with one batch dimension, a view where all bodies share it."""
+    if value is None:
+        return None
+    if value.dtype != dtype:
+        value = value.to(dtype)
+    if len(batch) == 1 and value.ndim == tail + 1 and value.shape[0] == batch[0]:
+        return value
+    shape = value.shape[-tail:]
+    return value.expand(*batch, *shape).reshape(math.prod(batch), *shape)

@@ -1,39 +1,49 @@
 """From the public functions to the path that computes: batch dimensions, dtypes, devices, compiled code.
 
-CPU tensors go to the compiled core, all others to the plain-torch reference.
+CPU tensors go to the compiled core, all others to the tuned `device` path where it covers the quantity, else to the
+plain-torch reference.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, NamedTuple
+from contextlib import AbstractContextManager, contextmanager
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import torch
 from torch import Tensor
 
 from ipman_rs import Ground as NumpyGround
 
-from . import reference
+from . import device, reference
 from .autograd import CompiledValue, CompiledWeighted, Value, Weighted
 from .ground import Ground, as_ground
 
 if TYPE_CHECKING:
     from ipman_rs import BodyTemplate
 
-_forced = False
+_forced: Literal["reference", "device"] | None = None
 
 
 @contextmanager
-def _reference_path() -> Iterator[None]:
-    """Send CPU tensors along the path of other devices too: for tests and comparisons."""
+def _forced_to(path: Literal["reference", "device"]) -> Iterator[None]:
     global _forced
-    before, _forced = _forced, True
+    before, _forced = _forced, path
     try:
         yield
     finally:
         _forced = before
+
+
+def _reference_path() -> AbstractContextManager[None]:
+    """Send all tensors along the plain-torch formulas: for tests and comparisons."""
+    return _forced_to("reference")
+
+
+def _device_path() -> AbstractContextManager[None]:
+    """Send CPU tensors along the path of other devices: for tests and comparisons."""
+    return _forced_to("device")
 
 
 class Bodies(NamedTuple):
@@ -101,6 +111,8 @@ def values_of(batch: Bodies, template: BodyTemplate, quantity: str, options: Seq
     """`quantity` of a checked batch: (B, K)."""
     numbers = [float(option) for option in options]
     vertices = batch.vertices
+    if _on_device(quantity, vertices):
+        return device.values(template, quantity, numbers, vertices, batch.normal, batch.height)
     if _on_reference(vertices):
         normal, height = batch.normal.to(vertices), batch.height.to(vertices)
         return reference.evaluate(template, quantity, numbers, vertices, normal, height)
@@ -118,6 +130,9 @@ def weighted_values_of(
     Where a gradient will be asked for, it is computed in the same pass.
     """
     vertices = batch.vertices
+    if _on_device(quantity, vertices) and vertices.requires_grad and torch.is_grad_enabled():
+        numbers = [float(option) for option in options]
+        return device.weighted(template, quantity, numbers, vertices, batch.normal, batch.height, weights)
     fused = vertices.requires_grad and torch.is_grad_enabled() and not _on_reference(vertices)
     if not fused:
         values = values_of(batch, template, quantity, options)
@@ -131,7 +146,11 @@ def weighted_values_of(
 
 
 def _on_reference(vertices: Tensor) -> bool:
-    return _forced or vertices.device.type != "cpu"
+    return _forced is not None or vertices.device.type != "cpu"
+
+
+def _on_device(quantity: str, vertices: Tensor) -> bool:
+    return _on_reference(vertices) and _forced != "reference" and device.covers(quantity, vertices)
 
 
 def _for_core(batch: Bodies) -> tuple[Tensor, Tensor]:

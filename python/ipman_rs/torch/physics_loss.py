@@ -115,11 +115,11 @@ class IntuitivePhysicsLoss(nn.Module):
         if mask is None:
             if self.reduction == "mean":
                 weights = [weight / max(len(vertices), 1) for weight in weights]
-            return vertices.new_tensor(weights).expand(len(vertices), len(weights))
+            return _row(vertices, weights).expand(len(vertices), len(weights))
         body = mask.to(vertices.dtype)
         if self.reduction == "mean":
             body = body / body.sum().clamp(min=1)
-        return body[:, None] * vertices.new_tensor(weights)
+        return body[:, None] * _row(vertices, weights)
 
     def _named(self, values: Tensor, counted: Tensor, number: Tensor, batch: Bodies) -> dict[str, Tensor]:
         """Reduce values (B, K) over the bodies that count."""
@@ -131,6 +131,13 @@ class IntuitivePhysicsLoss(nn.Module):
         else:
             values = values.reshape(*batch.batch_shape, len(self.terms))
         return dict(zip(self.terms, values.unbind(dim=-1), strict=True))
+
+
+def _row(like: Tensor, numbers: list[float]) -> Tensor:
+    """Numbers beside a tensor, filled in by kernels on devices: a copy from the host waits, and stops a CUDA graph."""
+    if like.device.type == "cpu":
+        return like.new_tensor(numbers)
+    return torch.stack([like.new_full((), number) for number in numbers])
 
 
 def _finite(values: Tensor) -> Tensor:

@@ -6,6 +6,7 @@ from torch import Tensor
 
 from ipman_rs import BodyTemplate
 from ipman_rs import Ground as NumpyGround
+from ipman_rs.checks import not_negative, number
 
 from .dispatch import evaluate
 from .ground import Ground
@@ -15,7 +16,8 @@ def pressure(
     vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround, alpha: float = 100.0, gamma: float = 10.0
 ) -> Tensor:
     """Relative pressure of each sample: 1 − αh below the ground, e^{−γh} from it upwards: (..., V, 3) -> (..., S)."""
-    return evaluate(vertices, template, ground, "pressure", (alpha, gamma), (template.num_samples,))
+    options = (number("alpha", alpha), number("gamma", gamma))
+    return evaluate(vertices, template, ground, "pressure", options, (template.num_samples,))
 
 
 def center_of_pressure(
@@ -27,4 +29,5 @@ def center_of_pressure(
     epsilon: float = 0.0,
 ) -> Tensor:
     """Σ ρ v / (Σ ρ + ε): vertices (..., V, 3) -> (..., 3), m; finite for hovering bodies when ε = 0."""
-    return evaluate(vertices, template, ground, "center_of_pressure", (alpha, gamma, epsilon), (3,))
+    options = (number("alpha", alpha), number("gamma", gamma), not_negative("epsilon", epsilon))
+    return evaluate(vertices, template, ground, "center_of_pressure", options, (3,))

@@ -39,6 +39,11 @@ pub mod batch;
 /// How many threads, and the pool.
 pub mod threads;
 
+/// Linear blend skinning: from a body model's parameters to its vertices and joints.
+pub mod skinning;
+/// Many posed bodies over threads.
+pub mod posing;
+
 pub use batch::Batch;
 pub use error::{Error, Result};
 pub use ground::Ground;

@@ -3,7 +3,7 @@
 use crate::number::vector::{Vec3, add_scaled, dot, narrow, scale, widen};
 use crate::number::{Real, Room};
 use crate::quantity::Quantity;
-use crate::sampling::{CHUNK, Place, Points, Row, Walk, sum_row};
+use crate::sampling::{CHUNK, Place, Points, Row, SUMS, Walk, sum_row};
 use crate::scene::Scene;
 use crate::template::Template;
 
@@ -111,6 +111,8 @@ pub struct LoadSums<R: Real> {
     total: R::Wide,
     /// q = Wᵀρ: the load that each vertex bears, so that Σ ρ_i v_i = Σ_v q_v v.
     loads: Vec<R>,
+    /// ρ of the samples that are looked at.
+    density: Row<R>,
 }
 
 /// s̄ in local coordinates, with what its backward needs.
@@ -128,18 +130,24 @@ const BLOCK: usize = 16;
 impl<R: Real> LoadSums<R> {
     pub fn new(of: CenterOfPressure, heights: &[R]) -> Self {
         let shift = if of.epsilon > 0.0 { R::zero() } else { R::apart::<LowestAbove, _>((heights,)) };
-        LoadSums { of, shift, total: R::Wide::zero(), loads: vec![R::zero(); heights.len()] }
+        LoadSums {
+            of,
+            shift,
+            total: R::Wide::zero(),
+            loads: vec![R::zero(); heights.len()],
+            density: [R::zero(); CHUNK],
+        }
     }
 
     pub fn read(&mut self, place: &Place, heights: &Row<R>) {
-        let mut density = [R::zero(); CHUNK];
-        R::apart::<Densities, _>((self.of.curve, self.shift, heights, place.len(), &mut density, &mut self.total));
-        place.hand_back(&density, &mut self.loads);
+        let (density, total) = (&mut self.density, &mut self.total);
+        R::apart::<Densities, _>((self.of.curve, self.shift, heights, place.len(), density, total));
+        place.hand_back(&self.density, &mut self.loads);
     }
 
     /// s̄ from the sums. Epsilon pulls towards the world's origin, which lies at −origin here.
     pub fn finish(self, scene: &Scene<R>) -> Cop<R> {
-        let LoadSums { of, shift, total, loads } = self;
+        let LoadSums { of, shift, total, loads, .. } = self;
         let epsilon = R::Wide::of(of.epsilon);
         let mut moment = scale(-epsilon, scene.origin);
         R::apart::<Moment, _>((scene.points, loads.as_slice(), &mut moment));
@@ -156,11 +164,17 @@ impl<R: Real> Room<(&[R],)> for LowestAbove {
 
     #[inline(always)]
     fn enter((heights,): (&[R],)) -> R {
-        let mut lowest = R::of(1e30);
-        for &height in heights {
-            lowest = lowest.at_most(height);
+        let mut lowest = [R::of(1e30); SUMS];
+        let (whole, rest) = heights.as_chunks::<SUMS>();
+        for heights in whole {
+            for k in 0..SUMS {
+                lowest[k] = lowest[k].at_most(heights[k]);
+            }
         }
-        lowest.at_least(R::zero())
+        for &height in lowest[1..].to_owned().iter().chain(rest) {
+            lowest[0] = lowest[0].at_most(height);
+        }
+        lowest[0].at_least(R::zero())
     }
 }
 
@@ -202,14 +216,14 @@ impl<R: Real> Room<(&[Vec3<R>], &[R], &mut Vec3<R::Wide>)> for Moment {
 }
 
 impl<R: Real> Cop<R> {
-    /// ∂s̄/∂v_i = ρ_i / Σρ, handed to the points, and ∂s̄/∂ρ_i = (v_i − s̄) / Σρ, added to the gradient by the vertices'
-    /// heights: `Scene::heights_backward` takes it on.
+    /// ∂s̄/∂v_i = ρ_i / Σρ and ∂s̄/∂ρ_i = (v_i − s̄) / Σρ, added to `d_points`; so is what `d_heights` holds already, a
+    /// gradient by the vertices' heights.
     pub fn backward(
         &self,
         scene: &Scene<R>,
         heights: &[R],
         d_point: Vec3<R::Wide>,
-        d_heights: &mut [R],
+        mut d_heights: Vec<R>,
         d_points: &mut [Vec3<R>],
     ) {
         let d_wide = [d_point[0] / self.total, d_point[1] / self.total, d_point[2] / self.total];
@@ -220,9 +234,10 @@ impl<R: Real> Cop<R> {
             place.read(heights, &mut row);
             place.read(&arms, &mut arm);
             R::apart::<SlopesByArms, _>((self.of.curve, self.shift, &arm, &mut row));
-            place.hand_back(&row, d_heights);
+            place.hand_back(&row, &mut d_heights);
         }
-        R::apart::<LoadsBackward, _>((self.loads.as_slice(), d, d_points));
+        let normal = scene.narrow_ground().normal;
+        R::apart::<Gradient, _>((self.loads.as_slice(), d, d_heights.as_slice(), normal, d_points));
     }
 }
 
@@ -234,9 +249,9 @@ impl<R: Real> Room<(&[Vec3<R>], Vec3<R>, R)> for Arms {
 
     #[inline(always)]
     fn enter((vertices, d, lever): (&[Vec3<R>], Vec3<R>, R)) -> Vec<R> {
-        let mut arms = Vec::with_capacity(vertices.len());
-        for &vertex in vertices {
-            arms.push(dot(d, vertex) - lever);
+        let mut arms = vec![R::zero(); vertices.len()];
+        for (arm, &vertex) in arms.iter_mut().zip(vertices) {
+            *arm = dot(d, vertex) - lever;
         }
         arms
     }
@@ -256,15 +271,17 @@ impl<R: Real> Room<(PressureCurve, R, &Row<R>, &mut Row<R>)> for SlopesByArms {
     }
 }
 
-struct LoadsBackward;
+/// Adds each vertex's load times d, and its height's gradient times n.
+struct Gradient;
 
-impl<R: Real> Room<(&[R], Vec3<R>, &mut [Vec3<R>])> for LoadsBackward {
+impl<R: Real> Room<(&[R], Vec3<R>, &[R], Vec3<R>, &mut [Vec3<R>])> for Gradient {
     type Output = ();
 
     #[inline(always)]
-    fn enter((loads, d, d_points): (&[R], Vec3<R>, &mut [Vec3<R>])) {
-        for (d_point, &load) in d_points.iter_mut().zip(loads) {
+    fn enter((loads, d, d_heights, normal, d_points): (&[R], Vec3<R>, &[R], Vec3<R>, &mut [Vec3<R>])) {
+        for ((d_point, &load), &d_height) in d_points.iter_mut().zip(loads).zip(d_heights) {
             add_scaled(d_point, load, d);
+            add_scaled(d_point, d_height, normal);
         }
     }
 }
@@ -298,8 +315,7 @@ impl Quantity for CenterOfPressure {
 
     fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
         let (cop, heights) = saved;
-        let mut d_heights = vec![R::zero(); heights.len()];
-        cop.backward(scene, heights, widen([d_out[0], d_out[1], d_out[2]]), &mut d_heights, d_points);
-        scene.heights_backward(&d_heights, d_points);
+        let d_heights = vec![R::zero(); heights.len()];
+        cop.backward(scene, heights, widen([d_out[0], d_out[1], d_out[2]]), d_heights, d_points);
     }
 }

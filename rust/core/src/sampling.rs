@@ -322,11 +322,12 @@ impl Weights {
     }
 }
 
-/// Σ of a row's first `len` numbers, as eight running sums: one body alone sums in the same order as in a lane, and yet
-/// its sums vectorise.
+/// Running sums over a row: one body alone sums in the same order as in a lane, and yet its sums vectorise.
+pub const SUMS: usize = 8;
+
+/// Σ of a row's first `len` numbers.
 #[inline(always)]
 pub fn sum_row<R: Real>(row: &Row<R>, len: usize) -> R {
-    const SUMS: usize = 8;
     let mut sums = [R::zero(); SUMS];
     let (whole, rest) = row[..len].as_chunks::<SUMS>();
     for numbers in whole {
@@ -337,6 +338,12 @@ pub fn sum_row<R: Real>(row: &Row<R>, len: usize) -> R {
     for (k, &number) in rest.iter().enumerate() {
         sums[k] = sums[k] + number;
     }
+    fold(sums)
+}
+
+/// The sum of the running sums.
+#[inline(always)]
+pub fn fold<R: Real>(sums: [R; SUMS]) -> R {
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
 }
 

@@ -70,9 +70,9 @@ impl<R: Real> Room<(Ground<R>, &[Vec3<R>])> for Heights {
 
     #[inline(always)]
     fn enter((ground, vertices): (Ground<R>, &[Vec3<R>])) -> Vec<R> {
-        let mut heights = Vec::with_capacity(vertices.len());
-        for &vertex in vertices {
-            heights.push(ground.signed_height(vertex));
+        let mut heights = vec![R::zero(); vertices.len()];
+        for (height, &vertex) in heights.iter_mut().zip(vertices) {
+            *height = ground.signed_height(vertex);
         }
         heights
     }

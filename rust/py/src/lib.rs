@@ -4,6 +4,7 @@ mod array;
 mod bodies;
 mod error;
 mod evaluate;
+mod skinning;
 mod support;
 mod template;
 
@@ -14,6 +15,8 @@ use pyo3::prelude::*;
 mod _core {
     #[pymodule_export]
     use crate::evaluate::{jvp, output_size, value, value_and_vjp, vjp, vjp_jvp};
+    #[pymodule_export]
+    use crate::skinning::Skin;
     #[pymodule_export]
     use crate::support::{base_of_support, bose_lp, status};
     #[pymodule_export]

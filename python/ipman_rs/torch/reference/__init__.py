@@ -4,6 +4,7 @@ Functions take `Posed(vertices, template)`, vertices (B, V, 3), and a ground, on
 them twice. `evaluate` finds them by quantity name, as the compiled ops do.
 """
 
+from . import skinning as skinning
 from .balance import balance_cost as balance_cost
 from .closing_volume import part_volumes as part_volumes
 from .ground import ground_loss as ground_loss

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::number::vector::Vec3;
 use crate::number::{Real, Room};
 use crate::quantity::{Quantity, unknown_choice};
-use crate::sampling::{CHUNK, Place, Points, Row, sum_row};
+use crate::sampling::{CHUNK, Place, Points, Row, SUMS, fold};
 use crate::scene::Scene;
 use crate::template::Template;
 
@@ -27,21 +27,20 @@ impl Tanh {
         }
     }
 
-    /// The curve and its derivative by x.
+    /// The curve and its derivative by x, for x ≥ 0.
     #[inline(always)]
     fn value_and_slope<R: Real>(self, x: R) -> (R, R) {
-        let one = R::of(1.0);
         match self {
             Tanh::Squared => {
-                let t = x.tanh();
+                let t = x.tanh_of_positive();
                 let squared = t * t;
-                (squared, R::of(2.0) * t * (one - squared))
+                (squared, R::of(2.0) * t.neg_mul_add(squared, t))
             }
             Tanh::OfSquare => {
-                // Beyond |x| = 10 the curve is 1 in double precision; the bound keeps x² finite.
-                let x = x.at_least(R::of(-10.0)).at_most(R::of(10.0));
-                let t = (x * x).tanh();
-                (t, R::of(2.0) * x * t.neg_mul_add(t, one))
+                // Beyond x = 10 the curve is 1 in double precision; the bound keeps x² finite.
+                let x = x.at_most(R::of(10.0));
+                let t = (x * x).tanh_of_positive();
+                (t, R::of(2.0) * x * t.neg_mul_add(t, R::of(1.0)))
             }
         }
     }
@@ -58,16 +57,27 @@ pub struct GroundLoss {
     pub beta2: f64,
 }
 
+/// What differs above and below the ground.
+struct Sides<R> {
+    tanh: Tanh,
+    /// 1/α2 and −1/β2: below the ground x = −h/β2 is positive, too.
+    widths: [R; 2],
+    /// What x's slope is worth, times the width.
+    shares: [R; 2],
+}
+
 /// The sums of both curves as the points are looked at.
 pub struct GroundSums<'a, R: Real> {
     of: &'a GroundLoss,
     pull: R::Wide,
     push: R::Wide,
+    /// Of the points that are looked at.
+    slopes: Row<R>,
 }
 
 impl GroundLoss {
     pub fn sums<R: Real>(&self) -> GroundSums<'_, R> {
-        GroundSums { of: self, pull: R::Wide::zero(), push: R::Wide::zero() }
+        GroundSums { of: self, pull: R::Wide::zero(), push: R::Wide::zero(), slopes: [R::zero(); CHUNK] }
     }
 
     /// What the slope of each side is worth: the gradients by (pull, push) over the number of points.
@@ -75,31 +85,36 @@ impl GroundLoss {
         let share = 1.0 / self.points.count(template) as f64;
         [d_out[0] * R::of(self.alpha1 * share), d_out[1] * R::of(self.beta1 * share)]
     }
+}
+
+impl<R: Real> Sides<R> {
+    fn new(of: &GroundLoss, shares: [R; 2]) -> Self {
+        let widths = [R::of(1.0 / of.alpha2), R::of(-1.0 / of.beta2)];
+        Sides { tanh: of.tanh, widths, shares: [widths[0] * shares[0], widths[1] * shares[1]] }
+    }
 
     /// The curve's value, and its slope by the height times the share of its side.
     #[inline(always)]
-    fn value_and_slope<R: Real>(&self, height: R, [pull, push]: [R; 2]) -> (R, R) {
-        let width = height.if_negative(R::of(1.0 / self.beta2), R::of(1.0 / self.alpha2));
-        let (value, slope) = self.tanh.value_and_slope(height * width);
-        (value, slope * (width * height.if_negative(push, pull)))
+    fn value_and_slope(&self, height: R) -> (R, R) {
+        let x = height * height.if_negative(self.widths[1], self.widths[0]);
+        let (value, slope) = self.tanh.value_and_slope(x);
+        (value, slope * height.if_negative(self.shares[1], self.shares[0]))
     }
 }
 
 impl<R: Real> GroundSums<'_, R> {
     pub fn read(&mut self, place: &Place, heights: &Row<R>) {
-        let mut unused = [R::zero(); CHUNK];
-        self.look(place, heights, [R::zero(); 2], &mut unused);
+        let sums = [&mut self.pull, &mut self.push];
+        let sides = Sides::new(self.of, [R::zero(); 2]);
+        R::apart::<Look, _>((&sides, heights, place.len(), &mut self.slopes, sums));
     }
 
     /// Reads and hands back at one look.
     pub fn read_and_hand_back(&mut self, place: &Place, heights: &Row<R>, shares: [R; 2], d_heights: &mut [R]) {
-        let mut slopes = [R::zero(); CHUNK];
-        self.look(place, heights, shares, &mut slopes);
-        place.hand_back(&slopes, d_heights);
-    }
-
-    fn look(&mut self, place: &Place, heights: &Row<R>, shares: [R; 2], slopes: &mut Row<R>) {
-        R::apart::<Look, _>((self.of, heights, place.len(), shares, slopes, &mut self.pull, &mut self.push));
+        let sums = [&mut self.pull, &mut self.push];
+        let sides = Sides::new(self.of, shares);
+        R::apart::<Look, _>((&sides, heights, place.len(), &mut self.slopes, sums));
+        place.hand_back(&self.slopes, d_heights);
     }
 
     pub fn finish(&self, template: &Template, out: &mut [R]) {
@@ -112,22 +127,34 @@ impl<R: Real> GroundSums<'_, R> {
 /// Both curves over a row of heights, added to their sums, and their slopes.
 struct Look;
 
-type Looked<'a, R> =
-    (&'a GroundLoss, &'a Row<R>, usize, [R; 2], &'a mut Row<R>, &'a mut <R as Real>::Wide, &'a mut <R as Real>::Wide);
+type Looked<'a, R> = (&'a Sides<R>, &'a Row<R>, usize, &'a mut Row<R>, [&'a mut <R as Real>::Wide; 2]);
 
 impl<R: Real> Room<Looked<'_, R>> for Look {
     type Output = ();
 
     #[inline(always)]
-    fn enter((of, heights, len, shares, slopes, pull_sum, push_sum): Looked<'_, R>) {
-        let (mut pull, mut push) = ([R::zero(); CHUNK], [R::zero(); CHUNK]);
-        for (((&height, pull), push), slope) in heights.iter().zip(&mut pull).zip(&mut push).zip(slopes) {
-            let (value, scaled) = of.value_and_slope(height, shares);
-            (*pull, *push) = (height.if_negative(R::zero(), value), height.if_negative(value, R::zero()));
+    fn enter((sides, heights, len, slopes, [pull, push]): Looked<'_, R>) {
+        // Pull as positive, push as negative numbers.
+        let mut values = [R::zero(); CHUNK];
+        for ((&height, signed), slope) in heights.iter().zip(&mut values).zip(slopes) {
+            let (value, scaled) = sides.value_and_slope(height);
+            *signed = height.if_negative(-value, value);
             *slope = scaled;
         }
-        sum_row(&pull, len).add_to(pull_sum);
-        sum_row(&push, len).add_to(push_sum);
+        let (mut above, mut below) = ([R::zero(); SUMS], [R::zero(); SUMS]);
+        let (whole, rest) = values[..len].as_chunks::<SUMS>();
+        for numbers in whole {
+            for k in 0..SUMS {
+                above[k] = above[k] + numbers[k].at_least(R::zero());
+                below[k] = below[k] + numbers[k].at_most(R::zero());
+            }
+        }
+        for (k, &number) in rest.iter().enumerate() {
+            above[k] = above[k] + number.at_least(R::zero());
+            below[k] = below[k] + number.at_most(R::zero());
+        }
+        fold(above).add_to(pull);
+        (-fold(below)).add_to(push);
     }
 }
 
@@ -152,12 +179,12 @@ impl Quantity for GroundLoss {
     }
 
     fn backward<R: Real>(&self, scene: &Scene<R>, heights: &Vec<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        let shares = self.shares(scene.template, d_out);
+        let sides = Sides::new(self, self.shares(scene.template, d_out));
         let mut d_heights = vec![R::zero(); heights.len()];
         let mut row = [R::zero(); CHUNK];
         for place in self.points.places(scene.template) {
             place.read(heights, &mut row);
-            R::apart::<Slopes, _>((self, shares, &mut row));
+            R::apart::<Slopes, _>((&sides, &mut row));
             place.hand_back(&row, &mut d_heights);
         }
         scene.heights_backward(&d_heights, d_points);
@@ -167,13 +194,13 @@ impl Quantity for GroundLoss {
 /// From heights to the slopes of both curves.
 struct Slopes;
 
-impl<R: Real> Room<(&GroundLoss, [R; 2], &mut Row<R>)> for Slopes {
+impl<R: Real> Room<(&Sides<R>, &mut Row<R>)> for Slopes {
     type Output = ();
 
     #[inline(always)]
-    fn enter((of, shares, row): (&GroundLoss, [R; 2], &mut Row<R>)) {
+    fn enter((sides, row): (&Sides<R>, &mut Row<R>)) {
         for height in row {
-            *height = of.value_and_slope(*height, shares).1;
+            *height = sides.value_and_slope(*height).1;
         }
     }
 }

@@ -41,8 +41,7 @@ impl Quantity for StabilityLoss {
         let (centre, cop, heights) = saved;
         let d_centre = scale(d_out[0].widen(), distance_on_ground(scene, centre, cop).1);
         self.method.backward(scene, centre, d_centre, d_points);
-        let mut d_heights = vec![R::zero(); heights.len()];
-        cop.backward(scene, heights, scale(R::Wide::of(-1.0), d_centre), &mut d_heights, d_points);
-        scene.heights_backward(&d_heights, d_points);
+        let d_heights = vec![R::zero(); heights.len()];
+        cop.backward(scene, heights, scale(R::Wide::of(-1.0), d_centre), d_heights, d_points);
     }
 }

@@ -79,8 +79,7 @@ impl Quantity for StabilityTerms {
         let shares = self.ground.shares(scene.template, &d_out[1..]);
         let (centre, cop, heights) = self.look(scene, out, Some((shares, &mut d_heights)));
         let d_centre = scale(d_out[0].widen(), distance_on_ground(scene, &centre, &cop).1);
-        cop.backward(scene, &heights, scale(R::Wide::of(-1.0), d_centre), &mut d_heights, d_points);
-        scene.heights_backward(&d_heights, d_points);
+        cop.backward(scene, &heights, scale(R::Wide::of(-1.0), d_centre), d_heights, d_points);
         self.stability.method.backward(scene, &centre, d_centre, d_points);
     }
 }

@@ -50,19 +50,30 @@ fn split<T: Format>(x: T) -> (T, T) {
     (rounded.low_bits_as_power(), series * f)
 }
 
+/// The nearest integer, halves to even.
+#[inline(always)]
+pub(super) fn nearest<T: Format>(x: T) -> T {
+    (x + T::of(T::ROUNDER)) - T::of(T::ROUNDER)
+}
+
 #[inline(always)]
 pub(super) fn exp2<T: Format>(x: T) -> T {
     let (power, fraction) = split(x.at_least(T::of(T::EXPONENTS.0)).at_most(T::of(T::EXPONENTS.1)));
     power.mul_add(fraction, power)
 }
 
-/// tanh x = −m / (2 + m) with m = e^(−2|x|) − 1, which keeps its relative accuracy down to x = 0.
+/// tanh x = −m / (2 + m) with m = e^(−2x) − 1 for x ≥ 0, which keeps its relative accuracy down to x = 0.
 #[inline(always)]
-pub(super) fn tanh<T: Format>(x: T) -> T {
-    let exponent = x.abs() * T::of(-2.0 * std::f64::consts::LOG2_E);
+pub(super) fn tanh_of_positive<T: Format>(x: T) -> T {
+    let exponent = x * T::of(-2.0 * std::f64::consts::LOG2_E);
     let (power, fraction) = split(exponent.at_least(T::of(T::EXPONENTS.0)));
     let m = power.mul_add(fraction, power - T::of(1.0));
-    let t = -m / (T::of(2.0) + m);
+    -m / (T::of(2.0) + m)
+}
+
+#[inline(always)]
+pub(super) fn tanh<T: Format>(x: T) -> T {
+    let t = tanh_of_positive(x.abs());
     x.if_negative(-t, t)
 }
 

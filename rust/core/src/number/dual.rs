@@ -91,6 +91,9 @@ impl Real for Dual {
         let t = Real::tanh(self.value);
         Dual::new(t, (1.0 - t * t) * self.slope)
     }
+    fn nearest(self) -> Self {
+        Dual::of(self.value.nearest())
+    }
     fn widen(self) -> Self {
         self
     }

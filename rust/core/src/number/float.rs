@@ -48,6 +48,14 @@ macro_rules! float {
                 curves::tanh(self)
             }
             #[inline(always)]
+            fn tanh_of_positive(self) -> Self {
+                curves::tanh_of_positive(self)
+            }
+            #[inline(always)]
+            fn nearest(self) -> Self {
+                curves::nearest(self)
+            }
+            #[inline(always)]
             fn widen(self) -> f64 {
                 self as f64
             }

@@ -83,6 +83,14 @@ macro_rules! fused {
                 curves::tanh(self)
             }
             #[inline(always)]
+            fn tanh_of_positive(self) -> Self {
+                curves::tanh_of_positive(self)
+            }
+            #[inline(always)]
+            fn nearest(self) -> Self {
+                curves::nearest(self)
+            }
+            #[inline(always)]
             fn widen(self) -> Fused<f64> {
                 Fused(self.0 as f64)
             }

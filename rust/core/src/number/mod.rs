@@ -72,6 +72,13 @@ pub trait Real:
     /// 2^self, relative error of a few ulp, within the type's normal range (no underflow to 0, no infinity).
     fn exp2(self) -> Self;
     fn tanh(self) -> Self;
+    /// tanh where self is known not to be negative.
+    #[inline(always)]
+    fn tanh_of_positive(self) -> Self {
+        self.tanh()
+    }
+    /// The nearest integer, with slope zero; |self| below 2^22 (2^51 in double precision).
+    fn nearest(self) -> Self;
     fn widen(self) -> Self::Wide;
     fn narrow(wide: Self::Wide) -> Self;
     /// Enters `F` in a function of its own that may use the CPU's instructions for this number. Gates inline all that they
@@ -110,14 +117,12 @@ pub trait Real:
         (self * Self::of(std::f64::consts::LOG2_E)).exp2()
     }
 
-    /// Rows of numbers, one row a lane and all of one length, as one row of lanes, each less its lane's `origin[k % 3]`.
-    #[inline(always)]
+    /// Rows of numbers, one row a lane and all as long as `out`, as one row of lanes, each less its lane's `origin[k % 3]`.
     fn read_rows(rows: &[&[Self::Data]], origin: &[[Self::Data; 3]], out: &mut [Self]) {
         lanes::read_rows_one_by_one(rows, origin, out);
     }
 
     /// The way back: lane l of every number to `rows[l]`.
-    #[inline(always)]
     fn write_rows(numbers: &[Self], rows: &mut [&mut [Self::Data]]) {
         lanes::write_rows_one_by_one(numbers, rows);
     }

@@ -1,6 +1,6 @@
 //! What lane types are made of on every CPU: registers of one or two parts, with an intrinsic for each operation.
 //!
-//! A CPU's own file ([`super`]'s `simd` and `neon`) names its intrinsics, and these macros write its types. Their
+//! A CPU's own file (`simd`, `neon`) names its intrinsics, and these macros write its types. Their
 //! operations may run only behind a gate ([`super::gate`]) of their CPU level, which the gate has made sure of: that is the
 //! SAFETY of every `unsafe` in these files. The crossings between single and double precision are kept out of line, so
 //! that sums in double precision do not take registers from the loops around them.
@@ -118,6 +118,14 @@ macro_rules! arithmetic {
             curves::tanh(self)
         }
         #[inline(always)]
+        fn tanh_of_positive(self) -> Self {
+            curves::tanh_of_positive(self)
+        }
+        #[inline(always)]
+        fn nearest(self) -> Self {
+            curves::nearest(self)
+        }
+        #[inline(always)]
         fn lane(self, lane: usize) -> Fused<$float> {
             Fused(self.array()[lane])
         }
@@ -231,7 +239,9 @@ pub(super) fn write_squares<S: Square, const N: usize>(numbers: &[S], rows: &mut
     let whole = numbers.len() / N * N;
     for start in (0..whole).step_by(N) {
         let mut block = [S::zero(); N];
-        block.copy_from_slice(&numbers[start..start + N]);
+        for (i, number) in block.iter_mut().enumerate() {
+            *number = numbers[start + i];
+        }
         S::turn(&mut block);
         for (number, row) in block.iter().zip(rows.iter_mut()) {
             // start + N ≤ numbers.len() = row.len()

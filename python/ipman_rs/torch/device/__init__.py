@@ -1,0 +1,56 @@
+"""The path of tensors on GPUs and other devices, where it is tuned: the terms that a trainer needs every step.
+
+No host synchronisation, no loop over bodies or parts, static shapes, sums in a fixed order; a first derivative by hand.
+On CUDA with Triton installed the terms run in Triton kernels, elsewhere in a fixed chain of torch operations. Every
+other quantity takes the formulas in `reference`, as do forward mode, torch.func transforms and second derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor
+from torch._C._functorch import is_functorch_wrapped_tensor
+
+from .derivatives import Terms, WeightedTerms
+
+if TYPE_CHECKING:
+    from ipman_rs import BodyTemplate
+
+PREFIX = "terms.stability.pcom.samples."
+
+
+def covers(quantity: str, vertices: Tensor) -> bool:
+    """Whether the tuned path computes this quantity of these vertices."""
+    if not quantity.startswith(PREFIX):
+        return False
+    if torch.compiler.is_compiling():
+        return True
+    return not is_functorch_wrapped_tensor(vertices) and torch.autograd.forward_ad._current_level < 0
+
+
+def values(
+    template: BodyTemplate, quantity: str, options: Sequence[float], vertices: Tensor, normal: Tensor, height: Tensor
+) -> Tensor:
+    """The terms (B, 3), each differentiable in vertices (B, V, 3); normal (B, 3) and height (B,) anywhere."""
+    plane = normal.to(vertices.device), height.to(vertices.device)
+    return Terms.apply(vertices, *plane, template, quantity.removeprefix(PREFIX), tuple(options))
+
+
+def weighted(
+    template: BodyTemplate,
+    quantity: str,
+    options: Sequence[float],
+    vertices: Tensor,
+    normal: Tensor,
+    height: Tensor,
+    weights: Tensor,
+) -> tuple[Tensor, Tensor]:
+    """Σ_k weights (B, 3) · terms (B,), differentiable, and the terms (B, 3), detached."""
+    plane = normal.to(vertices.device), height.to(vertices.device)
+    totals, terms = WeightedTerms.apply(
+        vertices, *plane, weights, template, quantity.removeprefix(PREFIX), tuple(options)
+    )
+    return totals, terms

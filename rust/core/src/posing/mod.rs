@@ -1,0 +1,321 @@
+//! Many posed bodies of one model, over threads. A few bodies at a time share each pass over the model's tables; the
+//! bits of a body depend neither on the number of threads nor on its neighbours.
+
+mod passes;
+
+use crate::error::{Error, Result};
+use crate::number::{Dual, Real, Scalar};
+use crate::skinning::blend::Tile;
+use crate::skinning::rotation::Form;
+use crate::skinning::{Body, Gradient, Parameters, Skin, Start, Wanted};
+use crate::threads::{self, num_threads};
+use passes::{Backward, Forward, wide};
+use std::mem::take;
+use std::ops::Range;
+
+/// Vertices a tile: one to four vector registers, by the machine.
+pub const TILE: usize = 16;
+/// Bodies that share a pass over the model's tables.
+const GROUP: usize = 8;
+
+/// One row of `width` numbers a body, or a single one that all bodies share; of width 0 where nothing is given.
+#[derive(Clone, Copy)]
+pub struct Rows<'a, T> {
+    pub numbers: &'a [T],
+    pub width: usize,
+    pub shared: bool,
+}
+
+impl<'a, T> Rows<'a, T> {
+    fn of(&self, body: usize) -> &'a [T] {
+        let start = if self.shared { 0 } else { body * self.width };
+        &self.numbers[start..start + self.width]
+    }
+}
+
+/// The parameters of all bodies, or a direction in their space.
+#[derive(Clone, Copy)]
+pub struct Bodies<'a, T> {
+    pub pose: Rows<'a, T>,       // J·3 axis-angle or J·6
+    pub betas: Rows<'a, T>,      // up to B
+    pub expression: Rows<'a, T>, // up to E
+    pub transl: Rows<'a, T>,     // 3 or none
+}
+
+/// The gradient by the posed bodies; an empty array counts as zeros.
+#[derive(Clone, Copy)]
+pub struct Upstream<'a, T> {
+    pub vertices: &'a [T], // (B, V, 3)
+    pub joints: &'a [T],   // (B, J, 3)
+}
+
+/// Gradients by pose, betas, expression and translation, one row a body; an empty one is not asked for.
+pub type Gradients<'a, T> = [&'a mut [T]; 4];
+
+/// Bodies of one model in their poses.
+pub struct Posing<'a, T> {
+    skin: &'a Skin<T, TILE>,
+    num_bodies: usize,
+    form: Form,
+    bodies: Bodies<'a, T>,
+    /// Betas and expressions that are not zero in every body: those after them cost nothing.
+    used: [usize; 2],
+    /// Asked now and then from the calling thread; true gives up with [`Error::Interrupted`].
+    interrupted: &'a (dyn Fn() -> bool + Sync + 'a),
+}
+
+impl<'a, T: Scalar> Posing<'a, T> {
+    pub fn new(
+        skin: &'a Skin<T, TILE>,
+        num_bodies: usize,
+        bodies: Bodies<'a, T>,
+        interrupted: &'a (dyn Fn() -> bool + Sync + 'a),
+    ) -> Result<Self> {
+        check_rows(skin, num_bodies, &bodies)?;
+        let form = Form::of_width(bodies.pose.width / skin.num_joints()).expect("checked");
+        let used = [bodies.betas, bodies.expression].map(used);
+        Ok(Posing { skin, num_bodies, form, bodies, used, interrupted })
+    }
+
+    /// Vertices (B, V, 3) and joints (B, J, 3).
+    pub fn forward(&self, vertices: &mut [T], joints: &mut [T]) -> Result<()> {
+        let shaped = self.shaped();
+        self.write(self.start(&shaped), |body| self.parameters(body), |x| x, vertices, joints)
+    }
+
+    /// Their derivatives along a direction.
+    pub fn jvp(&self, along: &Bodies<T>, vertices: &mut [T], joints: &mut [T]) -> Result<()> {
+        self.check_direction(along)?;
+        let slope = |x: Dual| if x.slope.is_finite() { T::of(x.slope) } else { T::zero() };
+        self.write(self.skin.start(), |body| self.dual(body, along), slope, vertices, joints)
+    }
+
+    /// The gradient of Σ d_vertices · vertices + Σ d_joints · joints.
+    pub fn vjp(&self, upstream: Upstream<T>, gradients: Gradients<T>) -> Result<()> {
+        let shaped = self.shaped();
+        self.pull(self.start(&shaped), |body| self.parameters(body), |x| x, |x| x, upstream, gradients)
+    }
+
+    /// The derivative of that gradient along a direction.
+    pub fn vjp_jvp(&self, upstream: Upstream<T>, along: &Bodies<T>, gradients: Gradients<T>) -> Result<()> {
+        self.check_direction(along)?;
+        let parameters = |body| self.dual(body, along);
+        self.pull(self.skin.start(), parameters, |x| Dual::of(x.value()), |x| T::of(x.slope), upstream, gradients)
+    }
+
+    fn write<R: Scalar>(
+        &self,
+        start: Start<T, TILE>,
+        parameters: impl Fn(usize) -> Parameters<R> + Sync,
+        number: impl Fn(R) -> T + Copy + Sync,
+        mut vertices: &mut [T],
+        mut joints: &mut [T],
+    ) -> Result<()> {
+        let (points, count) = (3 * self.skin.num_vertices, 3 * self.skin.num_joints());
+        check("vertices", vertices.len(), self.num_bodies * points)?;
+        check("joints", joints.len(), self.num_bodies * count)?;
+        let groups = self.groups(|bodies| {
+            let n = bodies.len();
+            (bodies, front(&mut vertices, n * points), front(&mut joints, n * count))
+        });
+        self.run(groups, |(bodies, vertices, joints)| {
+            let bodies: Vec<_> = bodies.map(|body| self.skin.place(parameters(body))).collect();
+            let places = bodies.iter().flat_map(Body::joints).flatten();
+            joints.iter_mut().zip(places).for_each(|(out, x)| *out = number(x));
+            wide(Forward { skin: self.skin, start, bodies: &bodies, vertices, number });
+        })
+    }
+
+    fn pull<R: Scalar>(
+        &self,
+        start: Start<T, TILE>,
+        parameters: impl Fn(usize) -> Parameters<R> + Sync,
+        constant: impl Fn(T) -> R + Copy + Sync,
+        number: impl Fn(R) -> T + Copy + Sync,
+        upstream: Upstream<T>,
+        gradients: Gradients<T>,
+    ) -> Result<()> {
+        let (points, count) = (3 * self.skin.num_vertices, 3 * self.skin.num_joints());
+        for (name, d, row) in [("d_vertices", upstream.vertices, points), ("d_joints", upstream.joints, count)] {
+            check(name, d.len(), if d.is_empty() { 0 } else { self.num_bodies * row })?;
+        }
+        let widths = self.gradient_widths(&gradients)?;
+        let wanted = Wanted { pose: widths[0] > 0, betas: widths[1], expression: widths[2] };
+        let mut gradients = gradients;
+        let groups = self.groups(|bodies| {
+            let gradients = fronts(&mut gradients, widths.map(|width| bodies.len() * width));
+            (bodies, gradients)
+        });
+        self.run(groups, |(range, mut gradients)| {
+            let bodies: Vec<_> = range.clone().map(|body| self.skin.place(parameters(body))).collect();
+            let mut sums: Vec<_> = bodies.iter().map(|_| self.skin.sums(wanted)).collect();
+            let d_vertices = rows(upstream.vertices, range.clone(), points);
+            if !d_vertices.is_empty() {
+                wide(Backward { skin: self.skin, start, bodies: &bodies, d_vertices, constant, sums: &mut sums });
+            }
+            for ((i, body), sums) in range.zip(&bodies).zip(&sums) {
+                let (d_vertices, d_joints) =
+                    (rows(upstream.vertices, i..i + 1, points), rows(upstream.joints, i..i + 1, count));
+                let constants: Vec<R> = d_joints.iter().map(|&x| constant(x)).collect();
+                let gradient = self.skin.gradient(body, sums, &constants);
+                let outs = fronts(&mut gradients, widths);
+                let finite = || all_finite(d_vertices) && all_finite(d_joints);
+                hand_out(body, &gradient, outs, number, finite);
+            }
+        })
+    }
+
+    /// A direction has the shape of the parameters, as far as it is given.
+    fn check_direction(&self, along: &Bodies<T>) -> Result<()> {
+        let bodies = &self.bodies;
+        let pairs = [
+            ("along_pose", bodies.pose, along.pose),
+            ("along_betas", bodies.betas, along.betas),
+            ("along_expression", bodies.expression, along.expression),
+            ("along_transl", bodies.transl, along.transl),
+        ];
+        for (name, values, slopes) in pairs {
+            check(name, slopes.width, slopes.width.min(1) * values.width)?;
+            check(name, slopes.numbers.len(), slopes.width * if slopes.shared { 1 } else { self.num_bodies })?;
+        }
+        Ok(())
+    }
+
+    /// Numbers a body in each of the gradients.
+    fn gradient_widths(&self, gradients: &Gradients<T>) -> Result<[usize; 4]> {
+        let given = [self.bodies.pose.width, self.skin.num_betas(), self.skin.num_expressions(), 3];
+        let names = ["d_pose", "d_betas", "d_expression", "d_transl"];
+        let mut widths = [0; 4];
+        for (k, numbers) in gradients.iter().enumerate() {
+            let width = numbers.len() / self.num_bodies.max(1);
+            check(names[k], numbers.len(), width.min(given[k]) * self.num_bodies)?;
+            widths[k] = width;
+        }
+        Ok(widths)
+    }
+
+    fn parameters(&self, body: usize) -> Parameters<T> {
+        let [betas, expression] = self.used;
+        Parameters {
+            form: self.form,
+            pose: self.bodies.pose.of(body).to_vec(),
+            betas: self.bodies.betas.of(body)[..betas].to_vec(),
+            expression: self.bodies.expression.of(body)[..expression].to_vec(),
+            transl: triple(self.bodies.transl.of(body)),
+        }
+    }
+
+    /// One body's parameters as dual numbers; what is not given, or has no direction, does not move.
+    fn dual(&self, body: usize, along: &Bodies<T>) -> Parameters<Dual> {
+        let pairs = |values: Rows<T>, slopes: Rows<T>| -> Vec<Dual> {
+            let (values, slopes) = (values.of(body), slopes.of(body));
+            let at = |numbers: &[T], k: usize| numbers.get(k).map_or(0.0, |x| x.value());
+            (0..values.len().max(slopes.len())).map(|k| Dual::new(at(values, k), at(slopes, k))).collect()
+        };
+        Parameters {
+            form: self.form,
+            pose: pairs(self.bodies.pose, along.pose),
+            betas: pairs(self.bodies.betas, along.betas),
+            expression: pairs(self.bodies.expression, along.expression),
+            transl: triple(&pairs(self.bodies.transl, along.transl)),
+        }
+    }
+
+    /// The resting body of the one shape that several bodies share.
+    fn shaped(&self) -> Option<Vec<Tile<T, TILE>>> {
+        let [betas, expression] = [(self.bodies.betas, self.used[0]), (self.bodies.expression, self.used[1])];
+        let alike = |(rows, used): (Rows<T>, usize)| rows.shared || used == 0;
+        let pays = self.num_bodies > 1 && betas.1 + expression.1 > 0 && alike(betas) && alike(expression);
+        pays.then(|| self.skin.shaped(&betas.0.of(0)[..betas.1], &expression.0.of(0)[..expression.1]))
+    }
+
+    fn start<'s>(&'s self, shaped: &'s Option<Vec<Tile<T, TILE>>>) -> Start<'s, T, TILE> {
+        shaped.as_ref().map_or(self.skin.start(), |tiles| Start { tiles, shaped: true })
+    }
+
+    /// The bodies in groups, each with its share of the outputs.
+    fn groups<P>(&self, mut share: impl FnMut(Range<usize>) -> P) -> Vec<P> {
+        let size = self.num_bodies.div_ceil(num_threads()).clamp(1, GROUP);
+        let starts = (0..self.num_bodies).step_by(size);
+        starts.map(|start| share(start..(start + size).min(self.num_bodies))).collect()
+    }
+
+    fn run<P: Send>(&self, groups: Vec<P>, work: impl Fn(P) + Sync) -> Result<()> {
+        threads::each(groups, true, self.interrupted, &work)
+    }
+}
+
+/// Writes one body's gradient: zero for a body that is not finite, unless the upstream gradient is to blame.
+fn hand_out<R: Scalar, T: Scalar>(
+    body: &Body<R>,
+    gradient: &Gradient<R>,
+    outs: Gradients<T>,
+    number: impl Fn(R) -> T,
+    finite_upstream: impl Fn() -> bool,
+) {
+    let parts = [&gradient.pose[..], &gradient.betas, &gradient.expression, &gradient.transl];
+    let good = all_finite(&body.shift) && parts.iter().all(|part| all_finite(part));
+    let good = good || !finite_upstream();
+    for (out, part) in outs.into_iter().zip(parts) {
+        for (out, &d) in out.iter_mut().zip(part) {
+            *out = if good { number(d) } else { T::zero() };
+        }
+    }
+}
+
+fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
+    numbers.iter().all(|x| x.value().is_finite())
+}
+
+/// How many leading columns have a number other than zero.
+fn used<T: Scalar>(rows: Rows<T>) -> usize {
+    let last = |row: &[T]| row.iter().rposition(|x| x.value() != 0.0).map_or(0, |last| last + 1);
+    rows.numbers.chunks_exact(rows.width.max(1)).map(last).max().unwrap_or(0)
+}
+
+fn triple<R: Real>(numbers: &[R]) -> [R; 3] {
+    std::array::from_fn(|axis| numbers.get(axis).copied().unwrap_or(R::zero()))
+}
+
+/// The rows of some bodies, if there are any.
+fn rows<T>(numbers: &[T], bodies: Range<usize>, row: usize) -> &[T] {
+    numbers.get(bodies.start * row..bodies.end * row).unwrap_or_default()
+}
+
+/// Cuts off the first n.
+fn front<'a, T>(rest: &mut &'a mut [T], n: usize) -> &'a mut [T] {
+    let (front, back) = take(rest).split_at_mut(n);
+    *rest = back;
+    front
+}
+
+fn fronts<'a, T>(rest: &mut Gradients<'a, T>, sizes: [usize; 4]) -> Gradients<'a, T> {
+    std::array::from_fn(|k| front(&mut rest[k], sizes[k]))
+}
+
+fn check(name: &'static str, got: usize, expected: usize) -> Result<()> {
+    match got == expected {
+        true => Ok(()),
+        false => Err(Error::Argument { name, expected: format!("{expected} numbers"), got: got.to_string() }),
+    }
+}
+
+fn check_rows<T: Scalar>(skin: &Skin<T, TILE>, num_bodies: usize, bodies: &Bodies<T>) -> Result<()> {
+    let joints = skin.num_joints();
+    let form = Form::of_width(bodies.pose.width / joints);
+    if form.is_none() || !bodies.pose.width.is_multiple_of(joints) {
+        let expected = format!("{joints} joints of 3 or 6 numbers");
+        return Err(Error::Argument { name: "pose", expected, got: format!("{} numbers", bodies.pose.width) });
+    }
+    let rows = [
+        ("pose", bodies.pose, bodies.pose.width),
+        ("betas", bodies.betas, bodies.betas.width.min(skin.num_betas())),
+        ("expression", bodies.expression, bodies.expression.width.min(skin.num_expressions())),
+        ("transl", bodies.transl, if bodies.transl.width == 0 { 0 } else { 3 }),
+    ];
+    for (name, rows, width) in rows {
+        check(name, rows.width, width)?;
+        check(name, rows.numbers.len(), width * if rows.shared { 1 } else { num_bodies })?;
+    }
+    Ok(())
+}
