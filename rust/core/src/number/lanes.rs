@@ -29,26 +29,13 @@ mod tests {
     use crate::number::Fused;
     use crate::number::gate::{Gates, Level, Work};
 
-    const NUMBERS: [f32; 18] = [
-        0.0,
-        -0.0,
-        1.0,
-        -1.0,
-        0.1,
-        -0.3,
-        3.5,
-        -2.5,
-        1e-3,
-        7e8,
-        -9e-9,
-        1e20,
-        -1e30,
-        1e-40,
-        f32::MAX,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::NAN,
-    ];
+    const NUMBERS: [f32; 18] = {
+        let [subnormal, largest, infinity, nan] = [1e-40, f32::MAX, f32::INFINITY, f32::NAN];
+        [
+            0.0, -0.0, 1.0, -1.0, 0.1, -0.3, 3.5, -2.5, 1e-3, 7e8, 1e20, -1e30, -9e-9, subnormal, largest, infinity,
+            -infinity, nan,
+        ]
+    };
 
     /// Every operation on every three of the numbers, as many at a time as there are lanes.
     struct Operations;
