@@ -17,7 +17,7 @@ def number(name: str, value: float) -> float:
     """A finite real number, as a float."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise TypeError(f"{name}: expected a number, got {value!r}")
-    if not math.isfinite(value):
+    if not -math.inf < value < math.inf:  # math.isfinite would stop torch.compile
         raise ValueError(f"{name}: expected a finite number, got {value!r}")
     return float(value)
 

@@ -1,23 +1,23 @@
 //! One bench a room: the value and its gradient in one pass, over a body of SMPL's size, float32 and float64, one body
 //! and 64, on one thread.
 //!
-//! `cargo bench` runs all, `cargo bench -- volume` one room; `IPMAN_SIMD=scalar|avx2|avx512` chooses the lanes.
+//! `cargo bench` runs all, `cargo bench -- volume` one room; `IPMAN_SIMD=scalar|avx2|avx512|neon` chooses the lanes.
 //! `python -m benchmarks.widths` compares the lanes room by room.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use ipman::Template;
-use ipman::batch::{Batch, set_num_threads};
 use ipman::losses::balance::{BalanceCost, Wrap};
 use ipman::losses::ground::{GroundLoss, Tanh};
 use ipman::losses::stability::StabilityLoss;
 use ipman::losses::terms::StabilityTerms;
 use ipman::mass::{CenterOfMass, Method};
-use ipman::number::Scalar;
+use ipman::number::Data;
 use ipman::pressure::{CenterOfPressure, Pressure, PressureCurve};
 use ipman::quantity::Quantity;
 use ipman::sampling::{Points, SampleSurface};
 use ipman::support::{Contact, ContactRule, SupportMargin};
+use ipman::threads::set_num_threads;
 use ipman::volume::{MassProperties, PartVolumes};
+use ipman::{Batch, Template};
 use std::hint::black_box;
 use std::time::Duration;
 
@@ -60,7 +60,7 @@ fn body() -> (Template, Vec<Vec3>) {
 }
 
 /// `count` bodies, each leaning a little more than the one before.
-fn leaning<T: Scalar>(vertices: &[Vec3], count: usize) -> Vec<T> {
+fn leaning<T: Data>(vertices: &[Vec3], count: usize) -> Vec<T> {
     let lean = |body: usize, v: &Vec3| [v[0] + 0.002 * body as f64 * v[1], v[1], v[2]];
     (0..count).flat_map(|body| vertices.iter().flat_map(move |v| lean(body, v))).map(T::of).collect()
 }
@@ -79,13 +79,13 @@ fn room<Q: Quantity>(criterion: &mut Criterion, name: &str, quantity: &Q) {
     group.finish();
 }
 
-fn once<T: Scalar, Q: Quantity>(template: &Template, quantity: &Q, vertices: &[T], count: usize) {
+fn once<T: Data, Q: Quantity>(template: &Template, quantity: &Q, vertices: &[T], count: usize) {
     let d_out = vec![T::of(1.0); count * quantity.len(template)];
     let done = batch(template, vertices, count).value_and_vjp(quantity, &d_out);
     let _ = black_box(done.expect("finite bodies"));
 }
 
-fn batch<'a, T: Scalar>(template: &'a Template, vertices: &'a [T], count: usize) -> Batch<'a, T> {
+fn batch<'a, T: Data>(template: &'a Template, vertices: &'a [T], count: usize) -> Batch<'a, T> {
     let normals = [0.0, 1.0, 0.0].repeat(count);
     Batch::new(template, vertices, &normals, &vec![0.0; count], &|| false).expect("as long as the template says")
 }

@@ -80,7 +80,7 @@ impl<R: Real> Room<(Method, &Scene<'_, R>, &Centre<R>, Vec3<R::Wide>, &mut [Vec3
     #[inline(always)]
     fn enter(
         (method, scene, centre, d_centre, d_points): (Method, &Scene<R>, &Centre<R>, Vec3<R::Wide>, &mut [Vec3<R>]),
-    ) -> () {
+    ) {
         match method {
             Method::Pcom => pcom_backward(scene, centre, d_centre, d_points),
             Method::VertexMean => vertex_mean_backward(scene, d_centre, d_points),
@@ -100,10 +100,17 @@ pub struct Centre<R: Real> {
     parts: Option<Parts<R>>,
 }
 
-/// The parts' volumes, and of each the absolute value, its sign, and the sum of its samples.
 struct Parts<R: Real> {
     signed: SignedVolumes<R>,
-    of_parts: Vec<(R::Wide, R::Wide, Vec3<R::Wide>)>,
+    of_parts: Vec<Part<R>>,
+}
+
+struct Part<R: Real> {
+    /// The absolute value of the signed volume, and the sign.
+    volume: R::Wide,
+    sign: R::Wide,
+    /// Of the part's samples.
+    sum: Vec3<R::Wide>,
 }
 
 impl<R: Real> Centre<R> {
@@ -124,7 +131,7 @@ fn pcom<R: Real>(scene: &Scene<R>) -> Centre<R> {
         let sum = row.forward(scene.points);
         total = volume.mul_add(R::Wide::of(row.count as f64), total);
         add_scaled(&mut moment, volume, sum);
-        of_parts.push((volume, sign, sum));
+        of_parts.push(Part { volume, sign, sum });
     }
     Centre { parts: Some(Parts { signed, of_parts }), ..Centre::plain(moment, total) }
 }
@@ -135,7 +142,7 @@ fn pcom_backward<R: Real>(scene: &Scene<R>, centre: &Centre<R>, d_centre: Vec3<R
     let Some(Parts { signed, of_parts }) = &centre.parts else { unreachable!("pcom keeps its parts") };
     let d_moment = [d_centre[0] / centre.total, d_centre[1] / centre.total, d_centre[2] / centre.total];
     let mut d_volumes = Vec::with_capacity(of_parts.len());
-    for (row, &(volume, sign, sum)) in scene.template.samples.part_sums.iter().zip(of_parts) {
+    for (row, &Part { volume, sign, sum }) in scene.template.samples.part_sums.iter().zip(of_parts) {
         let arm = sub(sum, scale(R::Wide::of(row.count as f64), centre.point));
         d_volumes.push(sign * dot(d_moment, arm));
         row.backward(scale(volume, d_moment), d_points);

@@ -260,7 +260,7 @@ impl<R: Real, const N: usize> Room<(&Walk, &Chunk, &[R], &mut Row<R>)> for Inter
     type Output = ();
 
     #[inline(always)]
-    fn enter((walk, chunk, vertices, row): (&Walk, &Chunk, &[R], &mut Row<R>)) -> () {
+    fn enter((walk, chunk, vertices, row): (&Walk, &Chunk, &[R], &mut Row<R>)) {
         let weights = walk.weights.of_samples::<R, N>(chunk);
         let rows = row.as_chunks_mut::<N>().0;
         for ((&[a, b, c], weights), row) in walk.corners[chunk.groups.clone()].iter().zip(weights).zip(rows) {
@@ -280,7 +280,7 @@ impl<R: Real, const N: usize> Room<(&Walk, &Chunk, &Row<R>, &mut [R])> for Scatt
     type Output = ();
 
     #[inline(always)]
-    fn enter((walk, chunk, row, vertices): (&Walk, &Chunk, &Row<R>, &mut [R])) -> () {
+    fn enter((walk, chunk, row, vertices): (&Walk, &Chunk, &Row<R>, &mut [R])) {
         let weights = walk.weights.of_samples::<R, N>(chunk);
         let rows = row.as_chunks::<N>().0;
         for ((&[a, b, c], weights), row) in walk.corners[chunk.groups.clone()].iter().zip(weights).zip(rows) {

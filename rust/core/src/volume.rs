@@ -67,7 +67,7 @@ impl<R: Real> Room<(&SignedVolumes<R>, &Closing, &[R::Wide], &mut [Vec3<R>])> fo
     type Output = ();
 
     #[inline(always)]
-    fn enter((signed, closing, d_volumes, d_points): (&SignedVolumes<R>, &Closing, &[R::Wide], &mut [Vec3<R>])) -> () {
+    fn enter((signed, closing, d_volumes, d_points): (&SignedVolumes<R>, &Closing, &[R::Wide], &mut [Vec3<R>])) {
         let mut all_doubled = signed.doubled.iter();
         for (rings, &d_volume) in closing.rings.iter().zip(d_volumes) {
             let factor = R::narrow(d_volume * R::Wide::of(1.0 / 6.0));
@@ -229,9 +229,7 @@ impl<R: Real> Room<(&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>])> 
     type Output = ();
 
     #[inline(always)]
-    fn enter(
-        (closing, points, d_moments, d_points): (&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>]),
-    ) -> () {
+    fn enter((closing, points, d_moments, d_points): (&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>])) {
         let points = widen_all(points);
         let mut d_wide = vec![[R::Wide::zero(); 3]; points.len()];
         for (part, d_part) in closing.parts.iter().zip(d_moments) {

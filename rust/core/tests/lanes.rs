@@ -51,7 +51,7 @@ fn lanes_are_bodies() {
             for (body, vertices) in bodies.iter().enumerate() {
                 let size = values.len() / COUNT;
                 // The upstream gradient of the test follows the place in the batch.
-                if (body * size) % 5 != 0 {
+                if !(body * size).is_multiple_of(5) {
                     continue;
                 }
                 let alone = run(&template, level, vertices, &quantity);

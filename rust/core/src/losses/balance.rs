@@ -259,7 +259,7 @@ impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>, &Balance<R>, R, &mut [Vec3<R>])
     type Output = ();
 
     #[inline(always)]
-    fn enter((of, scene, saved, d_out, d_points): (&BalanceCost, &Scene<R>, &Balance<R>, R, &mut [Vec3<R>])) -> () {
+    fn enter((of, scene, saved, d_out, d_points): (&BalanceCost, &Scene<R>, &Balance<R>, R, &mut [Vec3<R>])) {
         {
             let Balance { centre, supports, lambda, cost } = saved;
             let d_cost = d_out.widen() * of.wrap.value_and_slope(*cost).1;

@@ -68,7 +68,8 @@ pub(super) fn tanh_of_positive<T: Format>(x: T) -> T {
     let exponent = x * T::of(-2.0 * std::f64::consts::LOG2_E);
     let (power, fraction) = split(exponent.at_least(T::of(T::EXPONENTS.0)));
     let m = power.mul_add(fraction, power - T::of(1.0));
-    -m / (T::of(2.0) + m)
+    // Not −m: of one number aarch64 compiles −(a·b + c) to (−a)·b − c, whose zero has the other sign than the lanes'.
+    m / (T::of(-2.0) - m)
 }
 
 #[inline(always)]

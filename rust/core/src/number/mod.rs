@@ -13,6 +13,9 @@ mod float;
 mod fused;
 pub mod gate;
 pub mod lanes;
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+#[macro_use]
+mod registers;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 #[cfg(target_arch = "x86_64")]

@@ -11,6 +11,7 @@ use crate::skinning::{Body, Skin, Start, Sums};
 /// same bits.
 pub(super) trait Work {
     /// Whether the 512-bit registers pay.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     const IN_AVX512: bool;
     fn run(self);
 }

@@ -1,0 +1,296 @@
+//! What lane types are made of on every CPU: registers of one or two parts, with an intrinsic for each operation.
+//!
+//! A CPU's own file (`simd`, `neon`) names its intrinsics, and these macros write its types. Their
+//! operations may run only behind a gate ([`super::gate`]) of their CPU level, which the gate has made sure of: that is the
+//! SAFETY of every `unsafe` in these files. The crossings between single and double precision are kept out of line, so
+//! that sums in double precision do not take registers from the loops around them.
+
+// What the macros' text names: their users take all of this file.
+pub(super) use super::curves::{self, Format};
+pub(super) use super::{Fused, Real, Room, Scalar};
+pub(super) use std::mem::MaybeUninit;
+pub(super) use std::ops::{Add, Div, Mul, Neg, Sub};
+
+macro_rules! operator {
+    ($name:ident, $intrinsics:ident, $trait:ident, $method:ident, $($part:tt)+) => {
+        impl $trait for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                $name($(unsafe { $intrinsics::$method(self.$part, other.$part) }),+)
+            }
+        }
+    };
+}
+
+/// A register for each part, whatever the part's number is.
+macro_rules! splat_part {
+    ($intrinsics:ident, $value:expr, $part:tt) => {
+        $intrinsics::splat($value)
+    };
+}
+
+/// A lane type of `$lanes` numbers `$float` in the registers `$part`.
+macro_rules! lanes {
+    ($name:ident: $lanes:literal x $float:ty, $register:ty, $intrinsics:ident, $($part:tt)+) => {
+        impl $name {
+            #[inline(always)]
+            fn array(self) -> [$float; $lanes] {
+                unsafe { std::mem::transmute(self) }
+            }
+        }
+
+        operator!($name, $intrinsics, Add, add, $($part)+);
+        operator!($name, $intrinsics, Sub, sub, $($part)+);
+        operator!($name, $intrinsics, Mul, mul, $($part)+);
+        operator!($name, $intrinsics, Div, div, $($part)+);
+
+        impl Neg for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                $name($(unsafe { $intrinsics::sub($intrinsics::splat(-0.0), self.$part) }),+)
+            }
+        }
+
+        impl Format for $name {
+            const ROUNDER: f64 = <$float as Format>::ROUNDER;
+            const EXPONENTS: (f64, f64) = <$float as Format>::EXPONENTS;
+            const POWERS: &'static [f64] = <$float as Format>::POWERS;
+            #[inline(always)]
+            fn low_bits_as_power(self) -> Self {
+                $name($(unsafe { $intrinsics::low_bits_as_power(self.$part) }),+)
+            }
+        }
+    };
+}
+
+/// The methods of `Real` that every lane type has.
+macro_rules! arithmetic {
+    ($name:ident: $lanes:literal x $float:ty, $intrinsics:ident, $($part:tt)+) => {
+        type Scalar = Fused<$float>;
+        type Data = $float;
+        const LANES: usize = $lanes;
+
+        #[inline(always)]
+        fn of(value: f64) -> Self {
+            $name($(unsafe { splat_part!($intrinsics, value as $float, $part) }),+)
+        }
+        #[inline(always)]
+        fn splat(number: $float) -> Self {
+            $name($(unsafe { splat_part!($intrinsics, number, $part) }),+)
+        }
+        #[inline(always)]
+        fn mul_add(self, factor: Self, term: Self) -> Self {
+            $name($(unsafe { $intrinsics::fmadd(self.$part, factor.$part, term.$part) }),+)
+        }
+        #[inline(always)]
+        fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+            $name($(unsafe { $intrinsics::fnmadd(self.$part, factor.$part, term.$part) }),+)
+        }
+        #[inline(always)]
+        fn if_negative(self, below: Self, otherwise: Self) -> Self {
+            $name($(unsafe { $intrinsics::if_negative(self.$part, below.$part, otherwise.$part) }),+)
+        }
+        // The instructions give their second operand where the first is NaN.
+        #[inline(always)]
+        fn at_least(self, floor: Self) -> Self {
+            $name($(unsafe { $intrinsics::max(floor.$part, self.$part) }),+)
+        }
+        #[inline(always)]
+        fn at_most(self, ceiling: Self) -> Self {
+            $name($(unsafe { $intrinsics::min(ceiling.$part, self.$part) }),+)
+        }
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            $name($(unsafe { $intrinsics::sqrt(self.$part) }),+)
+        }
+        #[inline(always)]
+        fn ln(self) -> Self {
+            let numbers = self.array();
+            Self::from_lanes(|lane| Fused(numbers[lane].ln()))
+        }
+        #[inline(always)]
+        fn exp2(self) -> Self {
+            curves::exp2(self)
+        }
+        #[inline(always)]
+        fn tanh(self) -> Self {
+            curves::tanh(self)
+        }
+        #[inline(always)]
+        fn tanh_of_positive(self) -> Self {
+            curves::tanh_of_positive(self)
+        }
+        #[inline(always)]
+        fn nearest(self) -> Self {
+            curves::nearest(self)
+        }
+        #[inline(always)]
+        fn lane(self, lane: usize) -> Fused<$float> {
+            Fused(self.array()[lane])
+        }
+        #[inline(always)]
+        fn from_lanes(mut lane: impl FnMut(usize) -> Fused<$float>) -> Self {
+            let mut numbers = [0.0; $lanes];
+            for (l, number) in numbers.iter_mut().enumerate() {
+                *number = lane(l).0;
+            }
+            unsafe { std::mem::transmute(numbers) }
+        }
+    };
+}
+
+macro_rules! double {
+    ($name:ident: $lanes:literal, $register:ty, $intrinsics:ident, $apart:ident) => {
+        #[derive(Clone, Copy)]
+        #[repr(C)]
+        pub struct $name($register, $register);
+        lanes!($name: $lanes x f64, $register, $intrinsics, 0 1);
+
+        impl Real for $name {
+            arithmetic!($name: $lanes x f64, $intrinsics, 0 1);
+            type Wide = Self;
+            #[inline(always)]
+            fn apart<F: Room<A>, A>(arguments: A) -> F::Output {
+                unsafe { $apart::<F, A>(arguments) }
+            }
+            #[inline(always)]
+            fn widen(self) -> Self {
+                self
+            }
+            #[inline(always)]
+            fn narrow(wide: Self) -> Self {
+                wide
+            }
+        }
+    };
+}
+
+macro_rules! single {
+    ($name:ident: $lanes:literal, $wide:ident, $register:ty, $intrinsics:ident, $apart:ident, $border:ident) => {
+        #[derive(Clone, Copy)]
+        #[repr(C)]
+        pub struct $name($register);
+        lanes!($name: $lanes x f32, $register, $intrinsics, 0);
+
+        impl Real for $name {
+            arithmetic!($name: $lanes x f32, $intrinsics, 0);
+            type Wide = $wide;
+            #[inline(always)]
+            fn apart<F: Room<A>, A>(arguments: A) -> F::Output {
+                unsafe { $apart::<F, A>(arguments) }
+            }
+            #[inline(always)]
+            fn widen(self) -> $wide {
+                unsafe { $border::widen(self) }
+            }
+            #[inline(always)]
+            fn narrow(wide: $wide) -> Self {
+                unsafe { $border::narrow(wide) }
+            }
+            #[inline(always)]
+            fn add_to(self, sum: &mut $wide) {
+                unsafe { $border::add_to(self, sum) }
+            }
+            #[inline(always)]
+            fn read_rows(rows: &[&[f32]], origin: &[[f32; 3]], out: &mut [MaybeUninit<Self>]) {
+                unsafe { $border::read_rows(rows, origin, out) }
+            }
+            #[inline(always)]
+            fn write_rows(numbers: &[Self], rows: &mut [&mut [f32]]) {
+                unsafe { $border::write_rows(numbers, rows) }
+            }
+        }
+    };
+}
+
+/// Blocks of bodies and numbers that are turned in registers.
+pub(super) trait Square: Real<Data = f32> {
+    unsafe fn load(from: *const f32) -> Self;
+    unsafe fn store(self, to: *mut f32);
+    /// Number i of body l becomes lane l of number i, and back.
+    fn turn(block: &mut [Self]);
+}
+
+#[inline(always)]
+pub(super) fn read_squares<S: Square, const N: usize>(
+    rows: &[&[f32]],
+    origin: &[[f32; 3]],
+    out: &mut [MaybeUninit<S>],
+) {
+    assert!(rows.len() == N && rows.iter().all(|row| row.len() == out.len()));
+    let origins: [S; 3] = std::array::from_fn(|k| S::from_lanes(|lane| S::Scalar::read(origin[lane][k])));
+    let whole = out.len() / N * N;
+    for start in (0..whole).step_by(N) {
+        let mut block = [S::zero(); N];
+        for (number, row) in block.iter_mut().zip(rows) {
+            // start + N ≤ out.len() = row.len()
+            *number = unsafe { S::load(row.as_ptr().add(start)) };
+        }
+        S::turn(&mut block);
+        for (i, &number) in block.iter().enumerate() {
+            out[start + i].write(number - origins[(start + i) % 3]);
+        }
+    }
+    for i in whole..out.len() {
+        out[i].write(S::from_lanes(|lane| S::Scalar::read(rows[lane][i])) - origins[i % 3]);
+    }
+}
+
+#[inline(always)]
+pub(super) fn write_squares<S: Square, const N: usize>(numbers: &[S], rows: &mut [&mut [f32]]) {
+    assert!(rows.len() <= N && rows.iter().all(|row| row.len() == numbers.len()));
+    let whole = numbers.len() / N * N;
+    for start in (0..whole).step_by(N) {
+        let mut block = [S::zero(); N];
+        for (i, number) in block.iter_mut().enumerate() {
+            *number = numbers[start + i];
+        }
+        S::turn(&mut block);
+        for (number, row) in block.iter().zip(rows.iter_mut()) {
+            // start + N ≤ numbers.len() = row.len()
+            unsafe { number.store(row.as_mut_ptr().add(start)) };
+        }
+    }
+    for (lane, row) in rows.iter_mut().enumerate() {
+        for i in whole..numbers.len() {
+            row[i] = numbers[i].lane(lane).data();
+        }
+    }
+}
+
+/// What crosses between single and double precision or between bodies and lanes: out of line.
+macro_rules! border {
+    ($module:ident, $features:literal, $single:ident, $double:ident, $lanes:literal, $widen:expr, $narrow:expr) => {
+        mod $module {
+            use super::*;
+
+            #[inline(never)]
+            #[target_feature(enable = $features)]
+            pub fn widen(number: $single) -> $double {
+                $widen(number)
+            }
+            #[inline(never)]
+            #[target_feature(enable = $features)]
+            pub fn narrow(wide: $double) -> $single {
+                $narrow(wide)
+            }
+            #[inline(never)]
+            #[target_feature(enable = $features)]
+            pub fn add_to(number: $single, sum: &mut $double) {
+                *sum = *sum + $widen(number);
+            }
+            #[inline(never)]
+            #[target_feature(enable = $features)]
+            pub fn read_rows(rows: &[&[f32]], origin: &[[f32; 3]], out: &mut [MaybeUninit<$single>]) {
+                read_squares::<$single, $lanes>(rows, origin, out);
+            }
+            #[inline(never)]
+            #[target_feature(enable = $features)]
+            pub fn write_rows(numbers: &[$single], rows: &mut [&mut [f32]]) {
+                write_squares::<$single, $lanes>(numbers, rows);
+            }
+        }
+    };
+}
