@@ -35,6 +35,12 @@ mod single128 {
     pub unsafe fn low_bits_as_power(x: float32x4_t) -> float32x4_t {
         unsafe { vreinterpretq_f32_u32(vshlq_n_u32::<23>(vreinterpretq_u32_f32(x))) }
     }
+    pub const LANES: u32 = 4;
+    /// One bit a lane.
+    #[inline(always)]
+    pub unsafe fn negative(x: float32x4_t) -> u32 {
+        unsafe { vaddvq_u32(vandq_u32(vcltzq_f32(x), vld1q_u32([1, 2, 4, 8].as_ptr()))) }
+    }
 }
 
 mod double128 {
@@ -66,6 +72,12 @@ mod double128 {
     #[inline(always)]
     pub unsafe fn low_bits_as_power(x: float64x2_t) -> float64x2_t {
         unsafe { vreinterpretq_f64_u64(vshlq_n_u64::<52>(vreinterpretq_u64_f64(x))) }
+    }
+    pub const LANES: u32 = 2;
+    /// One bit a lane.
+    #[inline(always)]
+    pub unsafe fn negative(x: float64x2_t) -> u32 {
+        unsafe { vaddvq_u64(vandq_u64(vcltzq_f64(x), vld1q_u64([1, 2].as_ptr()))) as u32 }
     }
 }
 

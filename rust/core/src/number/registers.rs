@@ -92,6 +92,10 @@ macro_rules! arithmetic {
         fn if_negative(self, below: Self, otherwise: Self) -> Self {
             $name($(unsafe { $intrinsics::if_negative(self.$part, below.$part, otherwise.$part) }),+)
         }
+        #[inline(always)]
+        fn negative(self) -> u32 {
+            0 $(| (unsafe { $intrinsics::negative(self.$part) } << ($part * $intrinsics::LANES)))+
+        }
         // The instructions give their second operand where the first is NaN.
         #[inline(always)]
         fn at_least(self, floor: Self) -> Self {
