@@ -3,6 +3,7 @@
 //! Every body is computed from start to end in one lane by one thread, and all numbers of a CPU level round alike, so its
 //! bits depend neither on the number of threads nor on its neighbours nor on its place.
 
+use crate::analysis::{Analysis, Polygon};
 use crate::error::{Error, Result, status};
 use crate::ground::Ground;
 use crate::mass::Method;
@@ -15,6 +16,7 @@ use crate::support::{BaseOfSupport, Contact};
 use crate::template::Template;
 use crate::threads;
 use crate::volume::SignedVolumes;
+use std::sync::Mutex;
 
 /// `num_bodies` poses of one template, each over its ground.
 pub struct Batch<'a, T> {
@@ -180,7 +182,25 @@ impl<'a, T: Data> Batch<'a, T> {
     /// The base of support of each body.
     pub fn base_of_support(&self, contact: &Contact, method: Method) -> Result<Vec<BaseOfSupport>> {
         let nowhere = BaseOfSupport { polygon: Vec::new(), area: f64::NAN, margin: f64::NAN, num_contacts: 0 };
-        self.map(nowhere, |scene| BaseOfSupport::new(scene, contact, method))
+        let all = Mutex::new(vec![nowhere; self.len()]);
+        self.each([], |group, []| {
+            let mut supports = Vec::new();
+            self.on_lanes(group, Supports { contact, method, supports: &mut supports });
+            group.hand_out(supports, &all);
+        })?;
+        Ok(all.into_inner().expect("no thread panicked"))
+    }
+
+    /// All figures of each body ([`Analysis`]): B·K numbers, and the corners of the base of support.
+    pub fn analysis_into(&self, analysis: &Analysis, out: &mut [T]) -> Result<Vec<Polygon>> {
+        let size = analysis.len(self.template);
+        let all = Mutex::new(vec![Polygon::new(); self.len()]);
+        self.each([(out, size)], |group, [out]| {
+            let mut polygons = Vec::new();
+            self.on_lanes(group, Figures { analysis, size, out, polygons: &mut polygons });
+            group.hand_out(polygons, &all);
+        })?;
+        Ok(all.into_inner().expect("no thread panicked"))
     }
 
     /// BoSE by the linear programme.
@@ -193,15 +213,10 @@ impl<'a, T: Data> Batch<'a, T> {
     pub fn status(&self, contact: &Contact) -> Result<Vec<u32>> {
         self.map(status::NON_FINITE, |scene| {
             let volumes = SignedVolumes::forward(&scene.template.closing, scene.points).of_parts;
-            let support = BaseOfSupport::new(scene, contact, Method::VertexMean);
-            let size = extent(&scene.points[..scene.template.mesh.num_vertices]);
-            let bits = [
-                (volumes.iter().any(|v| *v < 0.0), status::INVERTED_PART),
-                (!support.has_contact(), status::NO_CONTACT),
-                (volumes.iter().map(|v| v.abs()).sum::<f64>() <= 1e-12 * size.powi(3), status::NO_VOLUME),
-                (!(0.2..=10.0).contains(&size), status::ODD_SIZE),
-            ];
-            bits.iter().filter(|(set, _)| *set).fold(0, |all, (_, bit)| all | bit)
+            let centre = Method::VertexMean.forward(scene);
+            let has_contact = BaseOfSupport::of_lanes(scene, contact, &centre)[0].has_contact();
+            let [low, high] = scene.bounds();
+            status::bits(&volumes, sub(high, low), has_contact)
         })
     }
 
@@ -320,6 +335,14 @@ impl Group {
         groups
     }
 
+    /// Gives each body what its lane has.
+    fn hand_out<O>(&self, lanes: Vec<O>, all: &Mutex<Vec<O>>) {
+        let mut all = all.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        for (&body, lane) in self.bodies.iter().zip(lanes) {
+            all[body] = lane;
+        }
+    }
+
     /// The body of each lane; lanes that are left over repeat the last body.
     fn lanes(&self) -> impl Iterator<Item = usize> {
         (0..self.width).map(|lane| lane.min(self.bodies.len() - 1))
@@ -374,6 +397,33 @@ impl<T: Data, Q: Quantity> OnLanes<T> for Forward<'_, T, Q> {
     }
 }
 
+struct Supports<'a> {
+    contact: &'a Contact,
+    method: Method,
+    supports: &'a mut Vec<BaseOfSupport>,
+}
+
+impl<T: Data> OnLanes<T> for Supports<'_> {
+    fn run<R: Real<Data = T>>(self, scene: &Scene<R>) {
+        *self.supports = BaseOfSupport::of_lanes(scene, self.contact, &self.method.forward(scene));
+    }
+}
+
+struct Figures<'a, T> {
+    analysis: &'a Analysis,
+    size: usize,
+    out: Vec<&'a mut [T]>,
+    polygons: &'a mut Vec<Polygon>,
+}
+
+impl<T: Data> OnLanes<T> for Figures<'_, T> {
+    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
+        let mut out = vec![R::zero(); self.size];
+        *self.polygons = self.analysis.forward(scene, &mut out);
+        R::write_rows(&out, &mut self.out);
+    }
+}
+
 struct ForwardAndBackward<'a, T, Q> {
     template: &'a Template,
     quantity: &'a Q,
@@ -414,12 +464,4 @@ fn zero_if_undefined<T: Scalar>(gradient: &mut [T], upstream_is_finite: bool) {
 
 fn finite_or_zero<T: Scalar>(x: T) -> T {
     if x.value().is_finite() { x } else { T::zero() }
-}
-
-/// The longest side of the bounding box.
-fn extent(vertices: &[Vec3<f64>]) -> f64 {
-    let bound = |pick: fn(f64, f64) -> f64| {
-        vertices.iter().fold(vertices[0], |best, v| std::array::from_fn(|k| pick(best[k], v[k])))
-    };
-    sub(bound(f64::max), bound(f64::min)).into_iter().fold(0.0, f64::max)
 }

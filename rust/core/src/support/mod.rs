@@ -11,7 +11,7 @@ use crate::mass::{Centre, Method};
 use crate::number::vector::{Vec3, narrow};
 use crate::number::{Real, Room, Scalar};
 use crate::quantity::{Quantity, unknown_choice};
-use crate::scene::Scene;
+use crate::scene::{self, Scene};
 use crate::support::margin::{Margin, Nearest};
 use crate::template::Template;
 
@@ -96,18 +96,25 @@ pub struct BaseOfSupport {
 }
 
 impl BaseOfSupport {
-    pub fn new(scene: &Scene<f64>, contact: &Contact, method: Method) -> Self {
-        let (_, positions) = contact.find(scene, 0);
+    /// Of the body of each lane, with the centre of mass that the scene's method has found.
+    pub fn of_lanes<R: Real>(scene: &Scene<R>, contact: &Contact, centre: &Centre<R>) -> Vec<Self> {
+        let centre = scene.plane.flatten(centre.point);
+        (0..R::LANES).map(|lane| Self::of_lane(scene, contact, scene::lane(centre, lane), lane)).collect()
+    }
+
+    fn of_lane<R: Real>(scene: &Scene<R>, contact: &Contact, centre: [f64; 2], lane: usize) -> Self {
+        let (_, positions) = contact.find(scene, lane);
         let corners: Vec<[f64; 2]> = hull::convex_hull(&positions).into_iter().map(|i| positions[i]).collect();
-        let centre = scene.plane.flatten(method.forward(scene).point);
         let margin = match Nearest::find(&corners, centre) {
             Some(nearest) => Margin::new(nearest.map(|i| corners[i]), centre).value,
             None => f64::NEG_INFINITY,
         };
-        let lift = scene.ground.height;
+        let value = |x: R::Wide| x.lane(lane).value();
+        let axes = scene.plane.axes.map(|axis| axis.map(value));
+        let (normal, origin, lift) =
+            (scene.ground.normal.map(value), scene.origin.map(value), value(scene.ground.height));
         let place = |flat: &[f64; 2]| {
-            let on_plane = scene.plane.raise(*flat);
-            std::array::from_fn(|k| on_plane[k] + lift * scene.ground.normal[k] + scene.origin[k])
+            std::array::from_fn(|k| flat[0] * axes[0][k] + flat[1] * axes[1][k] + lift * normal[k] + origin[k])
         };
         BaseOfSupport {
             polygon: corners.iter().map(place).collect(),
