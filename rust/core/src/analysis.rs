@@ -1,29 +1,29 @@
 //! The analysis: all figures of a body in one go. Its heights, samples, volumes, moments and centre of mass are found
 //! once and shared; each figure is that of its own room, to the bit.
 
-use crate::error::status;
-use crate::losses::balance::BalanceCost;
-use crate::losses::ground::GroundLoss;
+use crate::error::{Error, Result, status};
+use crate::losses::balance::{BalanceCost, Wrap};
+use crate::losses::ground::{GroundLoss, Tanh};
 use crate::losses::stability::distance_on_ground;
 use crate::mass::{Centre, Method};
 use crate::number::vector::{Vec3, sub};
 use crate::number::{Real, Room, Scalar};
-use crate::pressure::{CenterOfPressure, Cop, LoadSums};
+use crate::pressure::{CenterOfPressure, Cop, LoadSums, PressureCurve};
 use crate::quantity::Quantity;
 use crate::sampling::{CHUNK, Points, Row};
 use crate::scene::Scene;
-use crate::support::{BaseOfSupport, Contact};
+use crate::support::{BaseOfSupport, Contact, ContactRule};
 use crate::template::Template;
 use crate::volume::{MassProperties, PartVolumes, part_moments};
 
 /// The constants of all figures.
 pub struct Analysis {
-    pub method: Method,
-    pub pressure: CenterOfPressure,
-    pub ground: GroundLoss,
-    pub contact: Contact,
-    pub balance: BalanceCost,
-    pub mass: MassProperties,
+    method: Method,
+    pressure: CenterOfPressure,
+    ground: GroundLoss,
+    contact: Contact,
+    balance: BalanceCost,
+    mass: MassProperties,
 }
 
 /// The corners of a base of support, see [`BaseOfSupport::polygon`].
@@ -59,13 +59,38 @@ struct Looked<R: Real> {
 }
 
 impl Analysis {
+    /// `options` are alpha, gamma, epsilon, alpha1, alpha2, beta1, beta2, threshold, balance gamma and sigma; `densities`
+    /// one for all parts or one for each.
+    pub fn new(method: &str, rule: &str, options: &[f64], densities: &[f64]) -> Result<Self> {
+        let method = Method::named(method)?;
+        let bad = || {
+            let expected = "ten finite numbers, and densities".into();
+            Error::Argument { name: "options", expected, got: format!("{options:?}, {densities:?}") }
+        };
+        let &[alpha, gamma, epsilon, alpha1, alpha2, beta1, beta2, threshold, balance_gamma, sigma] = options else {
+            return Err(bad());
+        };
+        if densities.is_empty() || options.iter().chain(densities).any(|x| !x.is_finite()) {
+            return Err(bad());
+        }
+        let curve = PressureCurve { alpha, gamma: balance_gamma };
+        Ok(Analysis {
+            method,
+            pressure: CenterOfPressure { curve: PressureCurve { alpha, gamma }, epsilon },
+            ground: GroundLoss { points: Points::Samples, tanh: Tanh::Squared, alpha1, alpha2, beta1, beta2 },
+            contact: Contact { rule: ContactRule::named(rule)?, threshold },
+            balance: BalanceCost { method, wrap: Wrap::Log, curve, sigma },
+            mass: MassProperties { densities: densities.to_vec() },
+        })
+    }
+
     /// Numbers of one body.
-    pub fn len(&self, template: &Template) -> usize {
+    pub fn size(&self, template: &Template) -> usize {
         at::PART_VOLUMES + template.mesh.num_parts
     }
 
-    pub fn is_empty(&self, _: &Template) -> bool {
-        false
+    pub fn has_densities_for(&self, num_parts: usize) -> bool {
+        [1, num_parts].contains(&self.mass.densities.len())
     }
 
     /// Writes the numbers and gives the polygon of each lane.

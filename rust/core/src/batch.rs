@@ -193,7 +193,11 @@ impl<'a, T: Data> Batch<'a, T> {
 
     /// All figures of each body ([`Analysis`]): B·K numbers, and the corners of the base of support.
     pub fn analysis_into(&self, analysis: &Analysis, out: &mut [T]) -> Result<Vec<Polygon>> {
-        let size = analysis.len(self.template);
+        let size = analysis.size(self.template);
+        if !analysis.has_densities_for(self.template.mesh.num_parts) {
+            let expected = format!("1 or {} numbers", self.template.mesh.num_parts);
+            return Err(Error::Argument { name: "densities", expected, got: "another number".into() });
+        }
         let all = Mutex::new(vec![Polygon::new(); self.len()]);
         self.each([(out, size)], |group, [out]| {
             let mut polygons = Vec::new();

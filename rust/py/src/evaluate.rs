@@ -127,7 +127,7 @@ impl<'py> Question<'_, 'py> {
 }
 
 /// An array whose numbers are there but mean nothing yet: every verb writes all of its output.
-fn unwritten<'py, T: Element>(py: Python<'py>, shape: &[usize]) -> Bound<'py, PyArrayDyn<T>> {
+pub fn unwritten<'py, T: Element>(py: Python<'py>, shape: &[usize]) -> Bound<'py, PyArrayDyn<T>> {
     // SAFETY: T is f32 or f64, for which every bit pattern is a number.
     unsafe { PyArrayDyn::new(py, shape, false) }
 }
