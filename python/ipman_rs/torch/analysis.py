@@ -13,7 +13,7 @@ import ipman_rs as ip
 from ipman_rs import BaseOfSupport, BodyTemplate, presets
 from ipman_rs import Ground as NumpyGround
 
-from .ground import Ground, as_numpy_ground
+from .ground import Ground, as_ground, as_numpy_ground
 from .losses import balance_cost, ground_loss, stability_loss
 from .mass import center_of_mass
 from .pressure import center_of_pressure, pressure
@@ -59,6 +59,7 @@ def analyze(
     curve = (constants.alpha, constants.gamma)
     solid = mass_properties(*body, density)
     support = base_of_support(*where, constants.threshold, method, constants.contact)
+    pressures = pressure(*where, *curve)
     pull, push = ground_loss(*where, constants.alpha1, constants.alpha2, constants.beta1, constants.beta2)
     figures: dict[str, Any] = {
         "preset": preset,
@@ -71,7 +72,9 @@ def analyze(
         "inertia": solid.inertia,
         "center_of_mass": center_of_mass(*body, method),
         "center_of_mass_exact": center_of_mass(*body, "exact"),
-        "pressure": pressure(*where, *curve),
+        "pressure": pressures,
+        "pressure_sum": pressures.sum(-1),
+        "pressure_max": pressures.amax(-1),
         "center_of_pressure": center_of_pressure(*where, *curve, constants.epsilon),
         "base_of_support": support,
         "bose": support.inside,
@@ -79,6 +82,7 @@ def analyze(
         "pull": pull,
         "push": push,
         "balance": balance_cost(*where, constants.alpha, constants.balance_gamma, constants.sigma, method=method),
+        "lowest": as_ground(ground).signed_height(vertices).amin(-1),
     }
     return Analysis(**figures)
 
