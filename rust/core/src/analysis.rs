@@ -119,7 +119,7 @@ impl Analysis {
         out[at::STABILITY] = R::narrow(distance_on_ground(scene, &centre, &looked.cop).0);
         self.balance.forward(scene, &mut out[at::BALANCE..][..1]);
 
-        let supports = BaseOfSupport::of_lanes(scene, &self.contact, &centre);
+        let supports = BaseOfSupport::new(scene, &self.contact, &centre);
         let number = |of: &dyn Fn(usize) -> f64| R::narrow(R::Wide::from_lanes(|lane| Real::of(of(lane))));
         out[at::NUM_CONTACTS] = number(&|lane| supports[lane].num_contacts as f64);
         out[at::AREA] = number(&|lane| supports[lane].area);

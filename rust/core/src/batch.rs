@@ -182,13 +182,7 @@ impl<'a, T: Data> Batch<'a, T> {
     /// The base of support of each body.
     pub fn base_of_support(&self, contact: &Contact, method: Method) -> Result<Vec<BaseOfSupport>> {
         let nowhere = BaseOfSupport { polygon: Vec::new(), area: f64::NAN, margin: f64::NAN, num_contacts: 0 };
-        let all = Mutex::new(vec![nowhere; self.len()]);
-        self.each([], |group, []| {
-            let mut supports = Vec::new();
-            self.on_lanes(group, Supports { contact, method, supports: &mut supports });
-            group.hand_out(supports, &all);
-        })?;
-        Ok(all.into_inner().expect("no thread panicked"))
+        self.find(nowhere, &Support { contact, method })
     }
 
     /// All figures of each body ([`Analysis`]): B·K numbers, and the corners of the base of support.
@@ -210,28 +204,32 @@ impl<'a, T: Data> Batch<'a, T> {
     /// BoSE by the linear programme.
     #[cfg(feature = "lp")]
     pub fn is_supported_lp(&self, contact: &Contact, method: Method) -> Result<Vec<bool>> {
-        self.map(false, |scene| crate::support::is_supported_lp(scene, contact, method))
+        self.find(false, &SupportedLp { contact, method })
     }
 
     /// The bits of [`status`].
     pub fn status(&self, contact: &Contact) -> Result<Vec<u32>> {
-        self.map(status::NON_FINITE, |scene| {
-            let volumes = SignedVolumes::forward(&scene.template.closing, scene.points).of_parts;
-            let centre = Method::VertexMean.forward(scene);
-            let has_contact = BaseOfSupport::of_lanes(scene, contact, &centre)[0].has_contact();
-            let [low, high] = scene.bounds();
-            status::bits(&volumes, sub(high, low), has_contact)
-        })
+        self.find(status::NON_FINITE, &Status { contact })
     }
 
-    /// One result a body, in double precision; `bad` for a body that is not finite.
-    fn map<O: Clone + Send + Sync>(&self, bad: O, f: impl Fn(&Scene<f64>) -> O + Sync) -> Result<Vec<O>> {
+    /// What is found of each body; `bad` for a body that is not finite.
+    fn find<F: Finding>(&self, bad: F::Of, finding: &F) -> Result<Vec<F::Of>> {
         let mut out = vec![bad; self.len()];
-        self.each_body((&mut out, 1), |body, out| {
+        let (mut bodies, mut rows) = (Vec::new(), Vec::new());
+        for (body, row) in out.iter_mut().enumerate() {
             if let Some(origin) = self.origin(body) {
-                let points = self.points(body, |x, o| x.value() - o, origin);
-                out[0] = f(&Scene::new(self.template, &points, &[self.grounds[body]], &[origin]));
+                bodies.push((body, origin));
+                rows.push(row);
             }
+        }
+        let mut rows = rows.into_iter();
+        let groups = Group::of(&bodies, self.level, T::widths(self.level));
+        let items = groups.into_iter().map(|group| {
+            let out = rows.by_ref().take(group.bodies.len()).collect();
+            (group, out)
+        });
+        threads::each(items.collect(), self.pays_threads(), self.interrupted, &|(group, out): (Group, _)| {
+            self.on_lanes(&group, Find { finding, out });
         })?;
         Ok(out)
     }
@@ -401,18 +399,6 @@ impl<T: Data, Q: Quantity> OnLanes<T> for Forward<'_, T, Q> {
     }
 }
 
-struct Supports<'a> {
-    contact: &'a Contact,
-    method: Method,
-    supports: &'a mut Vec<BaseOfSupport>,
-}
-
-impl<T: Data> OnLanes<T> for Supports<'_> {
-    fn run<R: Real<Data = T>>(self, scene: &Scene<R>) {
-        *self.supports = BaseOfSupport::of_lanes(scene, self.contact, &self.method.forward(scene));
-    }
-}
-
 struct Figures<'a, T> {
     analysis: &'a Analysis,
     size: usize,
@@ -455,6 +441,72 @@ impl<T: Data, Q: Quantity> OnLanes<T> for ForwardAndBackward<'_, T, Q> {
             zero_if_undefined(row, d_out.iter().all(|d| d.value().is_finite()));
         }
     }
+}
+
+/// What is found of a body besides quantities.
+trait Finding: Sync {
+    type Of: Clone + Send;
+    /// That of each lane.
+    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<Self::Of>;
+}
+
+struct Find<'a, F: Finding> {
+    finding: &'a F,
+    out: Vec<&'a mut F::Of>,
+}
+
+impl<T: Data, F: Finding> OnLanes<T> for Find<'_, F> {
+    fn run<R: Real<Data = T>>(self, scene: &Scene<R>) {
+        self.out.into_iter().zip(self.finding.find(scene)).for_each(|(out, found)| *out = found);
+    }
+}
+
+struct Support<'a> {
+    contact: &'a Contact,
+    method: Method,
+}
+
+impl Finding for Support<'_> {
+    type Of = BaseOfSupport;
+    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<BaseOfSupport> {
+        BaseOfSupport::new(scene, self.contact, &self.method.forward(scene))
+    }
+}
+
+#[cfg(feature = "lp")]
+struct SupportedLp<'a> {
+    contact: &'a Contact,
+    method: Method,
+}
+
+#[cfg(feature = "lp")]
+impl Finding for SupportedLp<'_> {
+    type Of = bool;
+    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<bool> {
+        crate::support::is_supported_lp(scene, self.contact, self.method)
+    }
+}
+
+struct Status<'a> {
+    contact: &'a Contact,
+}
+
+impl Finding for Status<'_> {
+    type Of = u32;
+    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<u32> {
+        let contacts = self.contact.find(scene);
+        (0..R::LANES).map(|lane| status_of(scene, lane, contacts.count(lane))).collect()
+    }
+}
+
+/// The bits of one lane. Whether a volume is nothing or less is decided in double precision.
+fn status_of<R: Real>(scene: &Scene<R>, lane: usize, num_contacts: usize) -> u32 {
+    let vertices = &scene.points[..scene.template.mesh.num_vertices];
+    let mut points: Vec<Vec3<f64>> = vertices.iter().map(|v| v.map(|x| x.lane(lane).value())).collect();
+    let [low, high] = scene.bounds().map(|corner| corner.map(|x| x.lane(lane).value()));
+    scene.template.closing.forward(&mut points);
+    let volumes = SignedVolumes::forward(&scene.template.closing, &points).of_parts;
+    status::bits(&volumes, sub(high, low), num_contacts > 0)
 }
 
 /// A gradient that is not finite, though the upstream gradient is, belongs to a body on which the quantity is undefined

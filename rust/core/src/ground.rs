@@ -1,8 +1,8 @@
 //! The ground: a plane with a unit normal n at a height along it. h(u) = n·u − height, g(u) = u − h(u) n.
 
 use crate::error::{Error, Result};
+use crate::number::Real;
 use crate::number::vector::{Vec3, add, add_scaled, cross, dot, scale, sub};
-use crate::number::{Real, Scalar};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground<R> {
@@ -93,11 +93,6 @@ impl<R: Real> Plane<R> {
     pub fn raise(&self, flat: [R; 2]) -> Vec3<R> {
         add(scale(flat[0], self.axes[0]), scale(flat[1], self.axes[1]))
     }
-}
-
-#[inline(always)]
-pub fn values<S: Scalar>(flat: [S; 2]) -> [f64; 2] {
-    flat.map(S::value)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::number::vector::{Vec3, add_scaled, cross, dot, narrow, sub, widen};
-use crate::number::{Data, Real, Room};
+use crate::number::{Data, Real, Room, Scalar, WideScalar};
 use crate::quantity::{Quantity, unknown_choice};
 use crate::scene::Scene;
 use crate::template::Template;
@@ -92,6 +92,21 @@ impl Samples {
     pub fn wide_point<R: Real>(&self, sample: usize, vertices: &[Vec3<R>]) -> Vec3<R::Wide> {
         let [a, b, c] = self.corners[sample];
         let corner = |index: u32| widen(vertices[index as usize]);
+        blend([corner(a), corner(b), corner(c)], self.barycentric[sample])
+    }
+
+    /// One lane's (W V)_i in double precision.
+    #[inline(always)]
+    pub fn point_of_lane<R: Real>(&self, sample: usize, vertices: &[Vec3<R>], lane: usize) -> Vec3<WideScalar<R>> {
+        let [a, b, c] = self.corners[sample];
+        let corner = |index: u32| {
+            let vertex = &vertices[index as usize];
+            [
+                WideScalar::<R>::of(vertex[0].lane(lane).value()),
+                WideScalar::<R>::of(vertex[1].lane(lane).value()),
+                WideScalar::<R>::of(vertex[2].lane(lane).value()),
+            ]
+        };
         blend([corner(a), corner(b), corner(c)], self.barycentric[sample])
     }
 
@@ -236,6 +251,18 @@ impl Walk {
             7 => R::apart::<Interpolate<7>, _>((self, chunk, vertices, row)),
             _ => R::apart::<Interpolate<8>, _>((self, chunk, vertices, row)),
         }
+    }
+
+    /// The vertices of each of a chunk's groups, and how many samples a group has.
+    #[inline(always)]
+    pub fn groups(&self, chunk: &Chunk) -> (&[[u32; 3]], usize) {
+        (&self.corners[chunk.groups.clone()], chunk.group_size())
+    }
+
+    /// The weights of the sample at a place of the walk.
+    #[inline(always)]
+    pub fn weights<R: Real>(&self, place: usize) -> [R; 3] {
+        [self.weights.get(3 * place), self.weights.get(3 * place + 1), self.weights.get(3 * place + 2)]
     }
 
     /// Adds (Wᵀ y)_v of a chunk's samples to the vertices' numbers.

@@ -4,7 +4,7 @@
 //! that leave a room get the origin back.
 
 use crate::ground::{Ground, Plane};
-use crate::number::vector::{Vec3, add, add_scaled};
+use crate::number::vector::{Vec3, add, add_scaled, narrow};
 use crate::number::{Real, Room, Scalar};
 use crate::template::Template;
 
@@ -40,6 +40,13 @@ impl<'a, R: Real> Scene<'a, R> {
     pub fn narrow_ground(&self) -> Ground<R> {
         let [x, y, z] = self.ground.normal;
         Ground { normal: [R::narrow(x), R::narrow(y), R::narrow(z)], height: R::narrow(self.ground.height) }
+    }
+
+    /// The plane's axes in the precision of the points.
+    #[inline(always)]
+    pub fn narrow_plane(&self) -> Plane<R> {
+        let [e1, e2] = self.plane.axes;
+        Plane { axes: [narrow::<R>(e1), narrow::<R>(e2)] }
     }
 
     /// h of each vertex of the mesh: that of any point of a face is interpolated from them.

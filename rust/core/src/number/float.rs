@@ -90,6 +90,7 @@ float!(f32);
 float!(f64);
 
 impl Data for f32 {
+    const EPSILON: f64 = f32::EPSILON as f64;
     #[inline(always)]
     fn pick<'a>(single: &'a [f32], _: &'a [f64]) -> &'a [f32] {
         single
@@ -97,6 +98,7 @@ impl Data for f32 {
 }
 
 impl Data for f64 {
+    const EPSILON: f64 = f64::EPSILON;
     #[inline(always)]
     fn pick<'a>(_: &'a [f32], double: &'a [f64]) -> &'a [f64] {
         double

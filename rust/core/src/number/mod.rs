@@ -103,6 +103,16 @@ pub trait Real:
         *sum = *sum + self.widen();
     }
 
+    /// The lanes in which self < 0, as bits.
+    #[inline(always)]
+    fn negative(self) -> u32 {
+        let mut lanes = 0;
+        for lane in 0..Self::LANES {
+            lanes |= u32::from(self.lane(lane).value() < 0.0) << lane;
+        }
+        lanes
+    }
+
     #[inline(always)]
     fn abs(self) -> Self {
         self.if_negative(-self, self)
@@ -127,6 +137,9 @@ pub trait Real:
     }
 }
 
+/// One lane of a number in double precision.
+pub type WideScalar<R> = <<R as Real>::Wide as Real>::Scalar;
+
 /// A number that stands alone, so that decisions (contact, hull) can be taken on its value.
 pub trait Scalar: Real<Scalar = Self> {
     fn value(self) -> f64;
@@ -136,6 +149,8 @@ pub trait Scalar: Real<Scalar = Self> {
 
 /// A floating-point format of the caller's arrays, itself a number with one lane.
 pub trait Data: Scalar<Data = Self> + gate::Gates {
+    /// The distance from 1 to the next number.
+    const EPSILON: f64;
     /// The ones that are kept in this format, of constants that are kept in both.
     fn pick<'a>(single: &'a [f32], double: &'a [f64]) -> &'a [Self];
 }

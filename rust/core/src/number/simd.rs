@@ -28,6 +28,12 @@ mod single512 {
     pub unsafe fn low_bits_as_power(x: __m512) -> __m512 {
         unsafe { _mm512_castsi512_ps(_mm512_slli_epi32::<23>(_mm512_castps_si512(x))) }
     }
+    pub const LANES: u32 = 16;
+    /// One bit a lane.
+    #[inline(always)]
+    pub unsafe fn negative(x: __m512) -> u32 {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(x, _mm512_setzero_ps()) as u32 }
+    }
 }
 
 mod double512 {
@@ -48,6 +54,12 @@ mod double512 {
     pub unsafe fn low_bits_as_power(x: __m512d) -> __m512d {
         unsafe { _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(x))) }
     }
+    pub const LANES: u32 = 8;
+    /// One bit a lane.
+    #[inline(always)]
+    pub unsafe fn negative(x: __m512d) -> u32 {
+        unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(x, _mm512_setzero_pd()) as u32 }
+    }
 }
 
 mod single256 {
@@ -65,6 +77,12 @@ mod single256 {
     pub unsafe fn low_bits_as_power(x: __m256) -> __m256 {
         unsafe { _mm256_castsi256_ps(_mm256_slli_epi32::<23>(_mm256_castps_si256(x))) }
     }
+    pub const LANES: u32 = 8;
+    /// One bit a lane.
+    #[inline(always)]
+    pub unsafe fn negative(x: __m256) -> u32 {
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(x, _mm256_setzero_ps())) as u32 }
+    }
 }
 
 mod double256 {
@@ -81,6 +99,12 @@ mod double256 {
     #[inline(always)]
     pub unsafe fn low_bits_as_power(x: __m256d) -> __m256d {
         unsafe { _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(x))) }
+    }
+    pub const LANES: u32 = 4;
+    /// One bit a lane.
+    #[inline(always)]
+    pub unsafe fn negative(x: __m256d) -> u32 {
+        unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(x, _mm256_setzero_pd())) as u32 }
     }
 }
 
@@ -164,6 +188,10 @@ macro_rules! arithmetic {
         #[inline(always)]
         fn if_negative(self, below: Self, otherwise: Self) -> Self {
             $name($(unsafe { $intrinsics::if_negative(self.$part, below.$part, otherwise.$part) }),+)
+        }
+        #[inline(always)]
+        fn negative(self) -> u32 {
+            0 $(| (unsafe { $intrinsics::negative(self.$part) } << ($part * $intrinsics::LANES)))+
         }
         // The instructions give their second operand where the first is NaN.
         #[inline(always)]

@@ -4,10 +4,11 @@
 use robust::{Coord, orient2d};
 
 /// Indices of the hull's corners, counter-clockwise from the lowest x; no corner is repeated or lies on an edge.
-/// One distinct point gives one corner, collinear points give their two ends.
+/// One distinct point gives one corner, collinear points give their two ends. Of equal points the first is the corner.
 pub fn convex_hull(points: &[[f64; 2]]) -> Vec<usize> {
-    let mut order = candidates(points);
-    order.sort_unstable_by(|&i, &j| points[i][0].total_cmp(&points[j][0]).then(points[i][1].total_cmp(&points[j][1])));
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    let along = |i: usize, j: usize, k: usize| points[i][k].total_cmp(&points[j][k]);
+    order.sort_unstable_by(|&i, &j| along(i, j, 0).then(along(i, j, 1)).then(i.cmp(&j)));
     order.dedup_by_key(|i| points[*i]);
     if order.len() < 3 {
         return order;
@@ -33,17 +34,6 @@ fn chain(points: &[[f64; 2]], order: impl Iterator<Item = usize>) -> Vec<usize> 
         chain.push(next);
     }
     chain
-}
-
-/// The points outside the quadrilateral of the four extremes (Akl and Toussaint): the rest cannot be corners.
-fn candidates(points: &[[f64; 2]]) -> Vec<usize> {
-    let extreme =
-        |key: fn(&[f64; 2]) -> f64| (0..points.len()).max_by(|&i, &j| key(&points[i]).total_cmp(&key(&points[j])));
-    let keys: [fn(&[f64; 2]) -> f64; 4] = [|p| -p[0] - p[1], |p| p[0] - p[1], |p| p[0] + p[1], |p| p[1] - p[0]];
-    let Some(corners) = keys.into_iter().map(extreme).collect::<Option<Vec<_>>>() else { return Vec::new() };
-    let corners: Vec<_> = corners.into_iter().map(|i| points[i]).collect();
-    let inside = |&i: &usize| (0..4).all(|k| turn(corners[k], corners[(k + 1) % 4], points[i]) > 0.0);
-    (0..points.len()).filter(|i| !inside(i)).collect()
 }
 
 /// Positive where `c` lies to the left of a → b, negative to the right, 0 on the line; the sign is exact.

@@ -1,87 +1,22 @@
 //! The base of support: the hull of the contact samples on the ground, and whether the centre of mass lies over it.
 
+mod contact;
 pub mod hull;
 pub mod margin;
+mod octagon;
 #[cfg(feature = "lp")]
 pub mod program;
 
-use crate::error::Result;
-use crate::ground::values;
+pub use contact::{Contact, ContactRule};
+
 use crate::mass::{Centre, Method};
 use crate::number::vector::{Vec3, narrow};
-use crate::number::{Real, Room, Scalar};
-use crate::quantity::{Quantity, unknown_choice};
+use crate::number::{Real, Scalar, WideScalar};
+use crate::quantity::Quantity;
 use crate::scene::{self, Scene};
 use crate::support::margin::{Margin, Nearest};
+use crate::support::octagon::Hull;
 use crate::template::Template;
-
-/// Which samples touch the ground.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ContactRule {
-    /// |h| < τ
-    Paper,
-    /// h < τ, and ten contacts or fewer count as none: the authors' released code.
-    Released,
-}
-
-impl ContactRule {
-    pub fn named(name: &str) -> Result<Self> {
-        match name {
-            "paper" => Ok(ContactRule::Paper),
-            "released" => Ok(ContactRule::Released),
-            _ => Err(unknown_choice("contact", "\"paper\", \"released\"", name)),
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
-    pub rule: ContactRule,
-    /// τ, m
-    pub threshold: f64,
-}
-
-const RELEASED_MINIMUM: usize = 11;
-
-impl Contact {
-    fn touches(&self, height: f64) -> bool {
-        match self.rule {
-            ContactRule::Paper => height.abs() < self.threshold,
-            ContactRule::Released => height < self.threshold,
-        }
-    }
-
-    /// The contact samples of one lane and their positions on the ground. Always decided in double precision, so that
-    /// single and double precision agree on the contact set.
-    fn find<R: Real>(&self, scene: &Scene<R>, lane: usize) -> (Vec<u32>, Vec<[f64; 2]>) {
-        R::apart::<Find, _>((self, scene, lane))
-    }
-}
-
-/// [`Contact::find`]
-struct Find;
-
-impl<R: Real> Room<(&Contact, &Scene<'_, R>, usize)> for Find {
-    type Output = (Vec<u32>, Vec<[f64; 2]>);
-
-    #[inline(always)]
-    fn enter((contact, scene, lane): (&Contact, &Scene<R>, usize)) -> (Vec<u32>, Vec<[f64; 2]>) {
-        {
-            let (mut samples, mut positions) = (Vec::new(), Vec::new());
-            for sample in 0..scene.template.samples.len() {
-                let point = scene.template.samples.wide_point(sample, scene.points);
-                if contact.touches(scene.ground.signed_height(point).lane(lane).value()) {
-                    samples.push(sample as u32);
-                    positions.push(values(scene.plane.flatten(point).map(|x| x.lane(lane))));
-                }
-            }
-            if contact.rule == ContactRule::Released && samples.len() < RELEASED_MINIMUM {
-                return (Vec::new(), Vec::new());
-            }
-            (samples, positions)
-        }
-    }
-}
 
 /// The base of support of one body.
 #[derive(Clone, Debug)]
@@ -96,31 +31,32 @@ pub struct BaseOfSupport {
 }
 
 impl BaseOfSupport {
-    /// Of the body of each lane, with the centre of mass that the scene's method has found.
-    pub fn of_lanes<R: Real>(scene: &Scene<R>, contact: &Contact, centre: &Centre<R>) -> Vec<Self> {
+    /// That of each lane, with its centre of mass.
+    pub fn new<R: Real>(scene: &Scene<R>, contact: &Contact, centre: &Centre<R>) -> Vec<Self> {
         let centre = scene.plane.flatten(centre.point);
-        (0..R::LANES).map(|lane| Self::of_lane(scene, contact, scene::lane(centre, lane), lane)).collect()
+        let hulls = contact.find(scene).hulls(scene);
+        hulls
+            .iter()
+            .enumerate()
+            .map(|(lane, hull)| Self::of_hull(scene, hull, scene::lane(centre, lane), lane))
+            .collect()
     }
 
-    fn of_lane<R: Real>(scene: &Scene<R>, contact: &Contact, centre: [f64; 2], lane: usize) -> Self {
-        let (_, positions) = contact.find(scene, lane);
-        let corners: Vec<[f64; 2]> = hull::convex_hull(&positions).into_iter().map(|i| positions[i]).collect();
-        let margin = match Nearest::find(&corners, centre) {
-            Some(nearest) => Margin::new(nearest.map(|i| corners[i]), centre).value,
+    fn of_hull<R: Real>(scene: &Scene<R>, hull: &Hull, centre: [f64; 2], lane: usize) -> Self {
+        let margin = match Nearest::find(&hull.corners, centre) {
+            Some(nearest) => Margin::new(nearest.map(|i| hull.corners[i]), centre).value,
             None => f64::NEG_INFINITY,
         };
         let value = |x: R::Wide| x.lane(lane).value();
-        let axes = scene.plane.axes.map(|axis| axis.map(value));
-        let (normal, origin, lift) =
-            (scene.ground.normal.map(value), scene.origin.map(value), value(scene.ground.height));
-        let place = |flat: &[f64; 2]| {
-            std::array::from_fn(|k| flat[0] * axes[0][k] + flat[1] * axes[1][k] + lift * normal[k] + origin[k])
-        };
+        let [e1, e2, normal, origin] =
+            [scene.plane.axes[0], scene.plane.axes[1], scene.ground.normal, scene.origin].map(|v| v.map(value));
+        let lift = value(scene.ground.height);
+        let place = |&[x, y]: &[f64; 2]| std::array::from_fn(|k| x * e1[k] + y * e2[k] + lift * normal[k] + origin[k]);
         BaseOfSupport {
-            polygon: corners.iter().map(place).collect(),
-            area: hull::area(&corners),
+            polygon: hull.corners.iter().map(place).collect(),
+            area: hull::area(&hull.corners),
             margin,
-            num_contacts: positions.len(),
+            num_contacts: hull.num_contacts,
         }
     }
 
@@ -134,11 +70,13 @@ impl BaseOfSupport {
     }
 }
 
-/// BoSE by the paper's linear programme: g(m̄) is a convex combination of the contact points.
+/// BoSE of each lane by the paper's linear programme: g(m̄) is a convex combination of the contact points.
 #[cfg(feature = "lp")]
-pub fn is_supported_lp(scene: &Scene<f64>, contact: &Contact, method: Method) -> bool {
-    let (_, positions) = contact.find(scene, 0);
-    program::is_convex_combination(&positions, scene.plane.flatten(method.forward(scene).point))
+pub fn is_supported_lp<R: Real>(scene: &Scene<R>, contact: &Contact, method: Method) -> Vec<bool> {
+    let centre = scene.plane.flatten(method.forward(scene).point);
+    let contacts = contact.find(scene);
+    let supported = |lane| program::is_convex_combination(&contacts.positions(scene, lane), scene::lane(centre, lane));
+    (0..R::LANES).map(supported).collect()
 }
 
 /// The signed margin as a differentiable quantity, m.
@@ -154,13 +92,13 @@ pub struct SavedMargin<R: Real> {
 }
 
 impl SupportMargin {
-    #[inline(always)]
-    fn nearest<R: Real>(&self, scene: &Scene<R>, centre: &Centre<R>, lane: usize) -> Option<Nearest<u32>> {
-        let (samples, positions) = self.contact.find(scene, lane);
-        let corners = hull::convex_hull(&positions);
-        let polygon: Vec<_> = corners.iter().map(|&i| positions[i]).collect();
-        let point = values(scene.plane.flatten(centre.point).map(|x| x.lane(lane)));
-        Some(Nearest::find(&polygon, point)?.map(|i| samples[corners[i]]))
+    fn nearest<R: Real>(&self, scene: &Scene<R>, centre: &Centre<R>) -> Vec<Option<Nearest<u32>>> {
+        let point = scene.plane.flatten(centre.point);
+        let hulls = self.contact.find(scene).hulls(scene);
+        let nearest = |(lane, hull): (usize, &Hull)| {
+            Some(Nearest::find(&hull.corners, scene::lane(point, lane))?.map(|i| hull.samples[i]))
+        };
+        hulls.iter().enumerate().map(nearest).collect()
     }
 
     /// The margin and its derivatives, with the nearest boundary held.
@@ -170,7 +108,7 @@ impl SupportMargin {
         centre: &Centre<R>,
         nearest: Nearest<u32>,
         lane: usize,
-    ) -> Margin<<R::Wide as Real>::Scalar> {
+    ) -> Margin<WideScalar<R>> {
         let flatten = |point| scene.plane.flatten(point).map(|x: R::Wide| x.lane(lane));
         let samples = &scene.template.samples;
         let ends = nearest.map(|sample| flatten(samples.wide_point(sample as usize, scene.points)));
@@ -187,7 +125,7 @@ impl Quantity for SupportMargin {
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> SavedMargin<R> {
         let centre = self.method.forward(scene);
-        let nearest: Vec<_> = (0..R::LANES).map(|lane| self.nearest(scene, &centre, lane)).collect();
+        let nearest = self.nearest(scene, &centre);
         let lanes = R::Wide::from_lanes(|lane| match nearest[lane] {
             Some(nearest) => Self::margin(scene, &centre, nearest, lane).value,
             None => Real::of(f64::NEG_INFINITY),

@@ -1,0 +1,204 @@
+//! Contact: which samples touch the ground. Double precision decides, so that single and double precision agree on the
+//! contacts; single precision is asked first, and its answer counts where it is further from τ than its rounding.
+
+use crate::error::Result;
+use crate::ground::Plane;
+use crate::number::{Data, Real, Room, Scalar, WideScalar};
+use crate::quantity::unknown_choice;
+use crate::scene::Scene;
+
+/// Which samples touch the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ContactRule {
+    /// |h| < τ
+    Paper,
+    /// h < τ, and ten contacts or fewer count as none: the authors' released code.
+    Released,
+}
+
+impl ContactRule {
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "paper" => Ok(ContactRule::Paper),
+            "released" => Ok(ContactRule::Released),
+            _ => Err(unknown_choice("contact", "\"paper\", \"released\"", name)),
+        }
+    }
+
+    /// What is compared with τ.
+    #[inline(always)]
+    fn distance<R: Real>(self, height: R) -> R {
+        match self {
+            ContactRule::Paper => height.abs(),
+            ContactRule::Released => height,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    pub rule: ContactRule,
+    /// τ, m
+    pub threshold: f64,
+}
+
+const RELEASED_MINIMUM: usize = 11;
+
+/// The samples that touch the ground in any lane.
+pub struct Contacts<R: Real> {
+    pub(super) touches: Vec<Touch<R>>,
+    /// Contacts of each lane, a whole number.
+    count: R,
+    rule: ContactRule,
+    /// More than a coordinate on the ground or a height is off by rounding, m.
+    pub(super) rounding: R,
+}
+
+pub(super) struct Touch<R> {
+    pub sample: u32,
+    /// The lanes in which it touches, as bits.
+    pub lanes: u32,
+    /// Negative in the lanes in which it touches.
+    pub test: R,
+    /// Its position on the ground, as precise as R.
+    pub flat: [R; 2],
+}
+
+impl Contact {
+    pub fn find<R: Real>(&self, scene: &Scene<R>) -> Contacts<R> {
+        R::apart::<Find, _>((self, scene))
+    }
+
+    /// Decides about one sample in double precision, for the lanes that are asked for.
+    #[inline(always)]
+    fn decide<R: Real>(&self, scene: &Scene<R>, sample: usize, lanes: u32) -> u32 {
+        let height = scene.ground.signed_height(scene.template.samples.wide_point(sample, scene.points));
+        let mut touching = 0;
+        for lane in 0..R::LANES {
+            let touches = self.rule.distance(height.lane(lane)).value() < self.threshold;
+            touching |= u32::from(touches) << lane;
+        }
+        touching & lanes
+    }
+}
+
+/// [`Contact::find`]
+struct Find;
+
+impl<R: Real> Room<(&Contact, &Scene<'_, R>)> for Find {
+    type Output = Contacts<R>;
+
+    #[inline(always)]
+    fn enter((contact, scene): (&Contact, &Scene<R>)) -> Contacts<R> {
+        let all = u32::MAX >> (32 - R::LANES);
+        let walk = &scene.template.samples.walk;
+        let plane = scene.narrow_plane();
+        let threshold = R::of(contact.threshold);
+        let rounding = rounding(scene, contact.threshold);
+        let high = threshold + rounding;
+        let heights = scene.heights();
+        let above = lanes_above(&heights, high);
+        let mut touches = Vec::new();
+        let mut count = R::zero();
+        for chunk in &walk.chunks {
+            let (groups, size) = walk.groups(chunk);
+            for (group, &[a, b, c]) in groups.iter().enumerate() {
+                let [a, b, c] = [a as usize, b as usize, c as usize];
+                if above[a] & above[b] & above[c] == all {
+                    continue;
+                }
+                let start = heights[a];
+                let (to_b, to_c) = (heights[b] - start, heights[c] - start);
+                let flat_a = plane.flatten(scene.points[a]);
+                let (flat_b, flat_c) = (plane.flatten(scene.points[b]), plane.flatten(scene.points[c]));
+                let edges_x = (flat_b[0] - flat_a[0], flat_c[0] - flat_a[0]);
+                let edges_y = (flat_b[1] - flat_a[1], flat_c[1] - flat_a[1]);
+                for place in chunk.samples.start + group * size..chunk.samples.start + (group + 1) * size {
+                    let [_, v, w] = walk.weights::<R>(place);
+                    let distance = contact.rule.distance(w.mul_add(to_c, v.mul_add(to_b, start)));
+                    let inside = (distance + rounding - threshold).negative();
+                    let outside = (high - distance).negative();
+                    let mut test = distance - threshold;
+                    let mut lanes = inside;
+                    let unsure = all & !(inside | outside);
+                    if unsure != 0 {
+                        lanes |= contact.decide(scene, walk.order[place] as usize, unsure);
+                        test = R::from_lanes(|lane| Real::of(if lanes >> lane & 1 == 1 { -1.0 } else { 1.0 }));
+                    }
+                    if lanes != 0 {
+                        count = count + test.if_negative(R::of(1.0), R::zero());
+                        let x = w.mul_add(edges_x.1, v.mul_add(edges_x.0, flat_a[0]));
+                        let y = w.mul_add(edges_y.1, v.mul_add(edges_y.0, flat_a[1]));
+                        touches.push(Touch { sample: walk.order[place], lanes, test, flat: [x, y] });
+                    }
+                }
+            }
+        }
+        Contacts { touches, count, rule: contact.rule, rounding }
+    }
+}
+
+/// A bound on what rounding does to the height or to a coordinate on the ground of any sample, m. Both come from a dot
+/// product with a vertex and two interpolations; each of the about 20 roundings is at most half ε of the longest vector
+/// and of the ground's height, and the bound is three times their sum.
+#[inline(always)]
+fn rounding<R: Real>(scene: &Scene<R>, threshold: f64) -> R {
+    let mut longest = R::zero();
+    for vertex in &scene.points[..scene.template.mesh.num_vertices] {
+        longest = longest.at_least(vertex[0].abs() + vertex[1].abs() + vertex[2].abs());
+    }
+    let height = R::narrow(scene.ground.height).abs();
+    R::of(32.0 * R::Data::EPSILON) * (longest + height + R::of(threshold.abs()))
+}
+
+/// For each vertex the lanes in which it certainly lies above contact: a face with three such vertices has no contacts.
+#[inline(always)]
+fn lanes_above<R: Real>(heights: &[R], high: R) -> Vec<u32> {
+    let mut above = Vec::with_capacity(heights.len());
+    for &height in heights {
+        above.push((high - height).negative());
+    }
+    above
+}
+
+impl<R: Real> Contacts<R> {
+    /// How many contacts a lane has.
+    pub fn count(&self, lane: usize) -> usize {
+        let count = self.count.lane(lane).value() as usize;
+        if self.rule == ContactRule::Released && count < RELEASED_MINIMUM { 0 } else { count }
+    }
+
+    /// The contacts' positions on the ground in one lane, in double precision.
+    #[cfg(feature = "lp")]
+    pub fn positions(&self, scene: &Scene<R>, lane: usize) -> Vec<[f64; 2]> {
+        if self.count(lane) == 0 {
+            return Vec::new();
+        }
+        let body = OneBody::new(scene, lane);
+        let touches = self.touches.iter().filter(|touch| touch.lanes >> lane & 1 == 1);
+        touches.map(|touch| body.flat(touch.sample)).collect()
+    }
+}
+
+/// One lane of a scene in double precision.
+pub(super) struct OneBody<'a, R: Real> {
+    scene: &'a Scene<'a, R>,
+    lane: usize,
+    plane: Plane<WideScalar<R>>,
+}
+
+impl<'a, R: Real> OneBody<'a, R> {
+    #[inline(always)]
+    pub fn new(scene: &'a Scene<'a, R>, lane: usize) -> Self {
+        let of = |vector: [R::Wide; 3]| [vector[0].lane(lane), vector[1].lane(lane), vector[2].lane(lane)];
+        OneBody { scene, lane, plane: Plane { axes: [of(scene.plane.axes[0]), of(scene.plane.axes[1])] } }
+    }
+
+    /// A sample's position on the ground.
+    #[inline(always)]
+    pub fn flat(&self, sample: u32) -> [f64; 2] {
+        let point = self.scene.template.samples.point_of_lane(sample as usize, self.scene.points, self.lane);
+        let [x, y] = self.plane.flatten(point);
+        [x.value(), y.value()]
+    }
+}

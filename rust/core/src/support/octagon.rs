@@ -1,0 +1,153 @@
+//! The points that may be corners of the contacts' hull, found on lanes: what lies inside the octagon of the eight
+//! extreme contacts (after Akl and Toussaint) cannot be one. What is left is for the exact hull.
+
+use crate::number::{Real, Room, Scalar};
+use crate::scene::Scene;
+use crate::support::contact::{Contacts, OneBody};
+use crate::support::hull;
+
+/// The hull of one lane's contacts.
+#[derive(Default)]
+pub struct Hull {
+    /// The corners' samples, counter-clockwise.
+    pub samples: Vec<u32>,
+    /// Their positions on the ground.
+    pub corners: Vec<[f64; 2]>,
+    pub num_contacts: usize,
+}
+
+impl<R: Real> Contacts<R> {
+    /// The hull of each lane.
+    pub fn hulls(&self, scene: &Scene<R>) -> Vec<Hull> {
+        let edges = Edges::new(self, scene, &R::apart::<Extremes, _>((self,)));
+        R::apart::<Hulls, _>((self, scene, edges))
+    }
+}
+
+const DIRECTIONS: usize = 8;
+
+/// In each direction the place of the extreme contact among the touches, −1 in a lane without contacts.
+struct Extremes;
+
+impl<R: Real> Room<(&Contacts<R>,)> for Extremes {
+    type Output = [R; DIRECTIONS];
+
+    #[inline(always)]
+    fn enter((contacts,): (&Contacts<R>,)) -> [R; DIRECTIONS] {
+        let mut best = [R::of(-f64::MAX); DIRECTIONS];
+        let mut place = [R::of(-1.0); DIRECTIONS];
+        for (i, touch) in contacts.touches.iter().enumerate() {
+            let here = R::of(i as f64);
+            let [x, y] = touch.flat;
+            let (sum, difference) = (x + y, x - y);
+            let reach = [x, sum, y, -difference, -x, -sum, -y, difference];
+            for k in 0..DIRECTIONS {
+                let ahead = touch.test.if_negative(best[k] - reach[k], R::zero());
+                best[k] = ahead.if_negative(reach[k], best[k]);
+                place[k] = ahead.if_negative(here, place[k]);
+            }
+        }
+        place
+    }
+}
+
+/// Inside the octagon all of x · normal + offset are positive, by more than rounding.
+struct Edges<R> {
+    normals: [[R; 2]; DIRECTIONS],
+    offsets: [R; DIRECTIONS],
+}
+
+impl<R: Real> Edges<R> {
+    fn new(contacts: &Contacts<R>, scene: &Scene<R>, extremes: &[R; DIRECTIONS]) -> Self {
+        let of_lane = |lane: usize| lane_edges(contacts, scene, lane, extremes);
+        let lanes: Vec<_> = (0..R::LANES).map(of_lane).collect();
+        let number = |k: usize, i: usize| R::from_lanes(|lane| Real::of(lanes[lane][k][i]));
+        Edges {
+            normals: std::array::from_fn(|k| [number(k, 0), number(k, 1)]),
+            offsets: std::array::from_fn(|k| number(k, 2)),
+        }
+    }
+
+    /// The lanes in which a point is inside, as bits.
+    #[inline(always)]
+    fn inside(&self, [x, y]: [R; 2]) -> u32 {
+        let depth = |k: usize| self.normals[k][0].mul_add(x, self.normals[k][1].mul_add(y, self.offsets[k]));
+        let mut least = depth(0);
+        for k in 1..DIRECTIONS {
+            least = least.at_most(depth(k));
+        }
+        (-least).negative()
+    }
+}
+
+/// (normal, offset) of the octagon's edges in one lane, from its exact corners; equal corners repeat an edge. Nothing is
+/// inside an octagon without area.
+fn lane_edges<R: Real>(
+    contacts: &Contacts<R>,
+    scene: &Scene<R>,
+    lane: usize,
+    extremes: &[R; DIRECTIONS],
+) -> [[f64; 3]; DIRECTIONS] {
+    let nowhere = [[0.0, 0.0, -1.0]; DIRECTIONS];
+    let rounding = contacts.rounding.lane(lane).value();
+    let body = OneBody::new(scene, lane);
+    let mut points = Vec::with_capacity(DIRECTIONS);
+    for place in extremes {
+        let place = place.lane(lane).value();
+        if place >= 0.0 {
+            points.push(body.flat(contacts.touches[place as usize].sample));
+        }
+    }
+    let corners = hull::convex_hull(&points);
+    if corners.len() < 3 || !rounding.is_finite() {
+        return nowhere;
+    }
+    std::array::from_fn(|k| {
+        let (a, b) = (points[corners[k % corners.len()]], points[corners[(k + 1) % corners.len()]]);
+        let length = f64::hypot(b[0] - a[0], b[1] - a[1]);
+        let normal = [(a[1] - b[1]) / length, (b[0] - a[0]) / length];
+        // A point's coordinates, its depth and the edge's numbers are each off by less than `rounding`.
+        [normal[0], normal[1], -(normal[0] * a[0] + normal[1] * a[1]) - 4.0 * rounding]
+    })
+}
+
+/// [`Contacts::hulls`]
+struct Hulls;
+
+impl<R: Real> Room<(&Contacts<R>, &Scene<'_, R>, Edges<R>)> for Hulls {
+    type Output = Vec<Hull>;
+
+    #[inline(always)]
+    fn enter((contacts, scene, edges): (&Contacts<R>, &Scene<R>, Edges<R>)) -> Vec<Hull> {
+        let mut candidates = vec![Vec::new(); R::LANES];
+        for touch in &contacts.touches {
+            let mut lanes = touch.lanes & !edges.inside(touch.flat);
+            while lanes != 0 {
+                candidates[lanes.trailing_zeros() as usize].push(touch.sample);
+                lanes &= lanes - 1;
+            }
+        }
+        let mut hulls = Vec::with_capacity(R::LANES);
+        for (lane, mut samples) in candidates.into_iter().enumerate() {
+            let num_contacts = contacts.count(lane);
+            if num_contacts == 0 {
+                hulls.push(Hull::default());
+                continue;
+            }
+            // In public order: of equal points the first is the corner.
+            samples.sort_unstable();
+            let body = OneBody::new(scene, lane);
+            let mut positions = Vec::with_capacity(samples.len());
+            for &sample in &samples {
+                positions.push(body.flat(sample));
+            }
+            let corners = hull::convex_hull(&positions);
+            hulls.push(Hull {
+                samples: corners.iter().map(|&i| samples[i]).collect(),
+                corners: corners.iter().map(|&i| positions[i]).collect(),
+                num_contacts,
+            });
+        }
+        hulls
+    }
+}
