@@ -48,8 +48,8 @@ def main(context: click.Context, bodies: int, threads: int, out: Path) -> None:
             file.unlink()
             result["runs"].append({"bodies": count, **run})
             click.echo(
-                f"{count:9,} bodies: {run['bodies_a_second']:8,.0f} a second ({run['cpu_us_a_body']:.0f} µs of CPU each), "
-                f"report {run['report_seconds']:.1f} s, peak {run['peak_megabytes']:,.0f} MB"
+                f"{count:9,} bodies: {run['bodies_a_second']:8,.0f} a second, {run['cpu_us_a_body']:.0f} µs of CPU; "
+                f"report {run['report_seconds']:.1f} s; peak {run['peak_megabytes']:,.0f} MB"
             )
     out.mkdir(parents=True, exist_ok=True)
     (out / "million.json").write_text(json.dumps(result, indent=1) + "\n")
