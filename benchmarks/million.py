@@ -104,7 +104,7 @@ def run(file: Path, report: Path) -> None:
 @main.command(hidden=True)
 def stages() -> None:
     """µs of one core a body for posing and for analysis."""
-    from ipman_rs.analysis import PIECE
+    from ipman_rs.analysis import PIECE, analyze_sequence
     from ipman_rs.cli.parameters import read_npz
 
     ip.set_num_threads(1)
@@ -120,7 +120,7 @@ def stages() -> None:
             pass
         times["posing"].append(time.process_time() - start)
         start = time.process_time()
-        for _part in ip.analysis.analyze_sequence(bodies, template, ip.Ground()):
+        for _part in analyze_sequence(bodies, template, ip.Ground()):
             pass
         times["posing and analysis"].append(time.process_time() - start)
     click.echo(json.dumps({name: round(1e6 * min(each) / STAGED, 1) for name, each in times.items()}))

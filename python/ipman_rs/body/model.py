@@ -20,6 +20,8 @@ from .parts import PART_NAMES, face_parts
 if TYPE_CHECKING:
     from ..template import BodyTemplate
 
+_Rows = NDArray[np.floating] | None
+
 _KEYS = itertools.count()
 _BY_KEY: weakref.WeakValueDictionary[int, BodyModel] = weakref.WeakValueDictionary()
 
@@ -159,7 +161,7 @@ class BodyModel:
         betas: ArrayLike | None,
         transl: ArrayLike | None,
         expression: ArrayLike | None,
-    ) -> tuple[type[np.floating], tuple[int, ...], tuple[NDArray[np.floating] | None, ...]]:
+    ) -> tuple[type[np.floating], tuple[int, ...], tuple[_Rows, _Rows, _Rows, _Rows]]:
         """The precision, the batch, and the four parameters as rows."""
         given = [value for value in (pose, betas, transl, expression) if value is not None]
         dtype = np.float32 if given and np.result_type(*map(np.asarray, given)) == np.float32 else np.float64
@@ -172,8 +174,10 @@ class BodyModel:
         tails = {name: 2 if name == "pose" else 1 for name in arrays}
         shapes = {name: array.shape[: -tails[name]] for name, array in arrays.items() if array is not None}
         batch = _common_batch(**shapes)
-        rows = [None if array is None else _rows(array, batch, tails[name]) for name, array in arrays.items()]
-        return dtype, batch, tuple(rows)
+        given_pose, given_betas, given_expression, given_transl = (
+            None if array is None else _rows(array, batch, tails[name]) for name, array in arrays.items()
+        )
+        return dtype, batch, (given_pose, given_betas, given_expression, given_transl)
 
     def _pose(self, pose: ArrayLike | None, dtype: type[np.floating]) -> NDArray[np.floating]:
         """A pose in either form, with at least the dimensions (J, 3) or (J, 6)."""

@@ -111,8 +111,7 @@ def _read_parameters(stored: _Npz, model: str) -> Recording:
     betas, more = _betas(stored, body, len(pose), amass)
 
     def parameters(index: Index) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
-        columns = (None if rows is None else rows_of(rows, index).astype(np.float32) for rows in (betas, trans))
-        return pose.of(index), *columns
+        return pose.of(index), _singles(betas, index), _singles(trans, index)
 
     vertices = PosedSequence(body, len(pose), parameters)
     why = ", as AMASS has it" if amass else ""
@@ -122,6 +121,10 @@ def _read_parameters(stored: _Npz, model: str) -> Recording:
         seconds=_seconds(stored, len(pose)), up=Z_UP if amass else Y_UP, up_why=why,
         notes=(said, *pose.notes(), *more),
     )  # fmt: skip
+
+
+def _singles(rows: np.ndarray | None, index: Index) -> np.ndarray | None:
+    return None if rows is None else rows_of(rows, index).astype(np.float32)
 
 
 def _pose(stored: _Npz) -> list[tuple[np.ndarray, tuple[str, ...]]]:
