@@ -56,8 +56,14 @@ def test_every_field_is_its_own_function_s(preset, dtype, blob, bodies):
     for row, wanted in zip(found.base_of_support.polygon, support.polygon, strict=True):
         for polygon, corners in zip(row, wanted, strict=True):
             np.testing.assert_array_equal(polygon, corners)
+    # Sums of 64 samples in the vertices' precision, then in double.
+    rounding = 1e-6 if dtype == np.float32 else 1e-14
+    np.testing.assert_allclose(found.pressure_sum, found.pressure.sum(axis=-1, dtype=np.float64), rtol=rounding)
+    np.testing.assert_allclose(found.pressure_max, found.pressure.max(axis=-1), rtol=rounding)
+    heights = np.stack([[ground.signed_height(body.astype(np.float64)) for body in row] for row in vertices])
+    np.testing.assert_allclose(found.lowest, heights.min(axis=-1), rtol=0, atol=rounding)
     # Nothing is left that this test does not look at.
-    described = {"preset", "part_names", "com_method", "base_of_support"}
+    described = {"preset", "part_names", "com_method", "base_of_support", "pressure_sum", "pressure_max", "lowest"}
     assert {field.name for field in dataclasses.fields(found)} == described | {n for n in expected if "." not in n}
     assert (found.preset, found.part_names, found.com_method) == (preset, blob.part_names, "pcom")
 

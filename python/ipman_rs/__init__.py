@@ -6,7 +6,7 @@ Importing this package needs numpy alone.
 
 from ipman_rs import body, presets
 from ipman_rs._core import __version__, get_num_threads, set_num_threads
-from ipman_rs.analysis import Analysis, analyze
+from ipman_rs.analysis import Analysis, analyze, analyze_poses
 from ipman_rs.body import load_body
 from ipman_rs.ground import Ground
 from ipman_rs.losses import balance_cost, ground_loss, stability_loss
@@ -28,6 +28,7 @@ __all__ = [
     "UnitsWarning",
     "__version__",
     "analyze",
+    "analyze_poses",
     "balance_cost",
     "base_of_support",
     "body",

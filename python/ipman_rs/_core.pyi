@@ -168,6 +168,18 @@ def value_and_vjp(
 ) -> tuple[NDArray[_Float], NDArray[_Float]]:
     """The value (B, K) and the gradient of Σ d_out · value (B, V, 3), in one pass."""
 
+def analysis(
+    template: Template,
+    method: str,
+    contact_rule: str,
+    options: Sequence[float],
+    densities: Sequence[float],
+    vertices: NDArray[_Float],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+) -> tuple[NDArray[_Float], NDArray[np.float64], NDArray[np.int64]]:
+    """Rows of figures (B, K), the corners (N, 3) of all bases of support, and how many each has (B,)."""
+
 def base_of_support(
     template: Template,
     contact_rule: str,

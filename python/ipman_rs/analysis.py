@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs import presets
+from ipman_rs import _core, presets
 from ipman_rs.arrays import Bodies
 from ipman_rs.ground import Ground
-from ipman_rs.losses import balance_cost, ground_loss, stability_loss
-from ipman_rs.mass import center_of_mass
 from ipman_rs.plain import plain
-from ipman_rs.pressure import center_of_pressure, pressure
-from ipman_rs.status import Status, body_status, status_names, warn_odd_size
-from ipman_rs.support import BaseOfSupport, base_of_support
+from ipman_rs.pressure import pressure
+from ipman_rs.status import Status, status_names, warn_odd_size
+from ipman_rs.support import BaseOfSupport, nest
 from ipman_rs.template import BodyTemplate
-from ipman_rs.volume import mass_properties, part_volumes
+from ipman_rs.volume import densities
+
+if TYPE_CHECKING:
+    from ipman_rs.body.model import BodyModel
+    from ipman_rs.body.sequence import PosedSequence
+
+# Bodies that are posed and analysed at a time: enough for the lanes of several threads, few enough for the cache.
+PIECE = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +33,9 @@ class Analysis:
     """Every figure of a batch of bodies; shapes start with the batch's. Metres, kilograms, m³.
 
     center_of_mass is the paper's pCoM, or the exact one for a body of one part (`com_method` says which). stability,
-    pull, push and balance are the unweighted losses of the preset; `status` holds the bits of `ipman_rs.Status`.
+    pull, push and balance are the unweighted losses of the preset; `status` holds the bits of `ipman_rs.Status`;
+    `lowest` is the height of the lowest vertex above the ground. `pressure` of each sample is None where it was not
+    asked for; its sum and its largest value are always there.
     """
 
     preset: str
@@ -40,7 +48,9 @@ class Analysis:
     inertia: NDArray[Any]
     center_of_mass: NDArray[Any]
     center_of_mass_exact: NDArray[Any]
-    pressure: NDArray[Any]
+    pressure: NDArray[Any] | None
+    pressure_sum: NDArray[Any]
+    pressure_max: NDArray[Any]
     center_of_pressure: NDArray[Any]
     base_of_support: BaseOfSupport
     bose: NDArray[np.bool_]
@@ -48,6 +58,7 @@ class Analysis:
     pull: NDArray[Any]
     push: NDArray[Any]
     balance: NDArray[Any]
+    lowest: NDArray[Any]
 
     def to_json(self) -> str:
         """Strict JSON: the fields by name, nested as the batch, status as names; what is not finite becomes null.
@@ -57,60 +68,188 @@ class Analysis:
         values = {name: value for name, value in vars(self).items() if name not in {"pressure", "status"}}
         values["base_of_support"] = vars(self.base_of_support)
         values["status"] = status_names(self.status)
-        values["pressure_sum"] = self.pressure.sum(axis=-1)
-        values["pressure_max"] = self.pressure.max(axis=-1)
         return json.dumps(plain(values), allow_nan=False)
+
+    @classmethod
+    def concatenate(cls, parts: Iterable[Analysis]) -> Analysis:
+        """One analysis of the bodies of several, along the first axis of their batches.
+
+        Raises:
+            ValueError: there are none.
+        """
+        parts = list(parts)
+        if not parts:
+            raise ValueError("parts: expected at least one analysis")
+        return cls(**{field.name: _joined([getattr(part, field.name) for part in parts]) for field in fields(cls)})
+
+
+def _joined(values: list[Any]) -> Any:
+    if isinstance(values[0], np.ndarray):
+        return np.concatenate(values)
+    if isinstance(values[0], list):
+        return [entry for value in values for entry in value]
+    if isinstance(values[0], BaseOfSupport):
+        columns = {field.name: [getattr(value, field.name) for value in values] for field in fields(BaseOfSupport)}
+        return BaseOfSupport(**{name: _joined(column) for name, column in columns.items()})
+    return values[0]
 
 
 def analyze(
-    vertices: ArrayLike, template: BodyTemplate, ground: Ground, preset: str = "paper-r", density: float = 985.0
+    vertices: ArrayLike,
+    template: BodyTemplate,
+    ground: Ground,
+    preset: str = "paper-r",
+    density: ArrayLike = 985.0,
+    with_pressure: bool = True,
 ) -> Analysis:
     """Every quantity of each body with the constants of a preset (see `ipman_rs.presets`).
 
     Args:
         vertices: (..., V, 3) m.
         density: kg/m³, one number or one a part.
+        with_pressure: keep the pressure of every sample.
 
     Warns:
         UnitsWarning: a body is too large or too small for metres.
     """
-    constants = presets.get(preset)
     bodies = Bodies(vertices, template)
-    vertices = bodies.vertices.reshape(*bodies.shape, *bodies.vertices.shape[1:])
+    found = _analyze(bodies, ground, presets.get(preset), density, with_pressure)
+    _warn_units(bodies.vertices, np.ravel(found.status))
+    return found
+
+
+def analyze_poses(
+    body: BodyModel,
+    pose: ArrayLike,
+    ground: Ground,
+    betas: ArrayLike | None = None,
+    transl: ArrayLike | None = None,
+    preset: str = "paper-r",
+    density: ArrayLike = 985.0,
+    template: BodyTemplate | None = None,
+    with_pressure: bool = False,
+    piece: int = PIECE,
+) -> Iterator[Analysis]:
+    """Every quantity of each posed body, a piece of the bodies at a time: memory does not grow with their number.
+
+    The parts are those of `analyze` on all bodies, to the bit and for any piece; `Analysis.concatenate` joins them.
+
+    Args:
+        pose: (T, J, 3) axis-angle or (T, J, 6), as in `BodyModel.forward`. float32 throughout is the fast way.
+        ground: one for all bodies.
+        betas: (B,) of all bodies, or (T, B). transl: (3,) or (T, 3) m.
+        template: another than `body.template`.
+        with_pressure: keep the pressure of every sample.
+        piece: bodies at a time.
+
+    Warns:
+        UnitsWarning: a body is too large or too small for metres; once, for the first.
+    """
+    from ipman_rs.body.sequence import PosedSequence
+
+    return analyze_sequence(
+        PosedSequence.of(body, pose, betas, transl), template or body.template, ground, preset, density, with_pressure,
+        piece,
+    )  # fmt: skip
+
+
+def analyze_sequence(
+    bodies: PosedSequence | NDArray[Any],
+    template: BodyTemplate,
+    ground: Ground,
+    preset: str = "paper-r",
+    density: ArrayLike = 985.0,
+    with_pressure: bool = False,
+    piece: int = PIECE,
+) -> Iterator[Analysis]:
+    """`analyze_poses` for bodies that are posed when they are needed, or vertices (T, V, 3)."""
+    from ipman_rs.body.sequence import pieces
+
+    if np.ndim(ground.height) or np.ndim(ground.normal) > 1:
+        raise ValueError(f"ground: expected one for all bodies, got heights {ground.height.shape}")
+    constants = presets.get(preset)
+    warned, start = False, 0
+    for vertices in pieces(bodies, piece):
+        checked = Bodies(vertices, template)
+        found = _analyze(checked, ground, constants, density, with_pressure)
+        warned = warned or _warn_units(checked.vertices, found.status, start)
+        start += len(vertices)
+        yield found
+
+
+def _analyze(
+    bodies: Bodies, ground: Ground, constants: presets.Preset, density: ArrayLike, with_pressure: bool
+) -> Analysis:
+    template = bodies.template
     com_method: Literal["pcom", "exact"] = "exact" if template.num_parts == 1 else "pcom"
-    status = body_status(vertices, template, ground, constants.threshold, constants.contact)
-    _warn_units(bodies, status)
-    curve = {"alpha": constants.alpha, "gamma": constants.gamma}
-    solid = mass_properties(vertices, template, density)
-    support = base_of_support(vertices, template, ground, constants.threshold, com_method, constants.contact)
-    pull, push = ground_loss(
-        vertices, template, ground, constants.alpha1, constants.alpha2, constants.beta1, constants.beta2
+    options = [
+        constants.alpha, constants.gamma, constants.epsilon, constants.alpha1, constants.alpha2, constants.beta1,
+        constants.beta2, constants.threshold, constants.balance_gamma, constants.sigma,
+    ]  # fmt: skip
+    rows, corners, counts = _core.analysis(
+        template._core, com_method, constants.contact, options, densities(density, template), *bodies.over(ground)
     )
+    corners = corners.astype(rows.dtype, copy=False)
+    value = _Figures(bodies, rows)
+    finite = ~np.isnan(rows[:, _STATUS])
+    margin = value(_MARGIN)
+    num_contacts = bodies.unfold(np.where(finite, rows[:, _NUM_CONTACTS], 0).astype(np.int64))
+    support = BaseOfSupport(
+        polygon=nest(
+            [corners[end - count : end] for count, end in zip(counts, np.cumsum(counts), strict=True)], bodies.shape
+        ),
+        area=value(_AREA),
+        margin=margin,
+        inside=margin >= 0.0,
+        has_contact=num_contacts > 0,
+        num_contacts=num_contacts,
+    )
+    curve = {"alpha": constants.alpha, "gamma": constants.gamma}
+    vertices = bodies.vertices.reshape(*bodies.shape, *bodies.vertices.shape[1:])
     return Analysis(
-        preset=preset,
+        preset=constants.name,
         part_names=template.part_names,
         com_method=com_method,
-        status=status,
-        part_volumes=part_volumes(vertices, template),
-        volume=solid.volume,
-        mass=solid.mass,
-        inertia=solid.inertia,
-        center_of_mass=center_of_mass(vertices, template, com_method),
-        center_of_mass_exact=center_of_mass(vertices, template, "exact"),
-        pressure=pressure(vertices, template, ground, **curve),
-        center_of_pressure=center_of_pressure(vertices, template, ground, **curve, epsilon=constants.epsilon),
+        status=bodies.unfold(np.where(finite, rows[:, _STATUS], Status.NON_FINITE).astype(np.int64)),
+        part_volumes=value(_PART_VOLUMES, template.num_parts),
+        volume=value(_SOLID),
+        mass=value(_SOLID + 1),
+        inertia=value(_SOLID + 5, 3, 3),
+        center_of_mass=value(_CENTER_OF_MASS, 3),
+        center_of_mass_exact=value(_CENTER_OF_MASS_EXACT, 3),
+        pressure=pressure(vertices, template, ground, **curve) if with_pressure else None,
+        pressure_sum=value(_PRESSURE_SUM),
+        pressure_max=value(_PRESSURE_MAX),
+        center_of_pressure=value(_CENTER_OF_PRESSURE, 3),
         base_of_support=support,
         bose=support.inside,
-        stability=stability_loss(vertices, template, ground, **curve, epsilon=constants.epsilon, method=com_method),
-        pull=pull,
-        push=push,
-        balance=balance_cost(
-            vertices, template, ground, constants.alpha, constants.balance_gamma, constants.sigma, method=com_method
-        ),
+        stability=value(_STABILITY),
+        pull=value(_GROUND),
+        push=value(_GROUND + 1),
+        balance=value(_BALANCE),
+        lowest=value(_LOWEST),
     )
 
 
-def _warn_units(bodies: Bodies, status: NDArray[np.int64]) -> None:
+# Where the core's rows have each figure: rust/core/src/analysis.rs.
+_STATUS, _NUM_CONTACTS, _AREA, _MARGIN, _LOWEST, _PRESSURE_SUM, _PRESSURE_MAX, _STABILITY, _GROUND = range(9)
+_BALANCE, _CENTER_OF_MASS, _CENTER_OF_MASS_EXACT, _CENTER_OF_PRESSURE, _SOLID, _PART_VOLUMES = 10, 11, 14, 17, 20, 34
+
+
+@dataclass(frozen=True)
+class _Figures:
+    """The columns of the core's rows, as owned arrays in the shape of the batch."""
+
+    bodies: Bodies
+    rows: NDArray[Any]
+
+    def __call__(self, start: int, *shape: int) -> Any:
+        size = int(np.prod(shape, dtype=int))
+        return self.bodies.unfold(self.rows[:, start : start + size].copy(), *shape)
+
+
+def _warn_units(vertices: NDArray[Any], status: NDArray[np.int64], start: int = 0) -> bool:
     odd = np.flatnonzero(status & Status.ODD_SIZE)
     if odd.size:
-        warn_odd_size(float(np.ptp(bodies.vertices[odd[0]], axis=0).max()), f"body {odd[0]}")
+        warn_odd_size(float(np.ptp(vertices[odd[0]], axis=0).max()), f"body {start + odd[0]}")
+    return bool(odd.size)

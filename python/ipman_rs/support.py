@@ -61,7 +61,7 @@ def base_of_support(
     polygons, area, margin, num_contacts = found
     dtype = bodies.vertices.dtype
     return BaseOfSupport(
-        polygon=_nest([polygon.astype(dtype, copy=False) for polygon in polygons], bodies.shape),
+        polygon=nest([polygon.astype(dtype, copy=False) for polygon in polygons], bodies.shape),
         area=bodies.unfold(area.astype(dtype, copy=False)),
         margin=bodies.unfold(margin.astype(dtype, copy=False)),
         inside=bodies.unfold(margin >= 0.0),
@@ -114,11 +114,11 @@ def _question(contact: Contact, method: Method, name: str, threshold: float) -> 
     )
 
 
-def _nest(items: list[Any], shape: tuple[int, ...]) -> Any:
+def nest(items: list[Any], shape: tuple[int, ...]) -> Any:
     """The items as nested lists of this shape."""
     if not shape:
         return items[0]
     if len(shape) == 1:
         return items
     step = int(np.prod(shape[1:]))
-    return [_nest(items[start * step : (start + 1) * step], shape[1:]) for start in range(shape[0])]
+    return [nest(items[start * step : (start + 1) * step], shape[1:]) for start in range(shape[0])]

@@ -20,6 +20,8 @@ from .parts import PART_NAMES, face_parts
 if TYPE_CHECKING:
     from ..template import BodyTemplate
 
+_Rows = NDArray[np.floating] | None
+
 _KEYS = itertools.count()
 _BY_KEY: weakref.WeakValueDictionary[int, BodyModel] = weakref.WeakValueDictionary()
 
@@ -128,6 +130,39 @@ class BodyModel:
         ones are absolute. `betas` (..., up to B), `expression` (..., up to E): missing components are zero. `transl`
         (..., 3) m. float32 in gives float32 out, anything else float64. Raises ValueError on a wrong shape.
         """
+        dtype, batch, parameters = self._checked(pose, betas, transl, expression)
+        count = math.prod(batch)
+        vertices = np.empty((count, self.num_vertices, 3), dtype)
+        joints = np.empty((count, self.num_joints, 3), dtype)
+        self._skin(dtype).forward(count, parameters, vertices, joints)
+        return BodyOutput(vertices.reshape(*batch, *vertices.shape[1:]), joints.reshape(*batch, *joints.shape[1:]))
+
+    __call__ = forward
+
+    def vertices_into(
+        self,
+        buffer: NDArray[np.floating] | None,
+        pose: ArrayLike,
+        betas: ArrayLike | None = None,
+        transl: ArrayLike | None = None,
+    ) -> NDArray[np.floating]:
+        """The vertices of `forward` for poses (n, J, 3): in `buffer` (≥ n, V, 3) if it fits, else in a new array."""
+        dtype, batch, parameters = self._checked(pose, betas, transl, None)
+        (count,) = batch
+        if buffer is None or len(buffer) < count or buffer.dtype != dtype:
+            buffer = np.empty((count, self.num_vertices, 3), dtype)
+        joints = np.empty((count, self.num_joints, 3), dtype)
+        self._skin(dtype).forward(count, parameters, buffer[:count], joints)
+        return buffer[:count]
+
+    def _checked(
+        self,
+        pose: ArrayLike | None,
+        betas: ArrayLike | None,
+        transl: ArrayLike | None,
+        expression: ArrayLike | None,
+    ) -> tuple[type[np.floating], tuple[int, ...], tuple[_Rows, _Rows, _Rows, _Rows]]:
+        """The precision, the batch, and the four parameters as rows."""
         given = [value for value in (pose, betas, transl, expression) if value is not None]
         dtype = np.float32 if given and np.result_type(*map(np.asarray, given)) == np.float32 else np.float64
         arrays = {
@@ -139,17 +174,10 @@ class BodyModel:
         tails = {name: 2 if name == "pose" else 1 for name in arrays}
         shapes = {name: array.shape[: -tails[name]] for name, array in arrays.items() if array is not None}
         batch = _common_batch(**shapes)
-        count = math.prod(batch)
         given_pose, given_betas, given_expression, given_transl = (
             None if array is None else _rows(array, batch, tails[name]) for name, array in arrays.items()
         )
-        parameters = given_pose, given_betas, given_expression, given_transl
-        vertices = np.empty((count, self.num_vertices, 3), dtype)
-        joints = np.empty((count, self.num_joints, 3), dtype)
-        self._skin(dtype).forward(count, parameters, vertices, joints)
-        return BodyOutput(vertices.reshape(*batch, *vertices.shape[1:]), joints.reshape(*batch, *joints.shape[1:]))
-
-    __call__ = forward
+        return dtype, batch, (given_pose, given_betas, given_expression, given_transl)
 
     def _pose(self, pose: ArrayLike | None, dtype: type[np.floating]) -> NDArray[np.floating]:
         """A pose in either form, with at least the dimensions (J, 3) or (J, 6)."""

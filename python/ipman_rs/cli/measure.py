@@ -12,6 +12,8 @@ import numpy as np
 import ipman_rs as ip
 
 from .. import view
+from ..analysis import PIECE
+from ..body.sequence import pieces
 from . import console
 from .errors import FileError
 from .meshes import read_mesh
@@ -56,10 +58,9 @@ def _measure(path: Path, request: Request) -> view.Study:
         notes.append(f"up: {recording.up_name} (assumed{recording.up_why}; --up says otherwise)")
     height = request.ground
     if height is None:
-        heights = recording.vertices.astype(np.float64) @ ip.Ground(normal).normal
-        if not np.isfinite(heights).any():
+        height = _lowest(recording, ip.Ground(normal).normal)
+        if not np.isfinite(height):
             raise FileError(path, "no vertex is a finite number; export it again")
-        height = float(heights[np.isfinite(heights)].min())
         whole = "of all frames " if len(recording.vertices) > 1 else ""
         where = f"{round(height, 4) + 0.0:+.4f} m"
         notes.append(f"ground: through the lowest vertex {whole}({where}; --ground HEIGHT says otherwise)")
@@ -86,20 +87,46 @@ def read(path: Path, model: str) -> Recording:
     return read_mesh(path)
 
 
+def _lowest(recording: Recording, normal: np.ndarray) -> float:
+    """The least finite height along the normal; infinite if there is none."""
+    lowest = np.inf
+    with console.progress(f"finding the ground of {recording.path.name}", len(recording.vertices)) as step:
+        done = 0
+        for vertices in pieces(recording.vertices, PIECE):
+            heights = _heights(vertices, normal)
+            least = heights.min()
+            if not np.isfinite(least):
+                least = heights.min(initial=np.inf, where=np.isfinite(heights))
+            lowest = min(lowest, float(least))
+            done += len(vertices)
+            step.to(done)
+    return lowest
+
+
+def _heights(vertices: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """normal · vertex of each, summed in one order whatever the number of bodies, which a matrix product does not."""
+    axis = int(np.argmax(normal))
+    if normal[axis] == 1.0:
+        return vertices[..., axis]
+    x, y, z = (vertices[..., k].astype(np.float64) * normal[k] for k in range(3))
+    return x + y + z
+
+
 def _template(recording: Recording, request: Request) -> tuple[Any, list[str]]:
     """The template of a recording, and where its parts come from."""
-    vertices, faces = recording.vertices, recording.faces
+    faces = recording.faces
     if recording.template is not None and request.parts is None:
         return recording.template, []
-    finite = np.flatnonzero(np.isfinite(vertices).all(axis=(1, 2)))
-    if len(finite) == 0:
+    frames = (frame for piece in pieces(recording.vertices, PIECE) for frame in piece)
+    first = next((frame.copy() for frame in frames if np.isfinite(frame).all()), None)
+    if first is None:
         raise FileError(recording.path, "no frame has finite vertices only; export it again")
     if request.parts is not None:
         face_parts, names = read_parts(request.parts, faces, recording.vertex_map)
-        template = ip.BodyTemplate(vertices[finite[0]], faces, face_parts, names)
+        template = ip.BodyTemplate(first, faces, face_parts, names)
         return template, [f"parts: {len(names)} from {request.parts}"]
-    body = match_body(faces, vertices.shape[1], request.model)
+    body = match_body(faces, len(first), request.model)
     if body is not None:
         return body.template, [f"parts: the {len(body.part_names)} of the body {body.name}, whose topology it has"]
-    template = ip.BodyTemplate(vertices[finite[0]], faces)
+    template = ip.BodyTemplate(first, faces)
     return template, ["parts: none known, so it is analysed as one part (--parts FILE names them)"]

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..body import safe_npz
 from ..body.joints import BODY, SMPL, SMPLH, SMPLX
+from ..body.sequence import Index, PosedSequence, rows_of
 from .errors import FileError
 from .meshes import join_seams
 from .parts import match_body
@@ -102,29 +103,32 @@ def _read_parameters(stored: _Npz, model: str) -> Recording:
     amass = "poses" in stored.names or "root_orient" in stored.names
     # AMASS stores absolute hand angles, the smplx package angles relative to the mean hand.
     body = ip.load_body(model, flat_hand_mean=True) if amass else ip.load_body(model)
-    angles, names = _pose(stored)
-    pose, notes = _onto(angles, names, body)
+    pose = _Pose(_pose(stored), body)
     trans = stored.first("trans", "transl")
     if trans is not None and (trans.shape[-1:] != (3,) or trans.reshape(-1, 3).shape[0] not in (1, len(pose))):
         raise FileError(stored.path, f"trans has shape {trans.shape}; expected ({len(pose)}, 3)")
+    trans = None if trans is None else trans.reshape(-1, 3)
     betas, more = _betas(stored, body, len(pose), amass)
-    vertices = body(
-        pose.astype(np.float32),
-        betas,
-        None if trans is None else np.broadcast_to(trans.reshape(-1, 3), (len(pose), 3)).astype(np.float32),
-    ).vertices
-    if len(pose) == 1:
-        vertices = vertices.astype(np.float64)
+
+    def parameters(index: Index) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
+        return pose.of(index), _singles(betas, index), _singles(trans, index)
+
+    vertices = PosedSequence(body, len(pose), parameters)
     why = ", as AMASS has it" if amass else ""
-    said = f"body: {body.name}, posed by {len(names)} joints of the file"
+    said = f"body: {body.name}, posed by {len(pose.names)} joints of the file"
     return Recording(
-        stored.path, vertices, body.faces, body.template, seconds=_seconds(stored, len(pose)),
-        up=Z_UP if amass else Y_UP, up_why=why, notes=(said, *notes, *more),
+        stored.path, vertices[:].astype(np.float64) if len(pose) == 1 else vertices, body.faces, body.template,
+        seconds=_seconds(stored, len(pose)), up=Z_UP if amass else Y_UP, up_why=why,
+        notes=(said, *pose.notes(), *more),
     )  # fmt: skip
 
 
-def _pose(stored: _Npz) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Axis-angle (T, J, 3) and the names of its joints."""
+def _singles(rows: np.ndarray | None, index: Index) -> np.ndarray | None:
+    return None if rows is None else rows_of(rows, index).astype(np.float32)
+
+
+def _pose(stored: _Npz) -> list[tuple[np.ndarray, tuple[str, ...]]]:
+    """The axis-angle arrays (T or 1, j, 3) of the file, each with the names of its joints."""
     whole = stored.first("poses", "fullpose", "pose")
     if whole is not None:
         by_columns = {3 * len(names): names for names in _WHOLE}
@@ -135,9 +139,8 @@ def _pose(stored: _Npz) -> tuple[np.ndarray, tuple[str, ...]]:
             counts = ", ".join(str(count) for count in sorted(by_columns))
             raise FileError(stored.path, f"the pose has shape {whole.shape}; expected (T, n) with n of {counts}")
         names = by_columns[whole.shape[-1]]
-        return whole.reshape(-1, len(names), 3).astype(np.float64), names
-    pieces: list[np.ndarray] = []
-    names: tuple[str, ...] = ()
+        return [(whole.reshape(-1, len(names), 3), names)]
+    pieces: list[tuple[np.ndarray, tuple[str, ...]]] = []
     for key, choices in _PIECES.items():
         piece = stored.first(key)
         if piece is None:
@@ -148,27 +151,41 @@ def _pose(stored: _Npz) -> tuple[np.ndarray, tuple[str, ...]]:
         if joints is None or piece.ndim > 2 or piece.size == 0:
             counts = " or ".join(str(3 * len(choice)) for choice in choices)
             raise FileError(stored.path, f"{key} has shape {piece.shape}; expected (T, {counts}) axis-angle")
-        pieces.append(piece.reshape(-1, len(joints), 3).astype(np.float64))
-        names += joints
-    frames = max(len(piece) for piece in pieces)
-    if any(len(piece) not in (1, frames) for piece in pieces):
-        counts = sorted({len(piece) for piece in pieces})
-        raise FileError(stored.path, f"pose arrays have {counts} frames; expected equal numbers")
-    return np.concatenate([np.broadcast_to(p, (frames, *p.shape[1:])) for p in pieces], axis=1), names
+        pieces.append((piece.reshape(-1, len(joints), 3), joints))
+    counts = {len(piece) for piece, _ in pieces}
+    if len(counts - {1}) > 1:
+        raise FileError(stored.path, f"pose arrays have {sorted(counts)} frames; expected equal numbers")
+    return pieces
 
 
-def _onto(angles: np.ndarray, names: tuple[str, ...], body: Any) -> tuple[np.ndarray, list[str]]:
-    """The pose on the joints that the body has, and what was left out."""
-    pose = np.zeros((len(angles), body.num_joints, 3))
-    left_out = []
-    for k, name in enumerate(names):
-        if name in body.joint_names:
-            pose[:, body.joint_names.index(name)] = angles[:, k]
-        else:
-            left_out.append(name)
-    if not left_out:
-        return pose, []
-    return pose, [f"pose: {len(left_out)} joints are left out, for the body {body.name} has no {_kind(left_out)}"]
+class _Pose:
+    """The poses of a file, put on the joints that a body has when they are asked for."""
+
+    def __init__(self, pieces: list[tuple[np.ndarray, tuple[str, ...]]], body: Any) -> None:
+        self._pieces, self._body = pieces, body
+        self._length = max(len(piece) for piece, _ in pieces)
+        self.names = tuple(name for _, names in pieces for name in names)
+
+    def __len__(self) -> int:
+        return self._length
+
+    def of(self, index: Index) -> np.ndarray:
+        """(n, J, 3) float32."""
+        joints = self._body.joint_names
+        count = np.zeros(self._length, dtype=bool)[index].size
+        pose = np.zeros((count, len(joints), 3), np.float32)
+        for piece, names in self._pieces:
+            here = [k for k, name in enumerate(names) if name in joints]
+            pose[:, [joints.index(names[k]) for k in here]] = rows_of(piece, index)[:, here]
+        return pose
+
+    def notes(self) -> list[str]:
+        """What was left out."""
+        left_out = [name for name in self.names if name not in self._body.joint_names]
+        if not left_out:
+            return []
+        missing = f"for the body {self._body.name} has no {_kind(left_out)}"
+        return [f"pose: {len(left_out)} joints are left out, {missing}"]
 
 
 def _kind(joints: list[str]) -> str:
@@ -190,7 +207,7 @@ def _betas(stored: _Npz, body: Any, frames: int, amass: bool) -> tuple[np.ndarra
         raise FileError(stored.path, f"betas have shape {betas.shape}; expected one row, or {frames}")
     used = min(rows.shape[1], body.num_betas)
     notes = [f"shape: the first {used} of {rows.shape[1]} betas"] if used < rows.shape[1] else []
-    return np.broadcast_to(rows[:, :used], (frames, used)).astype(np.float32), notes
+    return rows[:, :used], notes
 
 
 def _seconds(stored: _Npz, frames: int) -> np.ndarray | None:

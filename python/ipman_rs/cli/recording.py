@@ -8,19 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from ..body.sequence import PosedSequence
+
 Y_UP, Z_UP = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Recording:
-    """``vertices`` (T, V, 3) m and ``faces`` (F, 3).
+    """``vertices`` (T, V, 3) m, or bodies that are posed when they are needed, and ``faces`` (F, 3).
 
     ``template`` when the file's body model has one; ``vertex_map`` (N,) the vertex that each vertex of the file became,
     where some were merged; ``seconds`` (T,) of a sequence; ``up`` what the file's kind has pointing up, ``up_why`` why.
     """
 
     path: Path
-    vertices: np.ndarray
+    vertices: np.ndarray | PosedSequence
     faces: np.ndarray
     template: Any = None
     vertex_map: np.ndarray | None = None

@@ -59,12 +59,18 @@ def analyze(
     curve = (constants.alpha, constants.gamma)
     solid = mass_properties(*body, density)
     support = base_of_support(*where, constants.threshold, method, constants.contact)
+    # What has no gradient comes from the core at one look.
+    plain = ip.analyze(as_array(vertices), template, as_numpy_ground(ground), preset, density, with_pressure=False)
+
+    def tensor(array: Any) -> Tensor:
+        return torch.as_tensor(array, device=vertices.device)
+
     pull, push = ground_loss(*where, constants.alpha1, constants.alpha2, constants.beta1, constants.beta2)
     figures: dict[str, Any] = {
         "preset": preset,
         "part_names": template.part_names,
         "com_method": method,
-        "status": body_status(*where, constants.threshold, constants.contact),
+        "status": tensor(plain.status),
         "part_volumes": part_volumes(*body),
         "volume": solid.volume,
         "mass": solid.mass,
@@ -72,6 +78,8 @@ def analyze(
         "center_of_mass": center_of_mass(*body, method),
         "center_of_mass_exact": center_of_mass(*body, "exact"),
         "pressure": pressure(*where, *curve),
+        "pressure_sum": tensor(plain.pressure_sum),
+        "pressure_max": tensor(plain.pressure_max),
         "center_of_pressure": center_of_pressure(*where, *curve, constants.epsilon),
         "base_of_support": support,
         "bose": support.inside,
@@ -79,6 +87,7 @@ def analyze(
         "pull": pull,
         "push": push,
         "balance": balance_cost(*where, constants.alpha, constants.balance_gamma, constants.sigma, method=method),
+        "lowest": tensor(plain.lowest),
     }
     return Analysis(**figures)
 

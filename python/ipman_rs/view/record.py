@@ -60,7 +60,7 @@ def frame_record(study: Study, frame: int) -> dict[str, Any]:
     row = {key: column[frame] for key, column in study.numbers.items()}
     volumes = dict(zip(study.template.part_names, plain(row.pop("part_volumes")), strict=True))
     return {
-        "frame": frame,
+        "frame": study.number(frame),
         "label": study.label(frame),
         "seconds": None if study.seconds is None else plain(study.seconds[frame]),
         "status": status_names(row.pop("status")),

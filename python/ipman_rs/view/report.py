@@ -13,7 +13,7 @@ from .floor import draw_floor_view
 from .html import page
 from .picture import draw_picture
 from .record import report_record, study_arrays
-from .study import Study
+from .study import MAX_LISTED_FRAMES, Study
 from .timeline import draw_timeline
 
 
@@ -27,11 +27,14 @@ def write_report(
 
     `report.html` and `report.json` cover all studies. `report.npz` and the pictures of a single study lie beside them,
     those of several studies in a folder each, named after the study. ``failures`` are (file, error) pairs to be told in
-    the report; ``progress`` is called with the name of each file written. Raises OSError where nothing can be written.
+    the report. Of a recording of more than 10,000 frames the page and `report.json` list evenly spaced ones and those
+    with pictures, and only these keep the outline of their base of support; `report.npz` has the figures of all.
+    ``progress`` is called with the name of each file written. Raises OSError where nothing can be written.
     """
     directory = Path(directory)
     directory.mkdir(parents=True, exist_ok=True)
-    record = json.dumps(report_record(studies, failures), allow_nan=False, ensure_ascii=False, indent=1)
+    excerpts = [study.excerpt() for study in studies]
+    record = json.dumps(report_record(excerpts, failures), allow_nan=False, ensure_ascii=False, indent=1)
     (directory / "report.json").write_text(record + "\n", encoding="utf-8")
     progress("report.json")
     names = safe_names([study.name for study in studies])
@@ -41,26 +44,14 @@ def write_report(
         for written in _write_study(study, folder):
             progress(written)
     path = directory / "report.html"
-    path.write_text(page(studies, failures), encoding="utf-8")
+    path.write_text(page(excerpts, failures), encoding="utf-8")
     progress("report.html")
     return path
 
 
 def count_files(studies: Sequence[Study]) -> int:
     """How many files `write_report` will write: the length of its progress bar."""
-    return 2 + sum(1 + 2 * len(pictured(study)) + _has_timeline(study) for study in studies)
-
-
-def pictured(study: Study) -> list[int]:
-    """The frames that get pictures: all named ones; of a recording the first, the last, the least stable ones."""
-    if study.labels or study.num_frames == 1:
-        return list(range(study.num_frames))
-    chosen = {0, study.num_frames - 1}
-    for key, worst in (("margin", np.nanargmin), ("com_cop_distance", np.nanargmax)):
-        column = np.where(np.isfinite(study.numbers[key]), study.numbers[key], np.nan)
-        if np.isfinite(column).any():
-            chosen.add(int(worst(column)))
-    return sorted(chosen)
+    return 2 + sum(1 + 2 * len(study.pictured()) + _has_timeline(study) for study in studies)
 
 
 def _has_timeline(study: Study) -> bool:
@@ -68,9 +59,11 @@ def _has_timeline(study: Study) -> bool:
 
 
 def _write_study(study: Study, folder: Path) -> Iterator[str]:
-    np.savez_compressed(folder / "report.npz", allow_pickle=False, **study_arrays(study))
+    # Packing millions of numbers would take longer than finding them.
+    save = np.savez_compressed if study.num_frames <= MAX_LISTED_FRAMES else np.savez
+    save(folder / "report.npz", allow_pickle=False, **study_arrays(study))
     yield "report.npz"
-    frames = pictured(study)
+    frames = study.pictured()
     digits = len(str(study.num_frames))
     labels = safe_names([study.labels[frame] if study.labels else f"{frame:0{digits}d}" for frame in frames])
     for frame, label in zip(frames, labels, strict=True):
@@ -79,7 +72,7 @@ def _write_study(study: Study, folder: Path) -> Iterator[str]:
             draw(study, frame, folder / f"{kind}{end}.png")
             yield f"{kind}{end}.png"
     if _has_timeline(study):
-        draw_timeline(study, folder / "timeline.png")
+        draw_timeline(study.excerpt(), folder / "timeline.png")
         yield "timeline.png"
 
 

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-# Frames analysed at once: large enough to fill the threads, small enough for a progress bar and for memory.
-_CHUNK = 16
 # Frames of a long sequence that are drawn and whose pressure samples are stored.
 MAX_KEY_FRAMES = 48
 _KEY_FRAME_VERTICES = 700_000
+# Frames of a long sequence that report.json and the page list, and whose outlines are kept.
+MAX_LISTED_FRAMES = 10_000
 
 _ROOMS = (
     "status", "volume", "mass", "part_volumes", "center_of_mass", "center_of_mass_exact", "inertia",
-    "center_of_pressure", "bose", "stability", "pull", "push", "balance",
+    "center_of_pressure", "bose", "stability", "pull", "push", "balance", "lowest",
 )  # fmt: skip
 _SUPPORT = ("area", "margin", "inside", "has_contact", "num_contacts")
 
@@ -25,18 +25,19 @@ _SUPPORT = ("area", "margin", "inside", "has_contact", "num_contacts")
 class Study:
     """One body over T frames.
 
-    ``vertices`` (T, V, 3) in metres; ``numbers`` has a column (T, ...) for every quantity of ``ip.analyze``, plus
-    ``com_cop_distance`` and ``lowest`` (signed height of the lowest vertex), both in metres; ``polygons`` the base of
-    support of each frame, (K, 3); ``pressure`` (K, S) at the samples of the frames ``key_frames`` (K,).
+    ``vertices`` (T, V, 3) in metres, or bodies that are posed when they are needed; ``numbers`` has a column (T, ...)
+    for every quantity of ``ip.analyze``, plus ``com_cop_distance``, m; ``polygons`` the base of support of each frame,
+    (K, 3), of a long sequence only those of the frames that are listed; ``pressure`` (K, S) at the samples of the
+    frames ``key_frames`` (K,); ``frames`` (T,) the frames' numbers, where these are some of a longer sequence.
     """
 
     name: str
-    vertices: np.ndarray
+    vertices: Any
     template: Any
     ground: Any
     preset: Any
     numbers: dict[str, np.ndarray]
-    polygons: list[np.ndarray]
+    polygons: Sequence[np.ndarray]
     pressure: np.ndarray
     key_frames: np.ndarray
     com_method: str
@@ -44,6 +45,7 @@ class Study:
     seconds: np.ndarray | None = None
     source: str = ""
     notes: tuple[str, ...] = field(default=())
+    frames: np.ndarray | None = None
 
     @property
     def num_frames(self) -> int:
@@ -55,12 +57,55 @@ class Study:
             return self.labels[frame]
         if self.seconds is not None:
             return f"{self.seconds[frame]:.2f} s"
-        return f"frame {frame}" if self.num_frames > 1 else self.name
+        return f"frame {self.number(frame)}" if self.num_frames > 1 else self.name
+
+    def number(self, frame: int) -> int:
+        """Which one of the recording's frames it is."""
+        return frame if self.frames is None else int(self.frames[frame])
+
+    def pictured(self) -> list[int]:
+        """The frames that get pictures: all named ones; of a recording the first, the last, the least stable ones."""
+        if self.labels or self.num_frames == 1:
+            return list(range(self.num_frames))
+        return _pictured(self.numbers)
+
+    def excerpt(self) -> Study:
+        """The study of the listed frames: itself, if it is not long."""
+        frames = listed(self.numbers, self.key_frames)
+        if len(frames) == self.num_frames:
+            return self
+        return replace(
+            self,
+            vertices=_Some(self.vertices, frames),
+            numbers={key: column[frames] for key, column in self.numbers.items()},
+            polygons=[self.polygons[frame] for frame in frames],
+            key_frames=np.searchsorted(frames, self.key_frames),
+            seconds=None if self.seconds is None else self.seconds[frames],
+            notes=(
+                *self.notes,
+                f"frames: {len(frames):,} of {self.num_frames:,} are listed here; report.npz has the figures of all",
+            ),
+            frames=frames,
+        )
+
+
+@dataclass(frozen=True)
+class _Some:
+    """Some of the bodies of a sequence."""
+
+    vertices: Any
+    chosen: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.chosen)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.vertices[self.chosen[index]]
 
 
 def study(
     name: str,
-    vertices: np.ndarray,
+    vertices: Any,
     template: Any,
     ground: Any,
     preset: str = "paper-r",
@@ -71,51 +116,110 @@ def study(
     notes: Sequence[str] = (),
     progress: Callable[[int], None] = lambda done: None,
 ) -> Study:
-    """Analyse the frames ``vertices`` (T, V, 3), or one body (V, 3), on one ground.
+    """Analyse the frames ``vertices`` (T, V, 3), one body (V, 3), or a `PosedSequence`, on one ground.
 
     ``progress`` is called with the number of frames done. Raises what ``ip.analyze`` raises.
     """
     import ipman_rs as ip
+    from ipman_rs.analysis import analyze_sequence
 
-    vertices = np.asarray(vertices)
-    if vertices.ndim == 2:
-        vertices = vertices[None]
+    if not hasattr(vertices, "pieces"):
+        vertices = np.asarray(vertices)
+        vertices = vertices[None] if vertices.ndim == 2 else vertices
     keys = key_frames(len(vertices), vertices.shape[1])
-    columns: dict[str, list[np.ndarray]] = {key: [] for key in (*_ROOMS, *_SUPPORT)}
-    polygons: list[np.ndarray] = []
-    pressure: list[np.ndarray] = []
-    com_method = "pcom"
-    for start in range(0, len(vertices), _CHUNK):
-        chunk = vertices[start : start + _CHUNK]
-        result = ip.analyze(chunk, template, ground, preset)
-        com_method = result.com_method
-        for key in _ROOMS:
-            columns[key].append(np.asarray(getattr(result, key)))
-        for key in _SUPPORT:
-            columns[key].append(np.asarray(getattr(result.base_of_support, key)))
-        polygons.extend(np.asarray(polygon).reshape(-1, 3) for polygon in result.base_of_support.polygon)
-        pressure.append(result.pressure[keys[(keys >= start) & (keys < start + len(chunk))] - start])
-        progress(start + len(chunk))
-    numbers = {key: np.concatenate(parts) for key, parts in columns.items()}
+    table = _Table(len(vertices))
+    for part in analyze_sequence(vertices, template, ground, preset):
+        table.add(part)
+        progress(table.done)
+    numbers = table.numbers
     com, cop = numbers["center_of_mass"], numbers["center_of_pressure"]
     numbers["com_cop_distance"] = np.linalg.norm(ground.project(com) - ground.project(cop), axis=-1)
-    numbers["lowest"] = np.array([ground.signed_height(body).min() for body in vertices])
+    drawn = np.union1d(keys, _pictured(numbers)) if len(vertices) > MAX_LISTED_FRAMES else np.array([], np.int64)
+    for frame in drawn:
+        table.outlines[int(frame)] = _outline(vertices[int(frame)], template, ground, preset)
+    constants = ip.presets.get(preset)
     return Study(
         name=name,
         vertices=vertices,
         template=template,
         ground=ground,
-        preset=ip.presets.get(preset),
+        preset=constants,
         numbers=numbers,
-        polygons=polygons,
-        pressure=np.concatenate(pressure),
+        polygons=_Outlines(len(vertices), table.outlines, com.dtype),
+        pressure=ip.pressure(vertices[keys], template, ground, constants.alpha, constants.gamma),
         key_frames=keys,
-        com_method=com_method,
+        com_method="exact" if template.num_parts == 1 else "pcom",
         labels=tuple(labels),
         seconds=seconds,
         source=source,
         notes=tuple(notes),
     )
+
+
+class _Table:
+    """The figures of all frames as columns, filled a piece at a time."""
+
+    def __init__(self, num_frames: int) -> None:
+        self.num_frames, self.done = num_frames, 0
+        self.numbers: dict[str, np.ndarray] = {}
+        self.outlines: dict[int, np.ndarray] = {}
+        self._evenly = set(evenly(num_frames).tolist())
+
+    def add(self, part: Any) -> None:
+        rows = slice(self.done, self.done + len(part.status))
+        values = {key: getattr(part, key) for key in _ROOMS}
+        values |= {key: getattr(part.base_of_support, key) for key in _SUPPORT}
+        for key, value in values.items():
+            column = self.numbers.setdefault(key, np.empty((self.num_frames, *value.shape[1:]), value.dtype))
+            column[rows] = value
+        for frame, outline in enumerate(part.base_of_support.polygon, self.done):
+            if frame in self._evenly:
+                self.outlines[frame] = outline.copy()
+        self.done = rows.stop
+
+
+@dataclass(frozen=True)
+class _Outlines(Sequence):
+    """The bases of support that are kept; those of other frames are empty."""
+
+    num_frames: int
+    kept: dict[int, np.ndarray]
+    dtype: Any
+
+    def __len__(self) -> int:
+        return self.num_frames
+
+    def __getitem__(self, frame: Any) -> Any:
+        return self.kept.get(range(self.num_frames)[frame], np.zeros((0, 3), self.dtype))
+
+
+def _outline(body: np.ndarray, template: Any, ground: Any, preset: str) -> np.ndarray:
+    import ipman_rs as ip
+
+    return ip.analyze(body, template, ground, preset, with_pressure=False).base_of_support.polygon
+
+
+def evenly(num_frames: int) -> np.ndarray:
+    """All frames of a sequence that is not long, else evenly spaced ones, first and last included."""
+    if num_frames <= MAX_LISTED_FRAMES:
+        return np.arange(num_frames)
+    return np.unique(np.linspace(0, num_frames - 1, MAX_LISTED_FRAMES).round().astype(np.int64))
+
+
+def listed(numbers: dict[str, np.ndarray], keys: np.ndarray) -> np.ndarray:
+    """The frames that report.json and the page list: evenly spaced ones, the drawn and the pictured ones."""
+    num_frames = len(numbers["status"])
+    chosen = evenly(num_frames)
+    return chosen if len(chosen) == num_frames else np.union1d(np.union1d(chosen, keys), _pictured(numbers))
+
+
+def _pictured(numbers: dict[str, np.ndarray]) -> list[int]:
+    chosen = {0, len(numbers["status"]) - 1}
+    for key, worst in (("margin", np.nanargmin), ("com_cop_distance", np.nanargmax)):
+        column = np.where(np.isfinite(numbers[key]), numbers[key], np.nan)
+        if np.isfinite(column).any():
+            chosen.add(int(worst(column)))
+    return sorted(chosen)
 
 
 def key_frames(num_frames: int, num_vertices: int) -> np.ndarray:

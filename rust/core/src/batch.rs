@@ -3,6 +3,7 @@
 //! Every body is computed from start to end in one lane by one thread, and all numbers of a CPU level round alike, so its
 //! bits depend neither on the number of threads nor on its neighbours nor on its place.
 
+use crate::analysis::{Analysis, Polygon};
 use crate::error::{Error, Result, status};
 use crate::ground::Ground;
 use crate::mass::Method;
@@ -16,6 +17,7 @@ use crate::template::Template;
 use crate::threads;
 use crate::volume::SignedVolumes;
 use std::mem::MaybeUninit;
+use std::sync::Mutex;
 
 /// `num_bodies` poses of one template, each over its ground.
 pub struct Batch<'a, T> {
@@ -188,6 +190,22 @@ impl<'a, T: Data> Batch<'a, T> {
         self.find(nowhere, &Support { contact, method })
     }
 
+    /// All figures of each body ([`Analysis`]): B·K numbers, and the corners of the base of support.
+    pub fn analysis_into(&self, analysis: &Analysis, out: &mut [T]) -> Result<Vec<Polygon>> {
+        let size = analysis.size(self.template);
+        if !analysis.has_densities_for(self.template.mesh.num_parts) {
+            let expected = format!("1 or {} numbers", self.template.mesh.num_parts);
+            return Err(Error::Argument { name: "densities", expected, got: "another number".into() });
+        }
+        let all = Mutex::new(vec![Polygon::new(); self.len()]);
+        self.each([(out, size)], |group, [out]| {
+            let mut polygons = Vec::new();
+            self.on_lanes(group, Figures { analysis, size, out, polygons: &mut polygons });
+            group.hand_out(polygons, &all);
+        })?;
+        Ok(all.into_inner().expect("no thread panicked"))
+    }
+
     /// BoSE by the linear programme.
     #[cfg(feature = "lp")]
     pub fn is_supported_lp(&self, contact: &Contact, method: Method) -> Result<Vec<bool>> {
@@ -324,6 +342,14 @@ impl Group {
         groups
     }
 
+    /// Gives each body what its lane has.
+    fn hand_out<O>(&self, lanes: Vec<O>, all: &Mutex<Vec<O>>) {
+        let mut all = all.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        for (&body, lane) in self.bodies.iter().zip(lanes) {
+            all[body] = lane;
+        }
+    }
+
     /// The body of each lane; lanes that are left over repeat the last body.
     fn lanes(&self) -> impl Iterator<Item = usize> {
         (0..self.width).map(|lane| lane.min(self.bodies.len() - 1))
@@ -383,6 +409,21 @@ impl<T: Data, Q: Quantity> OnLanes<T> for Forward<'_, T, Q> {
     }
 }
 
+struct Figures<'a, T> {
+    analysis: &'a Analysis,
+    size: usize,
+    out: Vec<&'a mut [T]>,
+    polygons: &'a mut Vec<Polygon>,
+}
+
+impl<T: Data> OnLanes<T> for Figures<'_, T> {
+    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
+        let mut out = vec![R::zero(); self.size];
+        *self.polygons = self.analysis.forward(scene, &mut out);
+        R::write_rows(&out, &mut self.out);
+    }
+}
+
 struct ForwardAndBackward<'a, T, Q> {
     template: &'a Template,
     quantity: &'a Q,
@@ -438,7 +479,7 @@ struct Support<'a> {
 impl Finding for Support<'_> {
     type Of = BaseOfSupport;
     fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<BaseOfSupport> {
-        BaseOfSupport::new(scene, self.contact, self.method)
+        BaseOfSupport::new(scene, self.contact, &self.method.forward(scene))
     }
 }
 
@@ -472,16 +513,10 @@ impl Finding for Status<'_> {
 fn status_of<R: Real>(scene: &Scene<R>, lane: usize, num_contacts: usize) -> u32 {
     let vertices = &scene.points[..scene.template.mesh.num_vertices];
     let mut points: Vec<Vec3<f64>> = vertices.iter().map(|v| v.map(|x| x.lane(lane).value())).collect();
-    let size = extent(&points);
+    let [low, high] = scene.bounds().map(|corner| corner.map(|x| x.lane(lane).value()));
     scene.template.closing.forward(&mut points);
     let volumes = SignedVolumes::forward(&scene.template.closing, &points).of_parts;
-    let bits = [
-        (volumes.iter().any(|v| *v < 0.0), status::INVERTED_PART),
-        (num_contacts == 0, status::NO_CONTACT),
-        (volumes.iter().map(|v| v.abs()).sum::<f64>() <= 1e-12 * size.powi(3), status::NO_VOLUME),
-        (!(0.2..=10.0).contains(&size), status::ODD_SIZE),
-    ];
-    bits.iter().filter(|(set, _)| *set).fold(0, |all, (_, bit)| all | bit)
+    status::bits(&volumes, sub(high, low), num_contacts > 0)
 }
 
 /// A gradient that is not finite, though the upstream gradient is, belongs to a body on which the quantity is undefined
@@ -495,12 +530,4 @@ fn zero_if_undefined<T: Scalar>(gradient: &mut [T], upstream_is_finite: bool) {
 
 fn finite_or_zero<T: Scalar>(x: T) -> T {
     if x.value().is_finite() { x } else { T::zero() }
-}
-
-/// The longest side of the bounding box.
-fn extent(vertices: &[Vec3<f64>]) -> f64 {
-    let bound = |pick: fn(f64, f64) -> f64| {
-        vertices.iter().fold(vertices[0], |best, v| std::array::from_fn(|k| pick(best[k], v[k])))
-    };
-    sub(bound(f64::max), bound(f64::min)).into_iter().fold(0.0, f64::max)
 }

@@ -59,4 +59,16 @@ pub mod status {
     pub const NO_VOLUME: u32 = 8;
     /// The body is under 20 cm or over 10 m across: probably not in metres.
     pub const ODD_SIZE: u32 = 16;
+
+    /// Those of a finite body with these signed part volumes and sides of its bounding box.
+    pub fn bits(volumes: &[f64], sides: [f64; 3], has_contact: bool) -> u32 {
+        let size = sides.into_iter().fold(0.0, f64::max);
+        let bits = [
+            (volumes.iter().any(|v| *v < 0.0), INVERTED_PART),
+            (!has_contact, NO_CONTACT),
+            (volumes.iter().map(|v| v.abs()).sum::<f64>() <= 1e-12 * size.powi(3), NO_VOLUME),
+            (!(0.2..=10.0).contains(&size), ODD_SIZE),
+        ];
+        bits.iter().filter(|(set, _)| *set).fold(0, |all, (_, bit)| all | bit)
+    }
 }

@@ -32,6 +32,8 @@ pub mod losses;
 pub mod template;
 /// One closed body over its ground, in local coordinates.
 pub mod scene;
+/// All figures of a body at one look.
+pub mod analysis;
 /// What a differentiable room offers, and the list of all.
 pub mod quantity;
 /// Many bodies over lanes and threads.

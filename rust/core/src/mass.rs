@@ -114,6 +114,21 @@ struct Part<R: Real> {
 }
 
 impl<R: Real> Centre<R> {
+    /// [`Method::Exact`] from the parts' moments.
+    #[inline(always)]
+    pub fn exact(parts: &[Moments<R::Wide>]) -> Self {
+        let mut whole = Moments::zero();
+        for part in parts {
+            whole.add_scaled(R::Wide::of(1.0), part);
+        }
+        Centre::plain(whole.first, whole.volume)
+    }
+
+    /// The signed volumes of the parts, where [`Method::Pcom`] has found them.
+    pub fn signed_volumes(&self) -> Option<&[R::Wide]> {
+        self.parts.as_ref().map(|parts| parts.signed.of_parts.as_slice())
+    }
+
     #[inline(always)]
     fn plain(moment: Vec3<R::Wide>, total: R::Wide) -> Self {
         Centre { point: [moment[0] / total, moment[1] / total, moment[2] / total], total, parts: None }
@@ -248,11 +263,7 @@ fn face_area_backward<R: Real>(
 
 #[inline(always)]
 fn exact<R: Real>(scene: &Scene<R>) -> Centre<R> {
-    let mut whole = Moments::zero();
-    for part in part_moments(&scene.template.closing, scene.points) {
-        whole.add_scaled(R::Wide::of(1.0), &part);
-    }
-    Centre::plain(whole.first, whole.volume)
+    Centre::exact(&part_moments(&scene.template.closing, scene.points))
 }
 
 #[inline(always)]

@@ -145,6 +145,11 @@ impl<R: Real> LoadSums<R> {
         place.hand_back(&self.density, &mut self.loads);
     }
 
+    /// Σ ρ_i, the shift taken back.
+    pub fn total_pressure(&self) -> R::Wide {
+        R::apart::<Unshifted, _>((self.of.curve, self.shift, self.total))
+    }
+
     /// s̄ from the sums. Epsilon pulls towards the world's origin, which lies at −origin here.
     pub fn finish(self, scene: &Scene<R>) -> Cop<R> {
         let LoadSums { of, shift, total, loads, .. } = self;
@@ -192,6 +197,18 @@ impl<R: Real> Room<(PressureCurve, R, &Row<R>, usize, &mut Row<R>, &mut R::Wide)
             *density = curve.density(height, shift);
         }
         sum_row(density, len).add_to(total);
+    }
+}
+
+/// [`LoadSums::total_pressure`]
+struct Unshifted;
+
+impl<R: Real> Room<(PressureCurve, R, R::Wide)> for Unshifted {
+    type Output = R::Wide;
+
+    #[inline(always)]
+    fn enter((curve, shift, total): (PressureCurve, R, R::Wide)) -> R::Wide {
+        total * (R::Wide::of(-curve.gamma) * shift.widen()).exp()
     }
 }
 

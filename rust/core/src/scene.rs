@@ -55,6 +55,11 @@ impl<'a, R: Real> Scene<'a, R> {
         R::apart::<Heights, _>((self.narrow_ground(), vertices))
     }
 
+    /// The lowest and the highest coordinates of the mesh's vertices.
+    pub fn bounds(&self) -> [Vec3<R>; 2] {
+        R::apart::<Bounds, _>((&self.points[..self.template.mesh.num_vertices],))
+    }
+
     /// Adds the gradient by the vertices' heights to that by their positions.
     pub fn heights_backward(&self, d_heights: &[R], d_points: &mut [Vec3<R>]) {
         R::apart::<HeightsBackward, _>((self.narrow_ground().normal, d_heights, d_points));
@@ -82,6 +87,25 @@ impl<R: Real> Room<(Ground<R>, &[Vec3<R>])> for Heights {
             *height = ground.signed_height(vertex);
         }
         heights
+    }
+}
+
+/// [`Scene::bounds`]
+struct Bounds;
+
+impl<R: Real> Room<(&[Vec3<R>],)> for Bounds {
+    type Output = [Vec3<R>; 2];
+
+    #[inline(always)]
+    fn enter((vertices,): (&[Vec3<R>],)) -> [Vec3<R>; 2] {
+        let (mut low, mut high) = (vertices[0], vertices[0]);
+        for vertex in vertices {
+            for k in 0..3 {
+                low[k] = low[k].at_most(vertex[k]);
+                high[k] = high[k].at_least(vertex[k]);
+            }
+        }
+        [low, high]
     }
 }
 

@@ -6,7 +6,7 @@
 //! order and hands the gradient over on the way.
 
 use crate::closing::Closing;
-use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, widen};
+use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, widen, widen_in_line};
 use crate::number::{Real, Room};
 use crate::quantity::Quantity;
 use crate::rings::{BLOCK, Rings};
@@ -139,17 +139,32 @@ impl<W: Real> Moments<W> {
         }
     }
 
-    /// With d = a·(b×c) and s = a+b+c: ∫1 = d/6, ∫x = d s/24, ∫xxᵀ = d (aaᵀ+bbᵀ+ccᵀ+ssᵀ)/120.
+    /// Adds 6 ∫1, 24 ∫x and 120 ∫xxᵀ of one tetrahedron: with d = a·(b×c) and s = a+b+c they are d, d s and
+    /// d (aaᵀ+bbᵀ+ccᵀ+ssᵀ).
     #[inline(always)]
     fn add_tetrahedron(&mut self, a: Vec3<W>, b: Vec3<W>, c: Vec3<W>) {
         let d = dot(a, cross(b, c));
-        let s: Vec3<W> = std::array::from_fn(|k| a[k] + b[k] + c[k]);
-        self.volume = self.volume + d * W::of(1.0 / 6.0);
-        add_scaled(&mut self.first, d * W::of(1.0 / 24.0), s);
-        let weight = d * W::of(1.0 / 120.0);
-        for (sum, (i, j)) in self.second.iter_mut().zip(PAIRS) {
-            *sum = *sum + weight * (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + s[i] * s[j]);
+        let s = add(add(a, b), c);
+        self.volume = self.volume + d;
+        add_scaled(&mut self.first, d, s);
+        for (k, &(i, j)) in PAIRS.iter().enumerate() {
+            let corners = c[i].mul_add(c[j], b[i].mul_add(b[j], a[i] * a[j]));
+            self.second[k] = d.mul_add(s[i].mul_add(s[j], corners), self.second[k]);
         }
+    }
+
+    /// From the sums of [`Moments::add_tetrahedron`] to the moments.
+    #[inline(always)]
+    fn scaled(&self) -> Self {
+        let mut moments = *self;
+        moments.volume = self.volume * W::of(1.0 / 6.0);
+        for k in 0..3 {
+            moments.first[k] = self.first[k] * W::of(1.0 / 24.0);
+        }
+        for k in 0..6 {
+            moments.second[k] = self.second[k] * W::of(1.0 / 120.0);
+        }
+        moments
     }
 
     /// The derivatives of Σ d_moments · moments for one tetrahedron, at its corners a, b, c.
@@ -200,14 +215,18 @@ impl<R: Real> Room<(&Closing, &[Vec3<R>])> for MomentsForward {
 
     #[inline(always)]
     fn enter((closing, points): (&Closing, &[Vec3<R>])) -> Vec<Moments<R::Wide>> {
-        let points = widen_all(points);
         let mut all = Vec::with_capacity(closing.parts.len());
         for part in &closing.parts {
             let mut sum = Moments::zero();
             for &[a, b, c] in &closing.faces[part.clone()] {
-                sum.add_tetrahedron(points[a as usize], points[b as usize], points[c as usize]);
+                // In line, for widened copies of all points would leave the cache.
+                sum.add_tetrahedron(
+                    widen_in_line(points[a as usize]),
+                    widen_in_line(points[b as usize]),
+                    widen_in_line(points[c as usize]),
+                );
             }
-            all.push(sum);
+            all.push(sum.scaled());
         }
         all
     }
@@ -319,14 +338,7 @@ impl Quantity for MassProperties {
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Vec<Moments<R::Wide>> {
         let parts = part_moments(&scene.template.closing, scene.points);
-        let (volumes, weighted) = self.weigh(&parts);
-        for (out, (volume, weighted)) in out.chunks_exact_mut(Self::ROW).zip(volumes.into_iter().zip(weighted)) {
-            let mut wide = [R::Wide::zero(); Self::ROW];
-            row(volume, &weighted, scene.origin, &mut wide);
-            for (out, wide) in out.iter_mut().zip(wide) {
-                *out = R::narrow(wide);
-            }
-        }
+        self.write(scene, &parts, out);
         parts
     }
 
@@ -356,6 +368,18 @@ impl Quantity for MassProperties {
 }
 
 impl MassProperties {
+    /// As many rows as `out` holds.
+    pub fn write<R: Real>(&self, scene: &Scene<R>, parts: &[Moments<R::Wide>], out: &mut [R]) {
+        let (volumes, weighted) = self.weigh(parts);
+        for (out, (volume, weighted)) in out.chunks_exact_mut(Self::ROW).zip(volumes.into_iter().zip(weighted)) {
+            let mut wide = [R::Wide::zero(); Self::ROW];
+            row(volume, &weighted, scene.origin, &mut wide);
+            for (out, wide) in out.iter_mut().zip(wide) {
+                *out = R::narrow(wide);
+            }
+        }
+    }
+
     /// Volume and density-weighted moments: the whole body's first, then each part's.
     #[inline(always)]
     fn weigh<W: Real>(&self, parts: &[Moments<W>]) -> (Vec<W>, Vec<Moments<W>>) {

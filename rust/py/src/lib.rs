@@ -1,5 +1,6 @@
 //! `ipman_rs._core`: the crate `ipman` for Python. It translates arrays and errors and knows no formula.
 
+mod analysis;
 mod array;
 mod bodies;
 mod error;
@@ -14,6 +15,8 @@ use pyo3::prelude::*;
 /// The Rust engine behind ipman_rs.
 #[pymodule]
 mod _core {
+    #[pymodule_export]
+    use crate::analysis::analysis;
     #[pymodule_export]
     use crate::evaluate::{jvp, output_size, value, value_and_vjp, vjp, vjp_jvp};
     #[pymodule_export]

@@ -81,6 +81,11 @@ pub trait Real:
     /// The nearest integer, with slope zero; |self| below 2^22 (2^51 in double precision).
     fn nearest(self) -> Self;
     fn widen(self) -> Self::Wide;
+    /// [`Real::widen`] for loops whose own work is in double precision: there a call costs more than its registers.
+    #[inline(always)]
+    fn widen_in_line(self) -> Self::Wide {
+        self.widen()
+    }
     fn narrow(wide: Self::Wide) -> Self;
     /// Enters `F` in a function of its own that may use the CPU's instructions for this number. Gates inline all that they
     /// lead to; a large room that many quantities enter is compiled once behind this door.

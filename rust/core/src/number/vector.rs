@@ -52,6 +52,12 @@ pub fn widen<R: Real>(a: Vec3<R>) -> Vec3<R::Wide> {
     [a[0].widen(), a[1].widen(), a[2].widen()]
 }
 
+/// [`widen`] by [`Real::widen_in_line`].
+#[inline(always)]
+pub fn widen_in_line<R: Real>(a: Vec3<R>) -> Vec3<R::Wide> {
+    [a[0].widen_in_line(), a[1].widen_in_line(), a[2].widen_in_line()]
+}
+
 #[inline(always)]
 pub fn narrow<R: Real>(a: Vec3<R::Wide>) -> Vec3<R> {
     [R::narrow(a[0]), R::narrow(a[1]), R::narrow(a[2])]

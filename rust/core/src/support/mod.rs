@@ -31,9 +31,9 @@ pub struct BaseOfSupport {
 }
 
 impl BaseOfSupport {
-    /// That of each lane.
-    pub fn new<R: Real>(scene: &Scene<R>, contact: &Contact, method: Method) -> Vec<Self> {
-        let centre = scene.plane.flatten(method.forward(scene).point);
+    /// That of each lane, with its centre of mass.
+    pub fn new<R: Real>(scene: &Scene<R>, contact: &Contact, centre: &Centre<R>) -> Vec<Self> {
+        let centre = scene.plane.flatten(centre.point);
         let hulls = contact.find(scene).hulls(scene);
         hulls
             .iter()

@@ -1,0 +1,198 @@
+//! The analysis: all figures of a body in one go. Its heights, samples, volumes, moments and centre of mass are found
+//! once and shared; each figure is that of its own room, to the bit.
+
+use crate::error::{Error, Result, status};
+use crate::losses::balance::{BalanceCost, Wrap};
+use crate::losses::ground::{GroundLoss, Tanh};
+use crate::losses::stability::distance_on_ground;
+use crate::mass::{Centre, Method};
+use crate::number::vector::{Vec3, sub};
+use crate::number::{Real, Room, Scalar};
+use crate::pressure::{CenterOfPressure, Cop, LoadSums, PressureCurve};
+use crate::quantity::Quantity;
+use crate::sampling::{CHUNK, Points, Row};
+use crate::scene::Scene;
+use crate::support::{BaseOfSupport, Contact, ContactRule};
+use crate::template::Template;
+use crate::volume::{MassProperties, PartVolumes, part_moments};
+
+/// The constants of all figures.
+pub struct Analysis {
+    method: Method,
+    pressure: CenterOfPressure,
+    ground: GroundLoss,
+    contact: Contact,
+    balance: BalanceCost,
+    mass: MassProperties,
+}
+
+/// The corners of a base of support, see [`BaseOfSupport::polygon`].
+pub type Polygon = Vec<Vec3<f64>>;
+
+/// Where the figures lie in a body's row: single numbers first, then points, then the solid, then the parts' volumes.
+mod at {
+    use crate::volume::MassProperties;
+
+    pub const STATUS: usize = 0;
+    pub const NUM_CONTACTS: usize = 1;
+    pub const AREA: usize = 2;
+    pub const MARGIN: usize = 3;
+    pub const LOWEST: usize = 4;
+    pub const PRESSURE_SUM: usize = 5;
+    pub const PRESSURE_MAX: usize = 6;
+    pub const STABILITY: usize = 7;
+    /// Pull and push.
+    pub const GROUND: usize = 8;
+    pub const BALANCE: usize = 10;
+    pub const CENTER_OF_MASS: usize = 11;
+    pub const CENTER_OF_MASS_EXACT: usize = 14;
+    pub const CENTER_OF_PRESSURE: usize = 17;
+    pub const SOLID: usize = 20;
+    pub const PART_VOLUMES: usize = SOLID + MassProperties::ROW;
+}
+
+/// What a look at all samples finds.
+struct Looked<R: Real> {
+    cop: Cop<R>,
+    pressure_sum: R,
+    pressure_max: R,
+}
+
+impl Analysis {
+    /// `options` are alpha, gamma, epsilon, alpha1, alpha2, beta1, beta2, threshold, balance gamma and sigma; `densities`
+    /// one for all parts or one for each.
+    pub fn new(method: &str, rule: &str, options: &[f64], densities: &[f64]) -> Result<Self> {
+        let method = Method::named(method)?;
+        let bad = || {
+            let expected = "ten finite numbers, and densities".into();
+            Error::Argument { name: "options", expected, got: format!("{options:?}, {densities:?}") }
+        };
+        let &[alpha, gamma, epsilon, alpha1, alpha2, beta1, beta2, threshold, balance_gamma, sigma] = options else {
+            return Err(bad());
+        };
+        if densities.is_empty() || options.iter().chain(densities).any(|x| !x.is_finite()) {
+            return Err(bad());
+        }
+        let curve = PressureCurve { alpha, gamma: balance_gamma };
+        Ok(Analysis {
+            method,
+            pressure: CenterOfPressure { curve: PressureCurve { alpha, gamma }, epsilon },
+            ground: GroundLoss { points: Points::Samples, tanh: Tanh::Squared, alpha1, alpha2, beta1, beta2 },
+            contact: Contact { rule: ContactRule::named(rule)?, threshold },
+            balance: BalanceCost { method, wrap: Wrap::Log, curve, sigma },
+            mass: MassProperties { densities: densities.to_vec() },
+        })
+    }
+
+    /// Numbers of one body.
+    pub fn size(&self, template: &Template) -> usize {
+        at::PART_VOLUMES + template.mesh.num_parts
+    }
+
+    pub fn has_densities_for(&self, num_parts: usize) -> bool {
+        [1, num_parts].contains(&self.mass.densities.len())
+    }
+
+    /// Writes the numbers and gives the polygon of each lane.
+    pub fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Vec<Polygon> {
+        let heights = scene.heights();
+        out[at::LOWEST] = R::apart::<Lowest, _>((&heights,));
+        let looked = self.look(scene, &heights, &mut out[at::GROUND..at::BALANCE]);
+        out[at::PRESSURE_SUM] = looked.pressure_sum;
+        out[at::PRESSURE_MAX] = looked.pressure_max;
+
+        let parts = part_moments(&scene.template.closing, scene.points);
+        let exact = Centre::<R>::exact(&parts);
+        let centre = self.method.forward(scene);
+        match centre.signed_volumes() {
+            Some(volumes) => {
+                for (out, volume) in out[at::PART_VOLUMES..].iter_mut().zip(volumes) {
+                    *out = R::narrow(volume.abs());
+                }
+            }
+            None => drop(PartVolumes.forward(scene, &mut out[at::PART_VOLUMES..])),
+        }
+        self.mass.write(scene, &parts, &mut out[at::SOLID..at::PART_VOLUMES]);
+        scene.put(centre.point, &mut out[at::CENTER_OF_MASS..][..3]);
+        scene.put(exact.point, &mut out[at::CENTER_OF_MASS_EXACT..][..3]);
+        scene.put(looked.cop.point, &mut out[at::CENTER_OF_PRESSURE..][..3]);
+        out[at::STABILITY] = R::narrow(distance_on_ground(scene, &centre, &looked.cop).0);
+        self.balance.forward(scene, &mut out[at::BALANCE..][..1]);
+
+        let supports = BaseOfSupport::new(scene, &self.contact, &centre);
+        let number = |of: &dyn Fn(usize) -> f64| R::narrow(R::Wide::from_lanes(|lane| Real::of(of(lane))));
+        out[at::NUM_CONTACTS] = number(&|lane| supports[lane].num_contacts as f64);
+        out[at::AREA] = number(&|lane| supports[lane].area);
+        out[at::MARGIN] = number(&|lane| supports[lane].margin);
+        let [low, high] = scene.bounds();
+        out[at::STATUS] = number(&|lane| {
+            let volumes: Vec<f64> = parts.iter().map(|part| part.volume.lane(lane).value()).collect();
+            let corner = |corner: Vec3<R>| corner.map(|x| x.lane(lane).value());
+            status::bits(&volumes, sub(corner(high), corner(low)), supports[lane].has_contact()) as f64
+        });
+        supports.into_iter().map(|support| support.polygon).collect()
+    }
+
+    /// Pressure and ground losses.
+    fn look<R: Real>(&self, scene: &Scene<R>, heights: &[R], ground: &mut [R]) -> Looked<R> {
+        let mut loads = LoadSums::new(self.pressure, heights);
+        let mut sums = self.ground.sums();
+        let mut lowest = R::of(1e30);
+        let mut row = [R::zero(); CHUNK];
+        for place in Points::Samples.places(scene.template) {
+            place.read(heights, &mut row);
+            loads.read(&place, &row);
+            sums.read(&place, &row);
+            R::apart::<LowestOfRow, _>((&row, place.len(), &mut lowest));
+        }
+        sums.finish(scene.template, ground);
+        Looked {
+            pressure_sum: R::narrow(loads.total_pressure()),
+            // ρ falls with the height.
+            pressure_max: R::apart::<Density, _>((self.pressure, lowest)),
+            cop: loads.finish(scene),
+        }
+    }
+}
+
+struct Lowest;
+
+impl<R: Real> Room<(&Vec<R>,)> for Lowest {
+    type Output = R;
+
+    #[inline(always)]
+    fn enter((heights,): (&Vec<R>,)) -> R {
+        let mut lowest = R::of(1e30);
+        for &height in heights {
+            lowest = lowest.at_most(height);
+        }
+        lowest
+    }
+}
+
+/// The lowest of the first `len` numbers, and of those before.
+struct LowestOfRow;
+
+impl<R: Real> Room<(&Row<R>, usize, &mut R)> for LowestOfRow {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((row, len, lowest): (&Row<R>, usize, &mut R)) {
+        let mut least = *lowest;
+        for &height in &row[..len] {
+            least = least.at_most(height);
+        }
+        *lowest = least;
+    }
+}
+
+struct Density;
+
+impl<R: Real> Room<(CenterOfPressure, R)> for Density {
+    type Output = R;
+
+    #[inline(always)]
+    fn enter((pressure, height): (CenterOfPressure, R)) -> R {
+        pressure.curve.density(height, R::zero())
+    }
+}
