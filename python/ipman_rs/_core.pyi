@@ -238,5 +238,8 @@ def weighted(
     unweighted terms (K,) or (B, K); what each body counts for (B,); the gradient of the totals' sum (B, V, 3).
     """
 
+def simd_levels() -> list[str]:
+    """The CPU levels that this machine has, best first."""
+
 def simd_level() -> str:
     """The CPU level that batches run on: avx512, avx2, neon or scalar. IPMAN_SIMD forces one."""

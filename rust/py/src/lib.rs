@@ -26,7 +26,7 @@ mod _core {
     #[pymodule_export]
     use crate::template::Template;
     #[pymodule_export]
-    use crate::threads::{follow_threads, get_num_threads, set_num_threads, simd_level};
+    use crate::threads::{follow_threads, get_num_threads, set_num_threads, simd_level, simd_levels};
     #[pymodule_export]
     use crate::weighted::weighted;
 
@@ -48,6 +48,12 @@ mod threads {
     #[pyfunction]
     pub fn simd_level() -> PyResult<&'static str> {
         Ok(Level::current().map_err(value_error)?.name())
+    }
+
+    /// The CPU levels that this machine has, best first.
+    #[pyfunction]
+    pub fn simd_levels() -> Vec<&'static str> {
+        Level::available().into_iter().map(Level::name).collect()
     }
 
     /// The number of threads that batches use.
