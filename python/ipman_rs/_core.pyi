@@ -238,6 +238,18 @@ def weighted(
     unweighted terms (K,) or (B, K); what each body counts for (B,); the gradient of the totals' sum (B, V, 3).
     """
 
+def terms(
+    template: Template,
+    quantity: str,
+    options: Sequence[float],
+    vertices: NDArray[_Float],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+    valid: NDArray[np.bool_] | None,
+    reduction: str,
+) -> tuple[NDArray[_Float], NDArray[_Float]]:
+    """(terms, shares) of `weighted`, without a gradient."""
+
 def simd_levels() -> list[str]:
     """The CPU levels that this machine has, best first."""
 

@@ -63,9 +63,7 @@ class Bodies(NamedTuple):
 _ANY_GROUND = Ground((0.0, 1.0, 0.0), 0.0)
 
 
-def check(
-    vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround | None
-) -> tuple[torch.Size, Ground]:
+def check(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround | None) -> tuple[torch.Size, Ground]:
     """The batch shape and the ground of arguments that fit together.
 
     Raises:

@@ -1,13 +1,14 @@
-"""The weighted total of a training step on the CPU: value and gradient in one call of the core.
+"""The loss terms of a training step on the CPU, eager and in reverse mode, with one call of the core each way.
 
-This is `IntuitivePhysicsLoss.weighted` as a trainer calls it, eager and in reverse mode. Anything else (torch.compile,
-torch.func, forward mode, other devices) takes the general path in `dispatch.py`.
+This is `IntuitivePhysicsLoss` as a trainer calls it. Anything else (torch.compile, torch.func, forward mode, other
+devices) takes the general path in `dispatch.py`.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch._C._functorch import is_functorch_wrapped_tensor
@@ -31,7 +32,7 @@ class Call(NamedTuple):
 
 
 def serves(vertices: Any) -> bool:
-    """Whether these vertices (B, V, 3) ask for a gradient in a way that one pass can give."""
+    """Whether these vertices ask for a gradient in the way that is meant here."""
     return (
         isinstance(vertices, Tensor)
         and vertices.requires_grad
@@ -44,35 +45,36 @@ def serves(vertices: Any) -> bool:
     )
 
 
-class OnePass(Function):
-    """vertices -> total (or totals (B,)), terms (K,) or (B, K). The terms are not differentiable.
+def _arrays(vertices: Tensor, ground: Ground) -> tuple[Any, Any, Any]:
+    """Vertices (B, V, 3), and normal and height of one ground or of B."""
+    normal, height = ground.normal.reshape(-1, 3), ground.height.reshape(-1)
+    if len(normal) != len(height):
+        normal, height = normal.expand(len(vertices), 3), height.expand(len(vertices))
+    return (
+        vertices.detach().contiguous().numpy(),
+        normal.to("cpu", torch.float64).contiguous().numpy(),
+        height.to("cpu", torch.float64).contiguous().numpy(),
+    )
 
-    The gradient waits for the backward, which scales it by its upstream in place and hands it over; a second backward,
-    or one that is itself differentiated, computes it again by differentiable operations.
+
+class WeightedTotal(Function):
+    """vertices (B, V, 3) -> Σ λ·term, reduced, or (B,); and the unweighted terms (K,) or (B, K), not differentiable.
+
+    Value and gradient come from one pass. The gradient waits for the backward, which scales it by its upstream in place
+    and hands it over; a second backward, or one that is itself differentiated, computes it again.
     """
 
     @staticmethod
-    def forward(
-        ctx: Any, vertices: Tensor, ground: Ground, valid: Tensor | None, call: Call
-    ) -> tuple[Tensor, Tensor]:
-        normal, height = ground.normal.reshape(-1, 3), ground.height.reshape(-1)
-        if len(normal) != len(height):
-            normal, height = (given.expand(len(vertices), *given.shape[1:]) for given in (normal, height))
+    def forward(ctx: Any, vertices: Tensor, ground: Ground, valid: Tensor | None, call: Call) -> tuple[Tensor, Tensor]:
+        arrays = _arrays(vertices, ground)
+        mask = None if valid is None else valid.numpy(force=True)
         follow_torch()
+        template, quantity, options, weights, reduction = call
         total, terms, shares, gradient = _core.weighted(
-            call.template._core,
-            call.quantity,
-            call.options,
-            vertices.detach().contiguous().numpy(),
-            normal.to("cpu", torch.float64).contiguous().numpy(),
-            height.to("cpu", torch.float64).contiguous().numpy(),
-            call.weights,
-            None if valid is None else valid.numpy(force=True),
-            call.reduction,
+            template._core, quantity, options, *arrays, weights, mask, reduction
         )
         ctx.save_for_backward(vertices)
-        ctx.call, ctx.ground, ctx.shares = call, (normal, height), shares
-        ctx.gradient = gradient
+        ctx.call, ctx.ground, ctx.shares, ctx.gradient = call, arrays[1:], shares, gradient
         outputs = torch.from_numpy(total), torch.from_numpy(terms)
         ctx.mark_non_differentiable(outputs[1])
         ctx.set_materialize_grads(False)
@@ -83,8 +85,10 @@ class OnePass(Function):
         if d_total is None:
             return None, None, None, None
         gradient, ctx.gradient = ctx.gradient, None
-        if gradient is None or torch.is_grad_enabled() or is_functorch_wrapped_tensor(d_total):
-            return _differentiable(ctx, d_total), None, None, None
+        if gradient is None or _is_differentiated(d_total):
+            (vertices,) = ctx.saved_tensors
+            d_bodies = d_total * torch.from_numpy(ctx.shares)
+            return _vjp(ctx, vertices, d_bodies[:, None] * vertices.new_tensor(ctx.call.weights)), None, None, None
         if d_total.ndim:
             gradient *= d_total.numpy(force=True)[:, None, None]
         elif (scale := d_total.item()) != 1:
@@ -92,11 +96,41 @@ class OnePass(Function):
         return torch.from_numpy(gradient), None, None, None
 
 
-def _differentiable(ctx: Any, d_total: Tensor) -> Tensor:
+class Terms(Function):
+    """vertices (B, V, 3) -> terms (K,), reduced, or (B, K).
+
+    The backward computes the forward again: keeping it would hold four numbers a vertex of each body in memory.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, vertices: Tensor, ground: Ground, valid: Tensor | None, call: Call) -> Tensor:
+        arrays = _arrays(vertices, ground)
+        mask = None if valid is None else valid.numpy(force=True)
+        follow_torch()
+        terms, shares = _core.terms(call.template._core, call.quantity, call.options, *arrays, mask, call.reduction)
+        ctx.save_for_backward(vertices)
+        ctx.call, ctx.ground, ctx.shares, ctx.vertices = call, arrays[1:], shares, arrays[0]
+        return torch.from_numpy(terms)
+
+    @staticmethod
+    def backward(ctx: Any, d_terms: Tensor) -> tuple[Tensor, None, None, None]:
+        (vertices,) = ctx.saved_tensors  # complains about vertices that were changed in place
+        if _is_differentiated(d_terms):
+            return _vjp(ctx, vertices, torch.from_numpy(ctx.shares)[:, None] * d_terms), None, None, None
+        d_out = np.ascontiguousarray(ctx.shares[:, None] * d_terms.numpy(force=True))
+        follow_torch()
+        template, quantity, options = ctx.call[:3]
+        gradient = _core.vjp(template._core, quantity, options, ctx.vertices, *ctx.ground, d_out)
+        return torch.from_numpy(gradient), None, None, None
+
+
+def _is_differentiated(upstream: Tensor) -> bool:
+    """Whether the backward is itself part of a graph or of a transform."""
+    return torch.is_grad_enabled() or is_functorch_wrapped_tensor(upstream)
+
+
+def _vjp(ctx: Any, vertices: Tensor, d_out: Tensor) -> Tensor:
     """The gradient by operations that can be differentiated once more."""
-    (vertices,) = ctx.saved_tensors
-    template, quantity, options, weights, _ = ctx.call
-    normal, height = (given.expand(len(vertices), *given.shape[1:]) for given in ctx.ground)
-    d_bodies = d_total * torch.from_numpy(ctx.shares)
-    d_out = d_bodies[:, None] * vertices.new_tensor(weights)
+    normal, height = (torch.from_numpy(given).expand(len(vertices), *given.shape[1:]) for given in ctx.ground)
+    template, quantity, options = ctx.call[:3]
     return Vjp.apply(vertices, normal, height, d_out, template, quantity, list(options))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Any, Literal
 
 import torch
 from torch import Tensor, nn
@@ -78,6 +78,8 @@ class IntuitivePhysicsLoss(nn.Module):
 
     def forward(self, vertices: Tensor, ground: Ground | NumpyGround, valid: Tensor | None = None) -> dict[str, Tensor]:
         """Unweighted terms: vertices (..., V, 3), valid bool (...) -> {name: scalar}, or {name: (...)} unreduced."""
+        if one_pass.serves(vertices) and not forced():
+            return self._by_name(*self._in_one_pass(one_pass.Terms, vertices, ground, valid))
         batch = bodies(vertices, self.template, ground)
         values = values_of(batch, self.template, self._quantity, self._options)
         counted = _finite(values.detach())
@@ -94,7 +96,8 @@ class IntuitivePhysicsLoss(nn.Module):
         for second derivatives.
         """
         if one_pass.serves(vertices) and not forced():
-            return self._in_one_pass(vertices, ground, valid)
+            (total, terms), shape = self._in_one_pass(one_pass.WeightedTotal, vertices, ground, valid)
+            return total.reshape(shape) if self.reduction == "none" else total, self._by_name(terms, shape)
         batch = bodies(vertices, self.template, ground)
         mask = None if valid is None else _mask(batch.batch_shape, valid, vertices)
         shares = self._shares(batch, mask)
@@ -115,18 +118,23 @@ class IntuitivePhysicsLoss(nn.Module):
         return total, self._named(values, counted, number, batch)
 
     def _in_one_pass(
-        self, vertices: Tensor, ground: Ground | NumpyGround, valid: Tensor | None
-    ) -> tuple[Tensor, dict[str, Tensor]]:
+        self, function: Any, vertices: Tensor, ground: Ground | NumpyGround, valid: Tensor | None
+    ) -> tuple[Any, torch.Size]:
+        """A function of `one_pass` on checked arguments, and the batch shape."""
         shape, plane = check(vertices, self.template, ground)
         mask = None if valid is None else _mask(shape, valid, vertices)
         if len(shape) != 1:
             plane = Ground.of_unit(plane.normal.expand(*shape, 3), plane.height.expand(shape))
             vertices = vertices.reshape(-1, *vertices.shape[-2:])
-        call = one_pass.Call(self.template, self._quantity, self._options, tuple(self.weights.values()), self.reduction)
-        total, terms = one_pass.OnePass.apply(vertices, plane, mask, call)
+        weights = tuple(self.weights[term] for term in self.terms)
+        call = one_pass.Call(self.template, self._quantity, self._options, weights, self.reduction)
+        return function.apply(vertices, plane, mask, call), shape
+
+    def _by_name(self, terms: Tensor, shape: torch.Size) -> dict[str, Tensor]:
+        """Terms (K,), or (B, K) of a batch shape, by their names."""
         if self.reduction == "none":
-            total, terms = total.reshape(shape), terms.reshape(*shape, len(self.terms))
-        return total, dict(zip(self.terms, terms.unbind(dim=-1), strict=True))
+            terms = terms.reshape(*shape, len(self.terms))
+        return dict(zip(self.terms, terms.unbind(dim=-1), strict=True))
 
     def _shares(self, batch: Bodies, mask: Tensor | None) -> Tensor:
         """What each term of each body weighs in the total: (B, K)."""

@@ -53,27 +53,50 @@ impl Weighted<'_> {
         quantity: &Q,
         gradient: &mut [T],
     ) -> Result<Totals<T>> {
-        let (bodies, size) = (batch.len(), self.weights.len());
-        if quantity.len(batch.template()) != size {
-            let expected = format!("{} numbers, one a term", quantity.len(batch.template()));
-            return Err(Error::Argument { name: "weights", expected, got: size.to_string() });
-        }
-        let valid = |body: usize| self.valid.is_none_or(|valid| valid[body]);
-        let dealt = self.share((0..bodies).filter(|&body| valid(body)).count());
+        let (bodies, size) = (batch.len(), self.size(batch, quantity)?);
+        let dealt = self.share((0..bodies).filter(|&body| self.valid(body)).count());
         let d_out: Vec<T> = (0..bodies * size)
-            .map(|i| if valid(i / size) { T::of(self.weights[i % size] * dealt) } else { T::zero() })
+            .map(|i| if self.valid(i / size) { T::of(self.weights[i % size] * dealt) } else { T::zero() })
             .collect();
         let mut values = vec![T::zero(); bodies * size];
         batch.value_and_vjp_into(quantity, &d_out, &mut values, gradient)?;
 
         // Broken bodies are known only now, after the shares of a mean were dealt out: put that right.
-        let counts: Vec<bool> = (0..bodies).map(|body| valid(body) && !values[body * size].value().is_nan()).collect();
+        let counts = self.counts(&values, size);
         let share = self.share(counts.iter().filter(|&&counts| counts).count());
         if share != dealt {
             let factor = T::of(share / dealt);
             gradient.iter_mut().for_each(|d| *d = *d * factor);
         }
         Ok(self.reduce(&values, &counts, share))
+    }
+
+    /// The same without a gradient.
+    pub fn evaluate_alone<T: Data, Q: Quantity>(&self, batch: &Batch<T>, quantity: &Q) -> Result<Totals<T>> {
+        let size = self.size(batch, quantity)?;
+        let values = batch.value(quantity)?;
+        let counts = self.counts(&values, size);
+        let share = self.share(counts.iter().filter(|&&counts| counts).count());
+        Ok(self.reduce(&values, &counts, share))
+    }
+
+    /// Numbers a body, if there is a weight for each.
+    fn size<T: Data, Q: Quantity>(&self, batch: &Batch<T>, quantity: &Q) -> Result<usize> {
+        let size = quantity.len(batch.template());
+        if size == self.weights.len() {
+            return Ok(size);
+        }
+        let expected = format!("{size} numbers, one a term");
+        Err(Error::Argument { name: "weights", expected, got: self.weights.len().to_string() })
+    }
+
+    fn valid(&self, body: usize) -> bool {
+        self.valid.is_none_or(|valid| valid[body])
+    }
+
+    fn counts<T: Data>(&self, values: &[T], size: usize) -> Vec<bool> {
+        let number = |body: usize| !values[body * size].value().is_nan();
+        (0..values.len() / size).map(|body| self.valid(body) && number(body)).collect()
     }
 
     /// What one of `count` bodies counts for.
