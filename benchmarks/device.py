@@ -165,6 +165,7 @@ def main(body: str, batches: tuple[int, ...], rounds: int) -> None:
         exact = standing_bodies(model, batch).double().requires_grad_()
         with _reference_path():
             ipt.IntuitivePhysicsLoss(model.template).weighted(exact, ipt.Ground.y_up())[0].backward()
+        assert exact.grad is not None
         slope = exact.grad.flatten(1)
         error = next(iter(runs.values()))().cpu().double().flatten(1) - slope
         if not table.columns:

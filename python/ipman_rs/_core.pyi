@@ -216,8 +216,9 @@ def get_num_threads() -> int:
     """The number of threads that batches use."""
 
 def set_num_threads(threads: int | None) -> None:
-    """Sets the number of threads that batches use, 1 to 1024. None: as RAYON_NUM_THREADS says, else as many as torch uses
-    once ipman_rs.torch has been used, else one a core.
+    """Sets the number of threads that batches use, 1 to 1024.
+
+    None: as RAYON_NUM_THREADS says, else as many as torch once ipman_rs.torch has been used, else one a core.
     """
 
 def follow_threads(threads: int) -> None:

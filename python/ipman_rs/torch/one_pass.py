@@ -109,7 +109,7 @@ class Terms(Function):
         follow_torch()
         terms, shares = _core.terms(call.template._core, call.quantity, call.options, *arrays, mask, call.reduction)
         ctx.save_for_backward(vertices)
-        ctx.call, ctx.ground, ctx.shares, ctx.vertices = call, arrays[1:], shares, arrays[0]
+        ctx.call, ctx.ground, ctx.shares, ctx.arrays = call, arrays[1:], shares, arrays
         return torch.from_numpy(terms)
 
     @staticmethod
@@ -120,7 +120,7 @@ class Terms(Function):
         d_out = np.ascontiguousarray(ctx.shares[:, None] * d_terms.numpy(force=True))
         follow_torch()
         template, quantity, options = ctx.call[:3]
-        gradient = _core.vjp(template._core, quantity, options, ctx.vertices, *ctx.ground, d_out)
+        gradient = _core.vjp(template._core, quantity, options, *ctx.arrays, d_out)  # pyright: ignore[reportCallIssue]
         return torch.from_numpy(gradient), None, None, None
 
 

@@ -103,7 +103,7 @@ fn stability() -> StabilityLoss {
 }
 
 fn rooms(criterion: &mut Criterion) {
-    set_num_threads(1);
+    set_num_threads(Some(1));
     room(criterion, "volume", &PartVolumes);
     room(criterion, "mass_properties", &MassProperties { densities: vec![985.0] });
     room(criterion, "sampling", &SampleSurface);

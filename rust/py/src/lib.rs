@@ -62,8 +62,9 @@ mod threads {
         ipman::threads::num_threads()
     }
 
-    /// Sets the number of threads that batches use, 1 to 1024. None: as RAYON_NUM_THREADS says, else as many as torch uses
-    /// once ipman_rs.torch has been used, else one a core.
+    /// Sets the number of threads that batches use, 1 to 1024.
+    ///
+    /// None: as RAYON_NUM_THREADS says, else as many as torch once ipman_rs.torch has been used, else one a core.
     #[pyfunction]
     pub fn set_num_threads(threads: Bound<'_, PyAny>) -> PyResult<()> {
         match threads.extract() {
