@@ -1,9 +1,9 @@
 //! The base of support: the hull of the contact samples on the ground, and whether the centre of mass lies over it.
 
 mod contact;
+mod extremes;
 pub mod hull;
 pub mod margin;
-mod octagon;
 #[cfg(feature = "lp")]
 pub mod program;
 
@@ -14,8 +14,8 @@ use crate::number::vector::{Vec3, narrow};
 use crate::number::{Real, Scalar, WideScalar};
 use crate::quantity::Quantity;
 use crate::scene::{self, Scene};
+use crate::support::extremes::Hull;
 use crate::support::margin::{Margin, Nearest};
-use crate::support::octagon::Hull;
 use crate::template::Template;
 
 /// The base of support of one body.

@@ -1,5 +1,5 @@
-//! The points that may be corners of the contacts' hull, found on lanes: what lies inside the octagon of the eight
-//! extreme contacts (after Akl and Toussaint) cannot be one. What is left is for the exact hull.
+//! The hull of the contacts, on lanes as far as it goes: what lies inside the polygon of the contacts that are extreme in
+//! some directions (after Akl and Toussaint) cannot be a corner. What is left is for the exact hull.
 
 use crate::number::{Real, Room, Scalar};
 use crate::scene::Scene;
@@ -24,7 +24,8 @@ impl<R: Real> Contacts<R> {
     }
 }
 
-const DIRECTIONS: usize = 8;
+/// With 16 the exact hull has about half as many points left as with 8; more cost more than they spare.
+const DIRECTIONS: usize = 16;
 
 /// In each direction the place of the extreme contact among the touches, −1 in a lane without contacts.
 struct Extremes;
@@ -34,16 +35,20 @@ impl<R: Real> Room<(&Contacts<R>,)> for Extremes {
 
     #[inline(always)]
     fn enter((contacts,): (&Contacts<R>,)) -> [R; DIRECTIONS] {
+        let mut normals = [[R::zero(); 2]; DIRECTIONS];
+        for (k, normal) in normals.iter_mut().enumerate() {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / DIRECTIONS as f64).sin_cos();
+            *normal = [R::of(cos), R::of(sin)];
+        }
         let mut best = [R::of(-f64::MAX); DIRECTIONS];
         let mut place = [R::of(-1.0); DIRECTIONS];
         for (i, touch) in contacts.touches.iter().enumerate() {
             let here = R::of(i as f64);
             let [x, y] = touch.flat;
-            let (sum, difference) = (x + y, x - y);
-            let reach = [x, sum, y, -difference, -x, -sum, -y, difference];
             for k in 0..DIRECTIONS {
-                let ahead = touch.test.if_negative(best[k] - reach[k], R::zero());
-                best[k] = ahead.if_negative(reach[k], best[k]);
+                let reach = normals[k][0].mul_add(x, normals[k][1] * y);
+                let ahead = touch.test.if_negative(best[k] - reach, R::zero());
+                best[k] = ahead.if_negative(reach, best[k]);
                 place[k] = ahead.if_negative(here, place[k]);
             }
         }
@@ -51,7 +56,7 @@ impl<R: Real> Room<(&Contacts<R>,)> for Extremes {
     }
 }
 
-/// Inside the octagon all of x · normal + offset are positive, by more than rounding.
+/// The edges of the extreme contacts' polygon: inside it all of normal · x + offset are positive, by more than rounding.
 struct Edges<R> {
     normals: [[R; 2]; DIRECTIONS],
     offsets: [R; DIRECTIONS],
@@ -80,8 +85,8 @@ impl<R: Real> Edges<R> {
     }
 }
 
-/// (normal, offset) of the octagon's edges in one lane, from its exact corners; equal corners repeat an edge. Nothing is
-/// inside an octagon without area.
+/// (normal, offset) of the edges in one lane, from the exact positions of the extreme contacts; with fewer corners than
+/// directions the edges repeat. Nothing is inside a polygon without area.
 fn lane_edges<R: Real>(
     contacts: &Contacts<R>,
     scene: &Scene<R>,
