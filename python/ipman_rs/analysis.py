@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ipman_rs.body.sequence import PosedSequence
 
 # Bodies that are posed and analysed at a time: enough for the lanes of several threads, few enough for the cache.
-PIECE = 64
+PIECE = 128
 
 
 @dataclass(frozen=True, eq=False)

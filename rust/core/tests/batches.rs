@@ -2,11 +2,13 @@
 
 mod common;
 
+use ipman::ground::Ground;
 use ipman::losses::balance::{BalanceCost, Wrap};
 use ipman::losses::ground::{GroundLoss, Tanh};
 use ipman::losses::stability::StabilityLoss;
 use ipman::losses::terms::StabilityTerms;
 use ipman::mass::Method;
+use ipman::number::gate::Level;
 use ipman::pressure::{CenterOfPressure, PressureCurve};
 use ipman::sampling::Points;
 use ipman::support::{Contact, ContactRule, SupportMargin};
@@ -108,6 +110,47 @@ fn a_body_in_the_air_has_no_margin_and_no_gradient() {
     assert!(gradient.iter().all(|&x| x == 0.0));
     let support = &batch.base_of_support(&contact, Method::Pcom).unwrap()[0];
     assert!(!support.has_contact() && !support.inside() && support.polygon.is_empty() && support.area == 0.0);
+}
+
+/// Single precision has the contacts and the hull's corners of double precision, in every lane of every level, also where
+/// a sample lies within single precision's rounding of the threshold.
+#[test]
+fn precisions_agree_on_the_base_of_support() {
+    let (template, single) = bodies(16 + 8 + 3);
+    let double: Vec<f64> = single.iter().map(|&x| x as f64).collect();
+    let count = single.len() / (3 * template.mesh.num_vertices);
+    let normals = [0.1, 1.0, -0.05].repeat(count);
+    let never = || false;
+    // A threshold within 1e-9 m of the height of the first body's tenth lowest sample.
+    let ground = Ground::new([0.1, 1.0, -0.05], 0.01).unwrap();
+    let vertices = &double.as_chunks::<3>().0[..template.mesh.num_vertices];
+    let height = |sample| ground.signed_height(template.samples.point(sample, vertices)).abs();
+    let mut close: Vec<f64> = (0..template.samples.len()).map(height).collect();
+    close.sort_by(f64::total_cmp);
+    let close = close[10];
+    for rule in [ContactRule::Paper, ContactRule::Released] {
+        for threshold in [0.02, 0.1, 0.6, close + 1e-9, close - 1e-9] {
+            let contact = Contact { rule, threshold };
+            let heights = vec![0.01; count];
+            let exact = Batch::new(&template, &double, &normals, &heights, &never).unwrap();
+            let exact = exact.base_of_support(&contact, Method::VertexMean).unwrap();
+            for level in Level::available() {
+                let batch = Batch::new(&template, &single, &normals, &heights, &never).unwrap().at_level(level);
+                let found = batch.base_of_support(&contact, Method::VertexMean).unwrap();
+                for (found, exact) in found.iter().zip(&exact) {
+                    assert_eq!(found.num_contacts, exact.num_contacts, "{rule:?} {threshold} {}", level.name());
+                    assert_eq!(found.polygon.len(), exact.polygon.len());
+                    for (a, b) in found.polygon.iter().zip(&exact.polygon) {
+                        assert!(common::distance(*a, *b) < 1e-14);
+                    }
+                    assert!((found.area - exact.area).abs() < 1e-14);
+                    // The centre of mass is single precision's.
+                    let same = found.margin == exact.margin || (found.margin - exact.margin).abs() < 1e-6;
+                    assert!(same, "{} {}", found.margin, exact.margin);
+                }
+            }
+        }
+    }
 }
 
 #[test]

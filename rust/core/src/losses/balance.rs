@@ -115,14 +115,22 @@ impl<W: Real> Supports<W> {
 
     #[inline(always)]
     fn weights(&self, lambda: [W; 2]) -> Weights<W> {
-        let arms = self.arm_x.iter().zip(&self.arm_y);
-        let mut of: Vec<W> =
-            self.exponent.iter().zip(arms).map(|(&e, (&x, &y))| e + lambda[0] * x + lambda[1] * y).collect();
-        let shift = of.iter().fold(W::of(-1e300), |top, &exponent| top.at_least(exponent));
+        // Loops of one kind each: only the sums and the largest must go in order, the rest is vectorised for one body too.
+        let mut of = self.exponent.clone();
+        for ((weight, &x), &y) in of.iter_mut().zip(&self.arm_x).zip(&self.arm_y) {
+            *weight = *weight + lambda[0] * x + lambda[1] * y;
+        }
+        let mut shift = W::of(-1e300);
+        for &exponent in &of {
+            shift = shift.at_least(exponent);
+        }
         for (weight, &factor) in of.iter_mut().zip(&self.factor) {
             *weight = factor * (*weight - shift).exp();
         }
-        let total = of.iter().fold(W::zero(), |sum, &weight| sum + weight);
+        let mut total = W::zero();
+        for &weight in &of {
+            total = total + weight;
+        }
         Weights { of, shift, total }
     }
 }
@@ -135,11 +143,14 @@ impl BalanceCost {
         let mut sums = [W::zero(); 5];
         for ((&weight, &x), &y) in weights.of.iter().zip(&supports.arm_x).zip(&supports.arm_y) {
             let (wx, wy) = (weight * x, weight * y);
-            for (sum, term) in sums.iter_mut().zip([wx, wy, wx * x, wx * y, wy * y]) {
-                *sum = *sum + term;
+            let terms = [wx, wy, wx * x, wx * y, wy * y];
+            for k in 0..5 {
+                sums[k] = sums[k] + terms[k];
             }
         }
-        let [x, y, xx, xy, yy] = sums.map(|sum| sum / weights.total);
+        let inverse = W::of(1.0) / weights.total;
+        let [x, y, xx, xy, yy] = sums;
+        let [x, y, xx, xy, yy] = [x * inverse, y * inverse, xx * inverse, xy * inverse, yy * inverse];
         let blur = W::of(self.sigma * self.sigma);
         let half = W::of(0.5) * blur * (lambda[0] * lambda[0] + lambda[1] * lambda[1]);
         Objective {
@@ -162,7 +173,7 @@ impl BalanceCost {
                 break;
             }
             let step = here.newton_step();
-            let trial: [W; 2] = std::array::from_fn(|k| lambda[k] + length * step[k]);
+            let trial = [lambda[0] + length * step[0], lambda[1] + length * step[1]];
             let there = self.objective(supports, trial);
             let promised = here.gradient[0] * step[0] + here.gradient[1] * step[1];
             // The slack admits steps whose gain drowns in rounding.
@@ -177,7 +188,7 @@ impl BalanceCost {
             length = refused.if_negative(W::of(1.0), W::of(0.5) * length);
         }
         let step = here.newton_step();
-        let lambda = std::array::from_fn(|k| lambda[k] + step[k]);
+        let lambda = [lambda[0] + step[0], lambda[1] + step[1]];
         (lambda, start - self.objective(supports, lambda).value)
     }
 
@@ -228,8 +239,12 @@ impl<W: Real> Objective<W> {
         let pick = |a: W, b: W| test.if_negative(b, a);
         Objective {
             value: pick(self.value, other.value),
-            gradient: std::array::from_fn(|k| pick(self.gradient[k], other.gradient[k])),
-            hessian: std::array::from_fn(|k| pick(self.hessian[k], other.hessian[k])),
+            gradient: [pick(self.gradient[0], other.gradient[0]), pick(self.gradient[1], other.gradient[1])],
+            hessian: [
+                pick(self.hessian[0], other.hessian[0]),
+                pick(self.hessian[1], other.hessian[1]),
+                pick(self.hessian[2], other.hessian[2]),
+            ],
         }
     }
 }
