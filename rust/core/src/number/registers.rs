@@ -190,6 +190,10 @@ macro_rules! single {
                 unsafe { $border::widen(self) }
             }
             #[inline(always)]
+            fn widen_in_line(self) -> $wide {
+                unsafe { $border::widen_in_line(self) }
+            }
+            #[inline(always)]
             fn narrow(wide: $wide) -> Self {
                 unsafe { $border::narrow(wide) }
             }
@@ -273,6 +277,11 @@ macro_rules! border {
             #[inline(never)]
             #[target_feature(enable = $features)]
             pub fn widen(number: $single) -> $double {
+                $widen(number)
+            }
+            #[inline]
+            #[target_feature(enable = $features)]
+            pub fn widen_in_line(number: $single) -> $double {
                 $widen(number)
             }
             #[inline(never)]
