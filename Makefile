@@ -29,7 +29,7 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard rust-toolchain.toml) 
 	$(shell find rust -type d -o -name '*.rs' -o -name Cargo.toml)
 BINARY := python/ipman_rs/_core.abi3.so
 
-.PHONY: help demo test test-rust test-python lint format wheel bench clean FORCE
+.PHONY: help demo test test-rust test-python test-levels lint format wheel bench clean FORCE
 
 help:
 	@echo 'make demo     the named poses of the embedded body, analysed: table, pictures and report in $(OUT)'
@@ -46,7 +46,7 @@ demo: $(VENV)/built
 	@echo
 	@echo 'The report: $(abspath $(OUT))/report.html   (numbers: report.json and report.npz, pictures: *.png)'
 
-test: test-rust test-python
+test: test-rust test-python test-levels
 	@echo
 	@echo 'All tests passed: Rust (cargo) and Python (pytest).'
 
@@ -57,6 +57,16 @@ test-rust:
 # One process a core, one thread each: torch would otherwise start its threads in every process.
 test-python: $(VENV)/test-tools $(VENV)/browser | test-rust
 	OMP_NUM_THREADS=1 python -m pytest -n auto $(PYTEST_ARGS)
+
+# The numbers once more on every other CPU level that this machine has (IPMAN_SIMD).
+LEVEL_TESTS := $(addprefix tests/,test_volume_mass.py test_sampling.py test_pressure.py test_support.py test_losses.py \
+	test_analysis.py test_real_bodies.py torch_layer/test_against_reference.py torch_layer/test_gradients.py \
+	torch_layer/test_bodies.py body/test_skinning.py)
+
+test-levels: $(VENV)/test-tools | test-python
+	for level in $$(python -c 'from ipman_rs import _core; print(*_core.simd_levels()[1:])'); do \
+		echo "CPU level $$level"; \
+		IPMAN_SIMD=$$level OMP_NUM_THREADS=1 python -m pytest -n auto $(LEVEL_TESTS); done
 
 lint: $(VENV)/test-tools $(VENV)/lint-tools
 	cargo fmt --all --check

@@ -123,6 +123,44 @@ def test_the_environment_sets_the_threads():
     assert results[0][1] == results[1][1]
 
 
+def test_the_environment_chooses_the_cpu_level():
+    """Levels with fused operations give the same bits; the scalar level rounds differently."""
+    script = "print(ip._core.simd_level(), digest(bodies.astype('f4')))"
+    levels = ip._core.simd_levels()
+    results = [child(script, IPMAN_SIMD=level) for level in levels]
+    assert [result[0] for result in results] == levels
+    assert len({bits for level, bits in results if level != "scalar"}) <= 1
+    refused = child(
+        """
+        try:
+            digest()
+        except ValueError as error:
+            print("IPMAN_SIMD" in str(error) and "scalar" in str(error) and "mmx" in str(error))
+        """,
+        IPMAN_SIMD="mmx",
+    )
+    assert refused == ["True"]
+
+
+def test_threads_follow_torch():
+    pytest.importorskip("torch")
+    script = """
+        import torch, ipman_rs.torch as ipt
+        torch.set_num_threads(3)
+        vertices = torch.from_numpy(bodies[:2]).requires_grad_()
+        loss = ipt.IntuitivePhysicsLoss(template)
+        loss.weighted(vertices, ipt.Ground.y_up(-0.9))[0].backward()
+        print(ip.get_num_threads())
+        ip.set_num_threads(2)
+        ipt.part_volumes(vertices, template)
+        print(ip.get_num_threads())
+        ip.set_num_threads(None)
+        print(ip.get_num_threads())
+        """
+    assert child(script) == ["3", "2", "3"]
+    assert child(script, RAYON_NUM_THREADS="5") == ["5", "2", "5"]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
 @pytest.mark.parametrize(
     "call",
