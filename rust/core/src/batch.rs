@@ -14,7 +14,7 @@ use crate::quantity::Quantity;
 use crate::scene::{self, Scene};
 use crate::support::{BaseOfSupport, Contact};
 use crate::template::Template;
-use crate::threads;
+use crate::threads::{self, num_threads};
 use crate::volume::SignedVolumes;
 use std::mem::MaybeUninit;
 use std::sync::Mutex;
@@ -228,7 +228,7 @@ impl<'a, T: Data> Batch<'a, T> {
             }
         }
         let mut rows = rows.into_iter();
-        let groups = Group::of(&bodies, self.level, T::widths(self.level));
+        let groups = Group::of(&bodies, self.level, self.widths(bodies.len()));
         let items = groups.into_iter().map(|group| {
             let out = rows.by_ref().take(group.bodies.len()).collect();
             (group, out)
@@ -306,6 +306,14 @@ impl<'a, T: Data> Batch<'a, T> {
     fn each_body<O: Send>(&self, output: (&mut [O], usize), f: impl Fn(usize, &mut [O]) + Sync) -> Result<()> {
         let rows: Vec<_> = output.0.chunks_exact_mut(output.1).enumerate().collect();
         threads::each(rows, self.pays_threads(), self.interrupted, &|(body, row)| f(body, row))
+    }
+
+    /// The lanes to use for so many bodies. Two threads with half the lanes are faster than one alone with all.
+    fn widths(&self, bodies: usize) -> &'static [usize] {
+        let widths = T::widths(self.level);
+        let (widest, half) = (widths[0], *widths.get(1).unwrap_or(&1));
+        let splits = num_threads() > 1 && half > 1 && half < bodies && bodies <= widest;
+        if splits { &widths[1..] } else { widths }
     }
 
     fn pays_threads(&self) -> bool {

@@ -4,6 +4,7 @@
 mod passes;
 
 use crate::error::{Error, Result};
+use crate::number::gate::Level;
 use crate::number::{Dual, Real, Scalar};
 use crate::skinning::blend::Tile;
 use crate::skinning::rotation::Form;
@@ -72,6 +73,7 @@ impl<'a, T: Scalar> Posing<'a, T> {
         interrupted: &'a (dyn Fn() -> bool + Sync + 'a),
     ) -> Result<Self> {
         check_rows(skin, num_bodies, &bodies)?;
+        Level::current()?;
         let form = Form::of_width(bodies.pose.width / skin.num_joints()).expect("checked");
         let used = [bodies.betas, bodies.expression].map(used);
         Ok(Posing { skin, num_bodies, form, bodies, used, interrupted })
