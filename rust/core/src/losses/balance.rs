@@ -7,12 +7,16 @@
 //! ½σ²|λ|², whose minimum is −J, and the envelope theorem gives the gradient at the solution:
 //! ∂J/∂m = λ, ∂J/∂x_i = −w_i λ, ∂J/∂h_i = −(w_i − p_i) d log ρ_i/dh, with w_i ∝ p_i e^(λ·x_i).
 
+//!
+//! Most samples bear nothing: chunks of them that cannot reach the heaviest one's load, but for rounding, are passed over.
+
 use crate::error::Result;
 use crate::mass::{Centre, Method};
-use crate::number::vector::{Vec3, add_scaled, narrow, scale};
-use crate::number::{Real, Room, Scalar};
+use crate::number::vector::{Vec3, add, add_scaled, narrow, scale, sub, widen};
+use crate::number::{Data, Real, Room};
 use crate::pressure::PressureCurve;
 use crate::quantity::{Quantity, unknown_choice};
+use crate::sampling::{CHUNK, Chunk, Row, SUMS, Walk, fold};
 use crate::scene::Scene;
 use crate::template::Template;
 
@@ -37,6 +41,7 @@ impl Wrap {
         }
     }
 
+    #[inline(always)]
     fn value_and_slope<W: Real>(self, cost: W) -> (W, W) {
         let one = W::of(1.0);
         let inverse = one / (one + cost);
@@ -59,157 +64,398 @@ pub struct BalanceCost {
 /// The solved problem.
 pub struct Balance<R: Real> {
     centre: Centre<R>,
-    supports: Supports<R::Wide>,
+    supports: Supports<R>,
+    /// Of the pressure alone, at λ = 0.
+    still: Load<R>,
     lambda: [R::Wide; 2],
+    /// Σ w_i x_i − m, nearly.
+    mean: [R::Wide; 2],
     cost: R::Wide,
 }
 
-/// The samples as supports: x_i − m on the ground, and log ρ_i = log factor + exponent (up to a common constant).
-struct Supports<W> {
-    arm_x: Vec<W>,
-    arm_y: Vec<W>,
-    height: Vec<W>,
-    factor: Vec<W>,
-    exponent: Vec<W>,
+/// What the samples' numbers are interpolated from, and where each chunk of samples reaches.
+struct Supports<R> {
+    /// Of the vertices.
+    heights: Vec<R>,
+    /// From a fixed point (the centre of mass, first) to the vertices, in the plane's coordinates.
+    arms: [Vec<R>; 2],
+    reaches: Vec<Reach<R>>,
 }
 
-/// p_i e^(λ·(x_i − m)) of each support, all divided by e^shift so that the largest is about 1, and their sum.
-struct Weights<W> {
-    of: Vec<W>,
-    shift: W,
-    total: W,
+/// Bounds of a chunk's samples.
+struct Reach<R> {
+    /// Lowest height, 0 below the ground.
+    lowest: R,
+    /// Least and largest arm along both axes.
+    arms: [[R; 2]; 2],
+    /// Height (0 below the ground) and arms of one of them.
+    first: [R; 3],
 }
 
-/// F, its gradient and its Hessian (xx, xy, yy) at one λ.
+/// log2 of e^(λ·(x_i − c) − γ h_i) as a function of (h_i, x_i).
+#[derive(Clone, Copy)]
+struct Exponent<R> {
+    by_height: R,
+    by_arm: [R; 2],
+    /// c
+    anchor: [R; 2],
+}
+
+/// Σ p_i e^(λ·(x_i − c)) / 2^top over the samples, where `top` is the largest exponent.
+#[derive(Clone, Copy)]
+struct Load<R: Real> {
+    top: R,
+    total: R::Wide,
+}
+
+/// The load, F, its gradient and its Hessian (xx, xy, yy) at one λ, and the loaded mean of the arms.
+#[derive(Clone, Copy)]
 struct Objective<W> {
     value: W,
     gradient: [W; 2],
     hessian: [W; 3],
+    mean: [W; 2],
 }
 
 /// Newton steps and halvings together. Balanced bodies need 5 or 6; a body that lies metres outside needs about 40.
 const MAX_STEPS: usize = 100;
-/// Residual in metres at which Newton's last full step reaches rounding.
-const TOLERANCE: f64 = 1e-9;
 
-impl<W: Real> Supports<W> {
+/// Residual in metres at which Newton's last full step reaches rounding, for it squares the residual over the length on
+/// which the loads change, a few centimetres.
+#[inline(always)]
+fn tolerance<R: Real>() -> R::Wide {
+    R::Wide::of(0.03 * R::Data::EPSILON.sqrt())
+}
+
+/// Exponents this far below the top add up to less than rounding, however many samples have them.
+#[inline(always)]
+fn negligible<R: Real>() -> R {
+    R::of(R::Data::EPSILON.log2() - 16.0)
+}
+
+impl<R: Real> Supports<R> {
     #[inline(always)]
-    fn new<R: Real<Wide = W>>(scene: &Scene<R>, centre: &Centre<R>, curve: &PressureCurve) -> Self {
-        let count = scene.template.samples.len();
-        let column = || Vec::with_capacity(count);
-        let mut supports =
-            Supports { arm_x: column(), arm_y: column(), height: column(), factor: column(), exponent: column() };
-        let [target_x, target_y] = scene.plane.flatten(centre.point);
-        for sample in 0..count {
-            let point = scene.template.samples.wide_point(sample, scene.points);
-            let [x, y] = scene.plane.flatten(point);
-            let height = scene.ground.signed_height(point);
-            supports.arm_x.push(x - target_x);
-            supports.arm_y.push(y - target_y);
-            supports.height.push(height);
-            supports.factor.push(height.if_negative(curve.density(height, W::zero()), W::of(1.0)));
-            supports.exponent.push(height.if_negative(W::zero(), W::of(-curve.gamma) * height));
+    fn new(scene: &Scene<R>, centre: Vec3<R::Wide>) -> Self {
+        let (heights, arms) = (scene.heights(), R::apart::<Arms, _>((scene, centre)));
+        let walk = &scene.template.samples.walk;
+        let mut reaches = Vec::with_capacity(walk.chunks.len());
+        let mut rows = [[R::zero(); CHUNK]; 3];
+        for chunk in &walk.chunks {
+            walk.interpolate(chunk, &heights, &mut rows[0]);
+            walk.interpolate(chunk, &arms[0], &mut rows[1]);
+            walk.interpolate(chunk, &arms[1], &mut rows[2]);
+            reaches.push(R::apart::<Reaches, _>((&rows, chunk.len())));
         }
-        supports
+        Supports { heights, arms, reaches }
     }
 
+    /// The same supports seen from another point, `by` further in the plane: arms are exact where they are short.
     #[inline(always)]
-    fn weights(&self, lambda: [W; 2]) -> Weights<W> {
-        // Loops of one kind each: only the sums and the largest must go in order, the rest is vectorised for one body too.
-        let mut of = self.exponent.clone();
-        for ((weight, &x), &y) in of.iter_mut().zip(&self.arm_x).zip(&self.arm_y) {
-            *weight = *weight + lambda[0] * x + lambda[1] * y;
+    fn seen_from(&self, scene: &Scene<R>, centre: Vec3<R::Wide>, by: [R::Wide; 2]) -> Self {
+        let arms = R::apart::<Arms, _>((scene, add(centre, scene.plane.raise(by))));
+        let by = [R::narrow(by[0]), R::narrow(by[1])];
+        let mut reaches = Vec::with_capacity(self.reaches.len());
+        for &Reach { lowest, arms: [x, y], first } in &self.reaches {
+            reaches.push(Reach {
+                lowest,
+                arms: [[x[0] - by[0], x[1] - by[0]], [y[0] - by[1], y[1] - by[1]]],
+                first: [first[0], first[1] - by[0], first[2] - by[1]],
+            });
         }
-        let mut shift = W::of(-1e300);
-        for &exponent in &of {
-            shift = shift.at_least(exponent);
-        }
-        for (weight, &factor) in of.iter_mut().zip(&self.factor) {
-            *weight = factor * (*weight - shift).exp();
-        }
-        let mut total = W::zero();
-        for &weight in &of {
-            total = total + weight;
-        }
-        Weights { of, shift, total }
+        Supports { heights: self.heights.clone(), arms, reaches }
     }
+}
+
+/// Arms of the vertices from a point. The point's rounding is taken off, too: a shift of all arms moves λ.
+struct Arms;
+
+impl<R: Real> Room<(&Scene<'_, R>, Vec3<R::Wide>)> for Arms {
+    type Output = [Vec<R>; 2];
+
+    #[inline(always)]
+    fn enter((scene, from): (&Scene<R>, Vec3<R::Wide>)) -> [Vec<R>; 2] {
+        let vertices = &scene.points[..scene.template.mesh.num_vertices];
+        let plane = scene.narrow_plane();
+        let near = narrow::<R>(from);
+        let rest = narrow::<R>(sub(from, widen(near)));
+        let mut arms = [vec![R::zero(); vertices.len()], vec![R::zero(); vertices.len()]];
+        let [x, y] = &mut arms;
+        for ((&vertex, x), y) in vertices.iter().zip(x).zip(y) {
+            [*x, *y] = plane.flatten(sub(sub(vertex, near), rest));
+        }
+        arms
+    }
+}
+
+/// The reach of a chunk from its rows of heights and arms.
+struct Reaches;
+
+impl<R: Real> Room<(&[Row<R>; 3], usize)> for Reaches {
+    type Output = Reach<R>;
+
+    #[inline(always)]
+    fn enter(([heights, x, y], len): (&[Row<R>; 3], usize)) -> Reach<R> {
+        let (lowest, _) = range(heights, len);
+        let (x_least, x_most) = range(x, len);
+        let (y_least, y_most) = range(y, len);
+        Reach {
+            lowest: lowest.at_least(R::zero()),
+            arms: [[x_least, x_most], [y_least, y_most]],
+            first: [heights[0].at_least(R::zero()), x[0], y[0]],
+        }
+    }
+}
+
+/// Least and largest of a row's first `len` numbers.
+#[inline(always)]
+fn range<R: Real>(row: &Row<R>, len: usize) -> (R, R) {
+    let (mut least, mut most) = ([row[0]; SUMS], [row[0]; SUMS]);
+    let (whole, rest) = row[..len].as_chunks::<SUMS>();
+    for numbers in whole {
+        for k in 0..SUMS {
+            least[k] = least[k].at_most(numbers[k]);
+            most[k] = most[k].at_least(numbers[k]);
+        }
+    }
+    for (k, &number) in rest.iter().enumerate() {
+        least[k] = least[k].at_most(number);
+        most[k] = most[k].at_least(number);
+    }
+    for k in 1..SUMS {
+        least[0] = least[0].at_most(least[k]);
+        most[0] = most[0].at_least(most[k]);
+    }
+    (least[0], most[0])
+}
+
+impl<R: Real> Exponent<R> {
+    #[inline(always)]
+    fn new(curve: &PressureCurve, lambda: [R::Wide; 2], anchor: [R; 2]) -> Self {
+        let unit = R::Wide::of(std::f64::consts::LOG2_E);
+        Exponent {
+            by_height: R::of(-curve.gamma * std::f64::consts::LOG2_E),
+            by_arm: [R::narrow(lambda[0] * unit), R::narrow(lambda[1] * unit)],
+            anchor,
+        }
+    }
+
+    /// At a height that is not negative and at arms from the anchor.
+    #[inline(always)]
+    fn at(&self, height: R, x: R, y: R) -> R {
+        height.mul_add(self.by_height, x.mul_add(self.by_arm[0], y * self.by_arm[1]))
+    }
+
+    /// No sample of the chunk has a larger one.
+    #[inline(always)]
+    fn bound(&self, reach: &Reach<R>) -> R {
+        let mut bound = reach.lowest * self.by_height;
+        for k in 0..2 {
+            let least = (reach.arms[k][0] - self.anchor[k]) * self.by_arm[k];
+            let most = (reach.arms[k][1] - self.anchor[k]) * self.by_arm[k];
+            bound = bound + least.at_least(most);
+        }
+        bound
+    }
+
+    /// Some sample has this one, and it is not far from the top.
+    #[inline(always)]
+    fn high(&self, reaches: &[Reach<R>]) -> R {
+        let mut high = R::of(-1e30);
+        for Reach { first: [height, x, y], .. } in reaches {
+            high = high.at_least(self.at(*height, *x - self.anchor[0], *y - self.anchor[1]));
+        }
+        high
+    }
+}
+
+/// The factor of the density that its exponent leaves: 1 above the ground.
+#[inline(always)]
+fn factor<R: Real>(curve: &PressureCurve, height: R) -> R {
+    height.if_negative(R::of(-curve.alpha).mul_add(height, R::of(1.0)), R::of(1.0))
+}
+
+/// One walk over the samples: their load at an exponent, and its first and second moments about the anchor.
+struct Weigh;
+
+impl<R: Real> Room<(&Supports<R>, &Walk, &PressureCurve, Exponent<R>)> for Weigh {
+    type Output = (Load<R>, [R::Wide; 5]);
+
+    #[inline(always)]
+    fn enter(
+        (supports, walk, curve, exponent): (&Supports<R>, &Walk, &PressureCurve, Exponent<R>),
+    ) -> (Load<R>, [R::Wide; 5]) {
+        let mut top = exponent.high(&supports.reaches);
+        let mut sums = [R::Wide::zero(); 6];
+        let mut rows = [[R::zero(); CHUNK]; 4];
+        for (chunk, reach) in walk.chunks.iter().zip(&supports.reaches) {
+            let clearance = exponent.bound(reach) - top - negligible::<R>();
+            if clearance.negative() == all_lanes::<R>() {
+                continue;
+            }
+            read(supports, walk, chunk, &mut rows);
+            R::apart::<WeighChunk, _>((curve, exponent, chunk.len(), clearance, &mut rows, &mut top, &mut sums));
+        }
+        let [total, x, y, xx, xy, yy] = sums;
+        (Load { top, total }, [x, y, xx, xy, yy])
+    }
+}
+
+/// All lanes' bits of [`Real::negative`].
+#[inline(always)]
+fn all_lanes<R: Real>() -> u32 {
+    R::of(-1.0).negative()
+}
+
+/// Heights and arms of a chunk's samples.
+#[inline(always)]
+fn read<R: Real>(supports: &Supports<R>, walk: &Walk, chunk: &Chunk, rows: &mut [Row<R>; 4]) {
+    walk.interpolate(chunk, &supports.heights, &mut rows[0]);
+    walk.interpolate(chunk, &supports.arms[0], &mut rows[1]);
+    walk.interpolate(chunk, &supports.arms[1], &mut rows[2]);
+}
+
+/// Adds a chunk, in the lanes where its clearance is not negative, to the sums. The sums are over 2^top: they are scaled
+/// down where the top rises.
+struct WeighChunk;
+
+type ChunkToWeigh<'a, R> =
+    (&'a PressureCurve, Exponent<R>, usize, R, &'a mut [Row<R>; 4], &'a mut R, &'a mut [<R as Real>::Wide; 6]);
+
+impl<R: Real> Room<ChunkToWeigh<'_, R>> for WeighChunk {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((curve, exponent, len, clearance, rows, top, sums): ChunkToWeigh<'_, R>) {
+        let [heights, x, y, exponents] = rows;
+        for (((height, x), y), own) in heights.iter().zip(&mut *x).zip(&mut *y).zip(&mut *exponents) {
+            *x = *x - exponent.anchor[0];
+            *y = *y - exponent.anchor[1];
+            *own = exponent.at(height.at_least(R::zero()), *x, *y);
+        }
+        let raised = top.at_least(range(exponents, len).1);
+        let rise = *top - raised;
+        if rise.negative() != 0 {
+            let shrink = rise.exp2().widen();
+            for sum in sums.iter_mut() {
+                *sum = *sum * shrink;
+            }
+        }
+        *top = raised;
+        for (height, own) in heights.iter_mut().zip(exponents.iter()) {
+            *height = factor(curve, *height) * (*own - raised).exp2();
+        }
+        for weight in &mut heights[len..] {
+            *weight = R::zero();
+        }
+        for (sum, moment) in sums.iter_mut().zip(moments(heights, x, y, exponents)) {
+            clearance.if_negative(R::zero(), moment).add_to(sum);
+        }
+    }
+}
+
+/// Σ of w, wx, wy, wxx, wxy, wyy over rows whose weights behind the chunk's end are 0. In three passes, so that the
+/// running sums stay in registers; `loads` is for wx.
+#[inline(always)]
+fn moments<R: Real>(weights: &Row<R>, x: &Row<R>, y: &Row<R>, loads: &mut Row<R>) -> [R; 6] {
+    let mut sums = [[R::zero(); SUMS]; 6];
+    let [total, by_x, by_y, by_xx, by_xy, by_yy] = &mut sums;
+    for start in (0..CHUNK).step_by(SUMS) {
+        for k in 0..SUMS {
+            let (weight, load) = (weights[start + k], weights[start + k] * x[start + k]);
+            loads[start + k] = load;
+            total[k] = total[k] + weight;
+            by_x[k] = by_x[k] + load;
+        }
+    }
+    for start in (0..CHUNK).step_by(SUMS) {
+        for k in 0..SUMS {
+            by_xx[k] = loads[start + k].mul_add(x[start + k], by_xx[k]);
+            by_xy[k] = loads[start + k].mul_add(y[start + k], by_xy[k]);
+        }
+    }
+    for start in (0..CHUNK).step_by(SUMS) {
+        for k in 0..SUMS {
+            let load = weights[start + k] * y[start + k];
+            by_y[k] = by_y[k] + load;
+            by_yy[k] = load.mul_add(y[start + k], by_yy[k]);
+        }
+    }
+    [fold(sums[0]), fold(sums[1]), fold(sums[2]), fold(sums[3]), fold(sums[4]), fold(sums[5])]
 }
 
 impl BalanceCost {
-    /// F at λ, up to the constant log Σρ.
+    /// F at λ, up to the constant log Σρ, from sums about an anchor.
     #[inline(always)]
-    fn objective<W: Real>(&self, supports: &Supports<W>, lambda: [W; 2]) -> Objective<W> {
-        let weights = supports.weights(lambda);
-        let mut sums = [W::zero(); 5];
-        for ((&weight, &x), &y) in weights.of.iter().zip(&supports.arm_x).zip(&supports.arm_y) {
-            let (wx, wy) = (weight * x, weight * y);
-            let terms = [wx, wy, wx * x, wx * y, wy * y];
-            for k in 0..5 {
-                sums[k] = sums[k] + terms[k];
-            }
-        }
-        let inverse = W::of(1.0) / weights.total;
-        let [x, y, xx, xy, yy] = sums;
-        let [x, y, xx, xy, yy] = [x * inverse, y * inverse, xx * inverse, xy * inverse, yy * inverse];
-        let blur = W::of(self.sigma * self.sigma);
-        let half = W::of(0.5) * blur * (lambda[0] * lambda[0] + lambda[1] * lambda[1]);
-        Objective {
-            value: weights.total.ln() + weights.shift + half,
-            gradient: [x + blur * lambda[0], y + blur * lambda[1]],
+    fn objective<R: Real>(
+        &self,
+        supports: &Supports<R>,
+        walk: &Walk,
+        lambda: [R::Wide; 2],
+        anchor: [R; 2],
+    ) -> (Objective<R::Wide>, Load<R>) {
+        let exponent = Exponent::new(&self.curve, lambda, anchor);
+        let (load, sums) = R::apart::<Weigh, _>((supports, walk, &self.curve, exponent));
+        let inverse = R::Wide::of(1.0) / load.total;
+        let [x, y] = [sums[0] * inverse, sums[1] * inverse];
+        let [xx, xy, yy] = [sums[2] * inverse, sums[3] * inverse, sums[4] * inverse];
+        let anchor = [anchor[0].widen(), anchor[1].widen()];
+        let mean = [anchor[0] + x, anchor[1] + y];
+        let blur = R::Wide::of(self.sigma * self.sigma);
+        let half = R::Wide::of(0.5) * blur * (lambda[0] * lambda[0] + lambda[1] * lambda[1]);
+        let shift = load.top.widen() * R::Wide::of(std::f64::consts::LN_2);
+        let objective = Objective {
+            value: load.total.ln() + shift + (lambda[0] * anchor[0] + lambda[1] * anchor[1]) + half,
+            gradient: [mean[0] + blur * lambda[0], mean[1] + blur * lambda[1]],
             hessian: [xx - x * x + blur, xy - x * y, yy - y * y + blur],
-        }
-    }
-
-    /// Newton with backtracking, each lane at its own pace, and one full step at the end, which also carries a dual
-    /// number's derivative of λ.
-    #[inline(always)]
-    fn solve<W: Real>(&self, supports: &Supports<W>) -> ([W; 2], W) {
-        let mut lambda = [W::zero(); 2];
-        let mut here = self.objective(supports, lambda);
-        let start = here.value;
-        let mut length = W::of(1.0);
-        for _ in 0..MAX_STEPS {
-            if here.has_arrived() {
-                break;
-            }
-            let step = here.newton_step();
-            let trial = [lambda[0] + length * step[0], lambda[1] + length * step[1]];
-            let there = self.objective(supports, trial);
-            let promised = here.gradient[0] * step[0] + here.gradient[1] * step[1];
-            // The slack admits steps whose gain drowns in rounding.
-            let slack = W::of(1e-13) * (W::of(1.0) + here.value.abs());
-            let excess = there.value - here.value - W::of(1e-4) * length * promised - slack;
-            // A lane that has arrived stays, however long the others take.
-            let refused = here.excess_residual().if_negative(W::of(1.0), excess);
-            for k in 0..2 {
-                lambda[k] = refused.if_negative(trial[k], lambda[k]);
-            }
-            here = here.replaced_where_negative(refused, there);
-            length = refused.if_negative(W::of(1.0), W::of(0.5) * length);
-        }
-        let step = here.newton_step();
-        let lambda = [lambda[0] + step[0], lambda[1] + step[1]];
-        (lambda, start - self.objective(supports, lambda).value)
-    }
-
-    fn solved<R: Real>(&self, scene: &Scene<R>) -> Balance<R> {
-        R::apart::<Forward, _>((self, scene))
+            mean,
+        };
+        (objective, load)
     }
 }
 
-/// [`BalanceCost::solved`]
-struct Forward;
+/// Newton with backtracking, each lane at its own pace, and one full step at the end, which also carries a dual number's
+/// derivative of λ. Arms are taken from the mean of the last step, for exponents are exact where they are short.
+struct Solve;
 
-impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>)> for Forward {
+impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>)> for Solve {
     type Output = Balance<R>;
 
     #[inline(always)]
     fn enter((cost, scene): (&BalanceCost, &Scene<R>)) -> Balance<R> {
         let centre = cost.method.forward(scene);
-        let supports = Supports::new(scene, &centre, &cost.curve);
-        let (lambda, divergence) = cost.solve(&supports);
+        let supports = Supports::new(scene, centre.point);
+        let walk = &scene.template.samples.walk;
+        let one = R::Wide::of(1.0);
+        let epsilon = (8.0 * R::Data::EPSILON).max(1e-13);
+        let mut lambda = [R::Wide::zero(); 2];
+        let (mut here, still) = cost.objective(&supports, walk, lambda, [R::zero(); 2]);
+        let start = here.value;
+        let mut length = one;
+        for _ in 0..MAX_STEPS {
+            let excess = here.residual() - tolerance::<R>();
+            // A lane without a number never leaves and must not keep the others waiting.
+            if (-excess).negative() == 0 {
+                break;
+            }
+            let step = here.newton_step();
+            let trial = [lambda[0] + length * step[0], lambda[1] + length * step[1]];
+            let anchor = [R::narrow(here.mean[0]), R::narrow(here.mean[1])];
+            let (there, _) = cost.objective(&supports, walk, trial, anchor);
+            // The slack admits steps whose gain drowns in rounding.
+            let slack = R::Wide::of(epsilon) * (one + here.value.abs());
+            let gain = there.value - here.value - R::Wide::of(1e-4) * length * here.along(step) - slack;
+            // A lane that has arrived stays, however long the others take.
+            let refused = excess.if_negative(one, gain);
+            lambda = [refused.if_negative(trial[0], lambda[0]), refused.if_negative(trial[1], lambda[1])];
+            here = here.replaced_where_negative(refused, there);
+            length = refused.if_negative(one, R::Wide::of(0.5) * length);
+        }
+        let step = here.newton_step();
+        // So close to the minimum F is its quadratic model.
+        let divergence = start - here.value - R::Wide::of(0.5) * here.along(step);
+        let lambda = [lambda[0] + step[0], lambda[1] + step[1]];
         // J is a divergence: below zero there is only rounding.
-        Balance { centre, supports, lambda, cost: divergence.at_least(R::Wide::zero()) }
+        Balance { centre, supports, still, lambda, mean: here.mean, cost: divergence.at_least(R::Wide::zero()) }
     }
 }
 
@@ -222,29 +468,32 @@ impl<W: Real> Objective<W> {
         [(xy * gy - yy * gx) / determinant, (xy * gx - xx * gy) / determinant]
     }
 
-    /// Negative in a lane whose residual is small enough.
+    /// F's slope along a step.
     #[inline(always)]
-    fn excess_residual(&self) -> W {
-        self.gradient[0].abs().at_least(self.gradient[1].abs()) - W::of(TOLERANCE)
+    fn along(&self, step: [W; 2]) -> W {
+        self.gradient[0] * step[0] + self.gradient[1] * step[1]
     }
 
+    /// How far Σ w_i x_i − m + σ²λ is from zero, metres.
     #[inline(always)]
-    fn has_arrived(&self) -> bool {
-        let excess = self.excess_residual();
-        (0..W::LANES).all(|lane| excess.lane(lane).value() < 0.0)
+    fn residual(&self) -> W {
+        self.gradient[0].abs().at_least(self.gradient[1].abs())
     }
 
     #[inline(always)]
     fn replaced_where_negative(self, test: W, other: Self) -> Self {
-        let pick = |a: W, b: W| test.if_negative(b, a);
+        let (g, other_g) = (self.gradient, other.gradient);
+        let (h, other_h) = (self.hessian, other.hessian);
+        let (m, other_m) = (self.mean, other.mean);
         Objective {
-            value: pick(self.value, other.value),
-            gradient: [pick(self.gradient[0], other.gradient[0]), pick(self.gradient[1], other.gradient[1])],
+            value: test.if_negative(other.value, self.value),
+            gradient: [test.if_negative(other_g[0], g[0]), test.if_negative(other_g[1], g[1])],
             hessian: [
-                pick(self.hessian[0], other.hessian[0]),
-                pick(self.hessian[1], other.hessian[1]),
-                pick(self.hessian[2], other.hessian[2]),
+                test.if_negative(other_h[0], h[0]),
+                test.if_negative(other_h[1], h[1]),
+                test.if_negative(other_h[2], h[2]),
             ],
+            mean: [test.if_negative(other_m[0], m[0]), test.if_negative(other_m[1], m[1])],
         }
     }
 }
@@ -257,7 +506,7 @@ impl Quantity for BalanceCost {
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Balance<R> {
-        let balance = self.solved(scene);
+        let balance = R::apart::<Solve, _>((self, scene));
         out[0] = R::narrow(self.wrap.value_and_slope(balance.cost).0);
         balance
     }
@@ -267,7 +516,7 @@ impl Quantity for BalanceCost {
     }
 }
 
-/// The backward of the cost.
+/// The backward of the cost. Its supports are seen from the loaded mean, so that the weights are exact.
 struct Backward;
 
 impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>, &Balance<R>, R, &mut [Vec3<R>])> for Backward {
@@ -275,23 +524,79 @@ impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>, &Balance<R>, R, &mut [Vec3<R>])
 
     #[inline(always)]
     fn enter((of, scene, saved, d_out, d_points): (&BalanceCost, &Scene<R>, &Balance<R>, R, &mut [Vec3<R>])) {
-        {
-            let Balance { centre, supports, lambda, cost } = saved;
-            let d_cost = d_out.widen() * of.wrap.value_and_slope(*cost).1;
-            let pull = scene.plane.raise([d_cost * lambda[0], d_cost * lambda[1]]);
-            of.method.backward(scene, centre, pull, d_points);
+        let Balance { centre, supports, still, lambda, mean, cost } = saved;
+        let d_cost = d_out.widen() * of.wrap.value_and_slope(*cost).1;
+        let pull = scene.plane.raise([d_cost * lambda[0], d_cost * lambda[1]]);
+        of.method.backward(scene, centre, pull, d_points);
 
-            let spread = supports.weights(*lambda);
-            let still = supports.weights([R::Wide::zero(); 2]);
-            for sample in 0..spread.of.len() {
-                let weight = spread.of[sample] / spread.total;
-                let pressure = still.of[sample] / still.total;
-                let factor = supports.factor[sample];
-                let log_slope = of.curve.slope(supports.height[sample], factor) / factor;
-                let mut d_point = scale(-weight, pull);
-                add_scaled(&mut d_point, -d_cost * (weight - pressure) * log_slope, scene.ground.normal);
-                scene.template.samples.point_backward(sample, narrow::<R>(d_point), d_points);
+        let walk = &scene.template.samples.walk;
+        let (curve, here) = (&of.curve, [R::zero(); 2]);
+        let supports = supports.seen_from(scene, centre.point, *mean);
+        let exponent = Exponent::new(curve, *lambda, here);
+        let (load, _) = R::apart::<Weigh, _>((&supports, walk, curve, exponent));
+        let spread = Side { exponent, top: load.top, share: R::narrow(R::Wide::of(1.0) / load.total) };
+        let exponent = Exponent::new(curve, [R::Wide::zero(); 2], here);
+        let still = Side { exponent, top: still.top, share: R::narrow(R::Wide::of(1.0) / still.total) };
+
+        let (mut d_arms, mut d_heights) =
+            (vec![R::zero(); supports.heights.len()], vec![R::zero(); supports.heights.len()]);
+        let mut rows = [[R::zero(); CHUNK]; 4];
+        for (chunk, reach) in walk.chunks.iter().zip(&supports.reaches) {
+            let clearances = [spread.clearance(reach), still.clearance(reach)];
+            if clearances[0].at_least(clearances[1]).negative() == all_lanes::<R>() {
+                continue;
             }
+            read(&supports, walk, chunk, &mut rows);
+            R::apart::<Shares, _>((curve, &spread, &still, clearances, &mut rows));
+            walk.scatter(chunk, &rows[0], &mut d_arms);
+            walk.scatter(chunk, &rows[1], &mut d_heights);
+        }
+        let (pull, d_cost) = (narrow::<R>(pull), R::narrow(d_cost));
+        let up = scale(-d_cost, scene.narrow_ground().normal);
+        for ((d_point, &weight), &d_height) in d_points.iter_mut().zip(&d_arms).zip(&d_heights) {
+            add_scaled(d_point, -weight, pull);
+            add_scaled(d_point, d_height, up);
+        }
+    }
+}
+
+/// Either side of the comparison: w, or p.
+struct Side<R> {
+    exponent: Exponent<R>,
+    top: R,
+    /// 1 / Σ
+    share: R,
+}
+
+impl<R: Real> Side<R> {
+    #[inline(always)]
+    fn clearance(&self, reach: &Reach<R>) -> R {
+        self.exponent.bound(reach) - self.top - negligible::<R>()
+    }
+
+    /// Its share of the load over the density's factor; 0 in the lanes that the walk has passed over.
+    #[inline(always)]
+    fn of(&self, clearance: R, height: R, x: R, y: R) -> R {
+        let share = self.share * (self.exponent.at(height, x, y) - self.top).exp2();
+        clearance.if_negative(R::zero(), share)
+    }
+}
+
+/// From heights and arms to w and, in the second row, (w − p) d log ρ/dh.
+struct Shares;
+
+impl<R: Real> Room<(&PressureCurve, &Side<R>, &Side<R>, [R; 2], &mut [Row<R>; 4])> for Shares {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((curve, spread, still, clearances, rows): (&PressureCurve, &Side<R>, &Side<R>, [R; 2], &mut [Row<R>; 4])) {
+        let [heights, x, y, _] = rows;
+        for ((height, x), y) in heights.iter_mut().zip(x).zip(y) {
+            let above = height.at_least(R::zero());
+            let weight = spread.of(clearances[0], above, *x, *y);
+            let pressure = still.of(clearances[1], above, *x, *y);
+            *x = (weight - pressure) * height.if_negative(R::of(-curve.alpha), R::of(-curve.gamma));
+            *height = factor(curve, *height) * weight;
         }
     }
 }
