@@ -268,10 +268,10 @@ impl<R: Real> Exponent<R> {
     }
 }
 
-/// The factor of the density that its exponent leaves: 1 above the ground.
+/// The factor of the density that its exponent leaves: 1 above the ground, and below it linear with slope `fall`.
 #[inline(always)]
-fn factor<R: Real>(curve: &PressureCurve, height: R) -> R {
-    height.if_negative(R::of(-curve.alpha).mul_add(height, R::of(1.0)), R::of(1.0))
+fn factor<R: Real>(fall: R, height: R) -> R {
+    height.if_negative(fall.mul_add(height, R::of(1.0)), R::of(1.0))
 }
 
 /// One walk over the samples: their load at an exponent, and its first and second moments about the anchor. Lanes with
@@ -342,8 +342,9 @@ impl<R: Real> Room<ChunkToWeigh<'_, R>> for WeighChunk {
             }
         }
         *top = raised;
+        let fall = R::of(-curve.alpha);
         for (height, own) in heights.iter_mut().zip(exponents.iter()) {
-            *height = factor(curve, *height) * (*own - raised).exp2();
+            *height = factor(fall, *height) * (*own - raised).exp2();
         }
         for weight in &mut heights[len..] {
             *weight = R::zero();
@@ -597,12 +598,13 @@ impl<R: Real> Room<(&PressureCurve, &Side<R>, &Side<R>, [R; 2], &mut [Row<R>; 4]
     #[inline(always)]
     fn enter((curve, spread, still, clearances, rows): (&PressureCurve, &Side<R>, &Side<R>, [R; 2], &mut [Row<R>; 4])) {
         let [heights, x, y, _] = rows;
+        let slopes = [R::of(-curve.alpha), R::of(-curve.gamma)];
         for ((height, x), y) in heights.iter_mut().zip(x).zip(y) {
             let above = height.at_least(R::zero());
             let weight = spread.of(clearances[0], above, *x, *y);
             let pressure = still.of(clearances[1], above, *x, *y);
-            *x = (weight - pressure) * height.if_negative(R::of(-curve.alpha), R::of(-curve.gamma));
-            *height = factor(curve, *height) * weight;
+            *x = (weight - pressure) * height.if_negative(slopes[0], slopes[1]);
+            *height = factor(slopes[0], *height) * weight;
         }
     }
 }
