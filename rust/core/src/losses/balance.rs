@@ -268,27 +268,28 @@ impl<R: Real> Exponent<R> {
     }
 }
 
-/// The factor of the density that its exponent leaves: 1 above the ground.
+/// The factor of the density that its exponent leaves: 1 above the ground, and below it linear with slope `fall`.
 #[inline(always)]
-fn factor<R: Real>(curve: &PressureCurve, height: R) -> R {
-    height.if_negative(R::of(-curve.alpha).mul_add(height, R::of(1.0)), R::of(1.0))
+fn factor<R: Real>(fall: R, height: R) -> R {
+    height.if_negative(fall.mul_add(height, R::of(1.0)), R::of(1.0))
 }
 
-/// One walk over the samples: their load at an exponent, and its first and second moments about the anchor.
+/// One walk over the samples: their load at an exponent, and its first and second moments about the anchor. Lanes with
+/// negative `idle` do not need it and make no chunk worth a visit.
 struct Weigh;
 
-impl<R: Real> Room<(&Supports<R>, &Walk, &PressureCurve, Exponent<R>)> for Weigh {
+impl<R: Real> Room<(&Supports<R>, &Walk, &PressureCurve, Exponent<R>, R)> for Weigh {
     type Output = (Load<R>, [R::Wide; 5]);
 
     #[inline(always)]
     fn enter(
-        (supports, walk, curve, exponent): (&Supports<R>, &Walk, &PressureCurve, Exponent<R>),
+        (supports, walk, curve, exponent, idle): (&Supports<R>, &Walk, &PressureCurve, Exponent<R>, R),
     ) -> (Load<R>, [R::Wide; 5]) {
         let mut top = exponent.high(&supports.reaches);
         let mut sums = [R::Wide::zero(); 6];
         let mut rows = [[R::zero(); CHUNK]; 4];
         for (chunk, reach) in walk.chunks.iter().zip(&supports.reaches) {
-            let clearance = exponent.bound(reach) - top - negligible::<R>();
+            let clearance = idle.if_negative(idle, exponent.bound(reach) - top - negligible::<R>());
             if clearance.negative() == all_lanes::<R>() {
                 continue;
             }
@@ -341,8 +342,9 @@ impl<R: Real> Room<ChunkToWeigh<'_, R>> for WeighChunk {
             }
         }
         *top = raised;
+        let fall = R::of(-curve.alpha);
         for (height, own) in heights.iter_mut().zip(exponents.iter()) {
-            *height = factor(curve, *height) * (*own - raised).exp2();
+            *height = factor(fall, *height) * (*own - raised).exp2();
         }
         for weight in &mut heights[len..] {
             *weight = R::zero();
@@ -357,30 +359,33 @@ impl<R: Real> Room<ChunkToWeigh<'_, R>> for WeighChunk {
 /// running sums stay in registers; `loads` is for wx.
 #[inline(always)]
 fn moments<R: Real>(weights: &Row<R>, x: &Row<R>, y: &Row<R>, loads: &mut Row<R>) -> [R; 6] {
-    let mut sums = [[R::zero(); SUMS]; 6];
-    let [total, by_x, by_y, by_xx, by_xy, by_yy] = &mut sums;
-    for start in (0..CHUNK).step_by(SUMS) {
+    let zero = [R::zero(); SUMS];
+    let (weights, x, y) = (weights.as_chunks::<SUMS>().0, x.as_chunks::<SUMS>().0, y.as_chunks::<SUMS>().0);
+    let loads = loads.as_chunks_mut::<SUMS>().0;
+    let (mut total, mut by_x) = (zero, zero);
+    for ((weights, x), loads) in weights.iter().zip(x).zip(&mut *loads) {
         for k in 0..SUMS {
-            let (weight, load) = (weights[start + k], weights[start + k] * x[start + k]);
-            loads[start + k] = load;
-            total[k] = total[k] + weight;
-            by_x[k] = by_x[k] + load;
+            loads[k] = weights[k] * x[k];
+            total[k] = total[k] + weights[k];
+            by_x[k] = by_x[k] + loads[k];
         }
     }
-    for start in (0..CHUNK).step_by(SUMS) {
+    let (mut by_xx, mut by_xy) = (zero, zero);
+    for ((loads, x), y) in loads.iter().zip(x).zip(y) {
         for k in 0..SUMS {
-            by_xx[k] = loads[start + k].mul_add(x[start + k], by_xx[k]);
-            by_xy[k] = loads[start + k].mul_add(y[start + k], by_xy[k]);
+            by_xx[k] = loads[k].mul_add(x[k], by_xx[k]);
+            by_xy[k] = loads[k].mul_add(y[k], by_xy[k]);
         }
     }
-    for start in (0..CHUNK).step_by(SUMS) {
+    let (mut by_y, mut by_yy) = (zero, zero);
+    for (weights, y) in weights.iter().zip(y) {
         for k in 0..SUMS {
-            let load = weights[start + k] * y[start + k];
+            let load = weights[k] * y[k];
             by_y[k] = by_y[k] + load;
-            by_yy[k] = load.mul_add(y[start + k], by_yy[k]);
+            by_yy[k] = load.mul_add(y[k], by_yy[k]);
         }
     }
-    [fold(sums[0]), fold(sums[1]), fold(sums[2]), fold(sums[3]), fold(sums[4]), fold(sums[5])]
+    [fold(total), fold(by_x), fold(by_y), fold(by_xx), fold(by_xy), fold(by_yy)]
 }
 
 impl BalanceCost {
@@ -392,9 +397,10 @@ impl BalanceCost {
         walk: &Walk,
         lambda: [R::Wide; 2],
         anchor: [R; 2],
+        idle: R,
     ) -> (Objective<R::Wide>, Load<R>) {
         let exponent = Exponent::new(&self.curve, lambda, anchor);
-        let (load, sums) = R::apart::<Weigh, _>((supports, walk, &self.curve, exponent));
+        let (load, sums) = R::apart::<Weigh, _>((supports, walk, &self.curve, exponent, idle));
         let inverse = R::Wide::of(1.0) / load.total;
         let [x, y] = [sums[0] * inverse, sums[1] * inverse];
         let [xx, xy, yy] = [sums[2] * inverse, sums[3] * inverse, sums[4] * inverse];
@@ -428,7 +434,7 @@ impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>)> for Solve {
         let one = R::Wide::of(1.0);
         let epsilon = (8.0 * R::Data::EPSILON).max(1e-13);
         let mut lambda = [R::Wide::zero(); 2];
-        let (mut here, still) = cost.objective(&supports, walk, lambda, [R::zero(); 2]);
+        let (mut here, still) = cost.objective(&supports, walk, lambda, [R::zero(); 2], R::zero());
         let start = here.value;
         let mut length = one;
         for _ in 0..MAX_STEPS {
@@ -440,7 +446,8 @@ impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>)> for Solve {
             let step = here.newton_step();
             let trial = [lambda[0] + length * step[0], lambda[1] + length * step[1]];
             let anchor = [R::narrow(here.mean[0]), R::narrow(here.mean[1])];
-            let (there, _) = cost.objective(&supports, walk, trial, anchor);
+            let idle = R::narrow((-excess).if_negative(R::Wide::zero(), -one));
+            let (there, _) = cost.objective(&supports, walk, trial, anchor, idle);
             // The slack admits steps whose gain drowns in rounding.
             let slack = R::Wide::of(epsilon) * (one + here.value.abs());
             let gain = there.value - here.value - R::Wide::of(1e-4) * length * here.along(step) - slack;
@@ -533,7 +540,7 @@ impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>, &Balance<R>, R, &mut [Vec3<R>])
         let (curve, here) = (&of.curve, [R::zero(); 2]);
         let supports = supports.seen_from(scene, centre.point, *mean);
         let exponent = Exponent::new(curve, *lambda, here);
-        let (load, _) = R::apart::<Weigh, _>((&supports, walk, curve, exponent));
+        let (load, _) = R::apart::<Weigh, _>((&supports, walk, curve, exponent, R::zero()));
         let spread = Side { exponent, top: load.top, share: R::narrow(R::Wide::of(1.0) / load.total) };
         let exponent = Exponent::new(curve, [R::Wide::zero(); 2], here);
         let still = Side { exponent, top: still.top, share: R::narrow(R::Wide::of(1.0) / still.total) };
@@ -591,12 +598,13 @@ impl<R: Real> Room<(&PressureCurve, &Side<R>, &Side<R>, [R; 2], &mut [Row<R>; 4]
     #[inline(always)]
     fn enter((curve, spread, still, clearances, rows): (&PressureCurve, &Side<R>, &Side<R>, [R; 2], &mut [Row<R>; 4])) {
         let [heights, x, y, _] = rows;
+        let slopes = [R::of(-curve.alpha), R::of(-curve.gamma)];
         for ((height, x), y) in heights.iter_mut().zip(x).zip(y) {
             let above = height.at_least(R::zero());
             let weight = spread.of(clearances[0], above, *x, *y);
             let pressure = still.of(clearances[1], above, *x, *y);
-            *x = (weight - pressure) * height.if_negative(R::of(-curve.alpha), R::of(-curve.gamma));
-            *height = factor(curve, *height) * weight;
+            *x = (weight - pressure) * height.if_negative(slopes[0], slopes[1]);
+            *height = factor(slopes[0], *height) * weight;
         }
     }
 }
