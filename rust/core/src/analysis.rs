@@ -117,9 +117,8 @@ impl Analysis {
         scene.put(exact.point, &mut out[at::CENTER_OF_MASS_EXACT..][..3]);
         scene.put(looked.cop.point, &mut out[at::CENTER_OF_PRESSURE..][..3]);
         out[at::STABILITY] = R::narrow(distance_on_ground(scene, &centre, &looked.cop).0);
-        self.balance.forward(scene, &mut out[at::BALANCE..][..1]);
-
         let supports = BaseOfSupport::new(scene, &self.contact, &centre);
+        self.balance.forward_about(scene, centre, &mut out[at::BALANCE..][..1]);
         let number = |of: &dyn Fn(usize) -> f64| R::narrow(R::Wide::from_lanes(|lane| Real::of(of(lane))));
         out[at::NUM_CONTACTS] = number(&|lane| supports[lane].num_contacts as f64);
         out[at::AREA] = number(&|lane| supports[lane].area);

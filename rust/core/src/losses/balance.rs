@@ -423,12 +423,11 @@ impl BalanceCost {
 /// derivative of λ. Arms are taken from the mean of the last step, for exponents are exact where they are short.
 struct Solve;
 
-impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>)> for Solve {
+impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>, Centre<R>)> for Solve {
     type Output = Balance<R>;
 
     #[inline(always)]
-    fn enter((cost, scene): (&BalanceCost, &Scene<R>)) -> Balance<R> {
-        let centre = cost.method.forward(scene);
+    fn enter((cost, scene, centre): (&BalanceCost, &Scene<R>, Centre<R>)) -> Balance<R> {
         let supports = Supports::new(scene, centre.point);
         let walk = &scene.template.samples.walk;
         let one = R::Wide::of(1.0);
@@ -505,6 +504,15 @@ impl<W: Real> Objective<W> {
     }
 }
 
+impl BalanceCost {
+    /// The forward about a centre of mass that is known already.
+    pub fn forward_about<R: Real>(&self, scene: &Scene<R>, centre: Centre<R>, out: &mut [R]) -> Balance<R> {
+        let balance = R::apart::<Solve, _>((self, scene, centre));
+        out[0] = R::narrow(self.wrap.value_and_slope(balance.cost).0);
+        balance
+    }
+}
+
 impl Quantity for BalanceCost {
     type Saved<R: Real> = Balance<R>;
 
@@ -513,9 +521,7 @@ impl Quantity for BalanceCost {
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Balance<R> {
-        let balance = R::apart::<Solve, _>((self, scene));
-        out[0] = R::narrow(self.wrap.value_and_slope(balance.cost).0);
-        balance
+        self.forward_about(scene, self.method.forward(scene), out)
     }
 
     fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Balance<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
