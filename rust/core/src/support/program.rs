@@ -38,7 +38,7 @@ pub fn is_convex_combination(points: &[[f64; 2]], point: [f64; 2]) -> bool {
 /// max t of the ray programme; t is the last column's variable.
 fn reach(columns: &[[f64; 3]]) -> f64 {
     let mut at = Iterate::start(columns);
-    let (mut least, mut reach) = (f64::INFINITY, 0.0);
+    let (mut least, mut best) = (f64::INFINITY, Vec::new());
     for _ in 0..MAX_ITERATIONS {
         let residual = Residual::of(columns, &at);
         let size = residual.size();
@@ -46,7 +46,7 @@ fn reach(columns: &[[f64; 3]]) -> f64 {
             break;
         }
         if size < least {
-            (least, reach) = (size, *at.x.last().expect("the ray's column is always there"));
+            (least, best) = (size, at.x.clone());
         }
         let Some(factor) = Factor::new(columns, &at) else { break };
         let affine = factor.direction(columns, &at, &residual, &|i| at.x[i] * at.s[i]);
@@ -62,7 +62,66 @@ fn reach(columns: &[[f64; 3]]) -> f64 {
         let dual = (back_off * step_length(&at.s, &step.s)).min(1.0);
         at.advance(&step, primal, dual);
     }
-    reach
+    let interior = best.last().copied().unwrap_or(0.0);
+    vertex(columns, &best).unwrap_or(interior)
+}
+
+/// t at the programme's optimal vertex, by pivots of the simplex method from the ray and the two heaviest points. An
+/// interior iterate comes close to it, on some programmes no closer than 1e-9; the vertex itself is exact to rounding.
+fn vertex(columns: &[[f64; 3]], x: &[f64]) -> Option<f64> {
+    let ([ray_x, ray_y, _], points) = columns.split_last()?;
+    let points: Vec<[f64; 2]> = points.iter().map(|p| [p[0], p[1]]).collect();
+    let mut heaviest: Vec<usize> = (0..points.len().min(x.len())).collect();
+    heaviest.sort_unstable_by(|&i, &j| x[j].total_cmp(&x[i]));
+    let ray = [-ray_x, -ray_y];
+    let mut edge = Edge { ends: [points[*heaviest.first()?], points[*heaviest.get(1)?]], ray };
+    for _ in 0..points.len() {
+        if !(0.0..=1.0).contains(&edge.crossing()) {
+            return None;
+        }
+        // The mean, the origin here, lies on the inner side; the point farthest beyond enters the basis.
+        let farthest = points.iter().copied().max_by(|&p, &q| edge.beyond(p).total_cmp(&edge.beyond(q)))?;
+        if edge.beyond(farthest) <= 1e-13 {
+            return Some(edge.reach()).filter(|t| t.is_finite());
+        }
+        let [start, end] = edge.ends;
+        let first = Edge { ends: [start, farthest], ray };
+        edge = if (0.0..=1.0).contains(&first.crossing()) { first } else { Edge { ends: [farthest, end], ray } };
+    }
+    None
+}
+
+/// A basis of the programme: an edge between two points and the ray from the mean that crosses it.
+struct Edge {
+    ends: [[f64; 2]; 2],
+    ray: [f64; 2],
+}
+
+impl Edge {
+    fn along(&self) -> [f64; 2] {
+        let [start, end] = self.ends;
+        [end[0] - start[0], end[1] - start[1]]
+    }
+
+    /// Where along the edge the ray crosses its line, 0 to 1 within it.
+    fn crossing(&self) -> f64 {
+        cross(self.ends[0], self.ray) / cross(self.ray, self.along())
+    }
+
+    /// How far along the ray that is.
+    fn reach(&self) -> f64 {
+        cross(self.ends[0], self.along()) / cross(self.ray, self.along())
+    }
+
+    /// Positive for a point on the other side of the edge's line than the mean.
+    fn beyond(&self, point: [f64; 2]) -> f64 {
+        let from_start = [point[0] - self.ends[0][0], point[1] - self.ends[0][1]];
+        cross(self.along(), from_start) * cross(self.along(), self.ends[0]).signum()
+    }
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
 }
 
 /// Primal x, dual y and slack s, or a direction of them.
