@@ -17,7 +17,6 @@ use crate::template::Template;
 use crate::threads::{self, num_threads};
 use crate::volume::SignedVolumes;
 use std::mem::MaybeUninit;
-use std::sync::Mutex;
 
 /// `num_bodies` poses of one template, each over its ground.
 pub struct Batch<'a, T> {
@@ -197,13 +196,19 @@ impl<'a, T: Data> Batch<'a, T> {
             let expected = format!("1 or {} numbers", self.template.mesh.num_parts);
             return Err(Error::Argument { name: "densities", expected, got: "another number".into() });
         }
-        let all = Mutex::new(vec![Polygon::new(); self.len()]);
-        self.each([(out, size)], |group, [out]| {
-            let mut polygons = Vec::new();
-            self.on_lanes(group, Figures { analysis, size, out, polygons: &mut polygons });
-            group.hand_out(polygons, &all);
+        let mut polygons = vec![Polygon::new(); self.len()];
+        let mut bodies = Vec::new();
+        for (body, (row, polygon)) in out.chunks_exact_mut(size).zip(&mut polygons).enumerate() {
+            match self.origin(body) {
+                Some(origin) => bodies.push((body, origin, (row, polygon))),
+                None => row.fill(T::of(f64::NAN)),
+            }
+        }
+        self.each_group(bodies, |group, rows| {
+            let (out, polygons) = rows.into_iter().unzip();
+            self.on_lanes(group, Figures { analysis, size, out, polygons });
         })?;
-        Ok(all.into_inner().expect("no thread panicked"))
+        Ok(polygons)
     }
 
     /// BoSE by the linear programme.
@@ -220,22 +225,9 @@ impl<'a, T: Data> Batch<'a, T> {
     /// What is found of each body; `bad` for a body that is not finite.
     fn find<F: Finding>(&self, bad: F::Of, finding: &F) -> Result<Vec<F::Of>> {
         let mut out = vec![bad; self.len()];
-        let (mut bodies, mut rows) = (Vec::new(), Vec::new());
-        for (body, row) in out.iter_mut().enumerate() {
-            if let Some(origin) = self.origin(body) {
-                bodies.push((body, origin));
-                rows.push(row);
-            }
-        }
-        let mut rows = rows.into_iter();
-        let groups = Group::of(&bodies, self.level, self.widths(bodies.len()));
-        let items = groups.into_iter().map(|group| {
-            let out = rows.by_ref().take(group.bodies.len()).collect();
-            (group, out)
-        });
-        threads::each(items.collect(), self.pays_threads(), self.interrupted, &|(group, out): (Group, _)| {
-            self.on_lanes(&group, Find { finding, out });
-        })?;
+        let bodies =
+            out.iter_mut().enumerate().filter_map(|(body, row)| Some((body, self.origin(body)?, row))).collect();
+        self.each_group(bodies, |group, out| self.on_lanes(group, Find { finding, out }))?;
         Ok(out)
     }
 
@@ -279,27 +271,42 @@ impl<'a, T: Data> Batch<'a, T> {
         f: impl Fn(&Group, [Vec<&mut [T]>; N]) + Sync,
     ) -> Result<()> {
         let mut rest = outputs.map(|(data, size)| data.chunks_exact_mut(size));
-        let (mut bodies, mut rows) = (Vec::new(), Vec::new());
+        let mut bodies = Vec::new();
         for body in 0..self.len() {
             let mut row = rest.each_mut().map(|chunks| chunks.next().expect("one row a body"));
             match self.origin(body) {
-                Some(origin) => {
-                    bodies.push((body, origin));
-                    rows.push(row);
-                }
+                Some(origin) => bodies.push((body, origin, row)),
                 None => row.iter_mut().enumerate().for_each(|(k, row)| row.fill(T::of([f64::NAN, 0.0][k]))),
             }
         }
-        let mut items = Vec::new();
-        let mut rows = rows.into_iter();
-        for group in Group::of(&bodies, self.level, T::widths(self.level)) {
+        self.each_group(bodies, |group, rows| {
             let mut own: [Vec<&mut [T]>; N] = std::array::from_fn(|_| Vec::with_capacity(group.width));
-            for row in rows.by_ref().take(group.bodies.len()) {
+            for row in rows {
                 own.iter_mut().zip(row).for_each(|(own, row)| own.push(row));
             }
-            items.push((group, own));
+            f(group, own);
+        })
+    }
+
+    /// Runs `f` on finite bodies side by side, over the threads: on each group with what belongs to its bodies.
+    fn each_group<P: Send>(&self, bodies: Vec<(usize, Vec3<f64>, P)>, f: impl Fn(&Group, Vec<P>) + Sync) -> Result<()> {
+        let widths = self.widths(bodies.len());
+        let mut groups = Vec::new();
+        let mut rest = bodies.into_iter();
+        for &width in widths {
+            // A group that is half empty takes as long as a full one.
+            while 2 * rest.len() > width {
+                let mut group = Group { level: self.level, width, bodies: Vec::new(), origins: Vec::new() };
+                let mut own = Vec::with_capacity(width);
+                for (body, origin, belonging) in rest.by_ref().take(width) {
+                    group.bodies.push(body);
+                    group.origins.push(origin);
+                    own.push(belonging);
+                }
+                groups.push((group, own));
+            }
         }
-        threads::each(items, self.pays_threads(), self.interrupted, &|(group, rows)| f(&group, rows))
+        threads::each(groups, self.pays_threads(), self.interrupted, &|(group, own)| f(&group, own))
     }
 
     /// Runs `f` on every body with its row of the output.
@@ -335,29 +342,6 @@ struct Group {
 }
 
 impl Group {
-    /// Groups as wide as pays: a group that is half empty takes as long as a full one.
-    fn of(bodies: &[(usize, Vec3<f64>)], level: Level, widths: &[usize]) -> Vec<Group> {
-        let mut groups = Vec::new();
-        let mut rest = bodies;
-        for &width in widths {
-            while 2 * rest.len() > width {
-                let (group, others) = rest.split_at(width.min(rest.len()));
-                rest = others;
-                let (bodies, origins) = group.iter().copied().unzip();
-                groups.push(Group { level, width, bodies, origins });
-            }
-        }
-        groups
-    }
-
-    /// Gives each body what its lane has.
-    fn hand_out<O>(&self, lanes: Vec<O>, all: &Mutex<Vec<O>>) {
-        let mut all = all.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        for (&body, lane) in self.bodies.iter().zip(lanes) {
-            all[body] = lane;
-        }
-    }
-
     /// The body of each lane; lanes that are left over repeat the last body.
     fn lanes(&self) -> impl Iterator<Item = usize> {
         (0..self.width).map(|lane| lane.min(self.bodies.len() - 1))
@@ -421,13 +405,14 @@ struct Figures<'a, T> {
     analysis: &'a Analysis,
     size: usize,
     out: Vec<&'a mut [T]>,
-    polygons: &'a mut Vec<Polygon>,
+    polygons: Vec<&'a mut Polygon>,
 }
 
 impl<T: Data> OnLanes<T> for Figures<'_, T> {
     fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
         let mut out = vec![R::zero(); self.size];
-        *self.polygons = self.analysis.forward(scene, &mut out);
+        let polygons = self.analysis.forward(scene, &mut out);
+        self.polygons.into_iter().zip(polygons).for_each(|(own, polygon)| *own = polygon);
         R::write_rows(&out, &mut self.out);
     }
 }
