@@ -13,7 +13,7 @@ from torch import Tensor
 from ipman_rs import presets
 
 from . import bodies
-from .measure import MIN_TURNS, Row, interleaved, medians, relative_error, use_threads
+from .measure import MIN_TURNS, Row, Times, interleaved, relative_error, use_threads
 from .peers import skinning
 from .peers.best_torch import BestTorch
 from .peers.literal import Literal
@@ -79,12 +79,12 @@ def _losses(budget: Budget, body: str, preset: str, batch: int, threads: int) ->
             )
         runs = {name: _step(lambda peer=peer: total(peer), vertices) for name, peer in peers.items()}
         times = interleaved(runs, budget.seconds, budget.min_turns)
-        for name, seconds in medians(times).items():
+        for name in peers:
             errors: tuple[float | None, float | None] = (None, None)
             if expected is not None:
                 found = _value_and_gradient(lambda name=name: total(peers[name]), vertices)
                 errors = relative_error(found[0], expected[0]), relative_error(found[1], expected[1])
-            yield Row(case, body, preset, batch, threads, name, 1e6 * seconds / batch, len(times[name]), *errors)
+            yield Row(case, body, preset, batch, threads, name, *_microseconds(times[name], batch), *errors)
 
 
 def _names(body: str, preset: str, batch: int, threads: int) -> list[str]:
@@ -120,13 +120,11 @@ def _skinning(budget: Budget) -> Iterator[Row]:
             times = interleaved(
                 {name: (lambda peer=peer: run(peer)) for name, peer in peers.items()}, budget.seconds, budget.min_turns
             )
-            for name, seconds in medians(times).items():
+            for name in peers:
                 value = relative_error(run(peers[name]), expected)
                 gradient = max(relative_error(a.grad, b.grad) for a, b in zip(inputs, doubles, strict=True))
-                yield Row(
-                    "skinning", "smpl", "", batch, threads, name,
-                    1e6 * seconds / batch, len(times[name]), value, gradient,
-                )  # fmt: skip
+                found = _microseconds(times[name], batch)
+                yield Row("skinning", "smpl", "", batch, threads, name, *found, value, gradient)
 
 
 def _metrics(budget: Budget) -> Iterator[Row]:
@@ -148,9 +146,15 @@ def _metrics(budget: Budget) -> Iterator[Row]:
     for case, peers in groups.items():
         expected = {name: peer(exact) for name, peer in peers.items()}["ours"]
         times = interleaved({n: (lambda p=p: p(vertices)) for n, p in peers.items()}, budget.seconds, budget.min_turns)
-        for name, seconds in medians(times).items():
+        for name in peers:
             error = _metric_error(peers[name](vertices), expected)
-            yield Row(case, "smpl", "", batch, 1, name, 1e6 * seconds / batch, len(times[name]), error)
+            yield Row(case, "smpl", "", batch, 1, name, *_microseconds(times[name], batch), error)
+
+
+def _microseconds(times: Times, batch: int) -> tuple[float, float, int]:
+    """A body: the median, that of the first calls, and the number of calls."""
+    further, first = (1e6 * seconds / batch for seconds in times.medians())
+    return further, first, len(times.first) + len(times.further)
 
 
 def _metric_error(found: Any, expected: Any) -> float:

@@ -8,7 +8,7 @@ import platform
 import statistics
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ import ipman_rs as ip
 from ipman_rs import _core
 
 MIN_TURNS = 5
+TURN = 0.02  # seconds
 
 
 @dataclass
@@ -31,38 +32,58 @@ class Row:
     threads: int
     peer: str
     microseconds: float  # a body, the median
-    turns: int
+    first: float  # the same of the first calls of the turns, which find the caches as the other peers left them
+    calls: int
     value_error: float | None = None
     gradient_error: float | None = None
 
 
-def interleaved(
-    runs: Mapping[str, Callable[[], Any]], seconds: float, min_turns: int = MIN_TURNS
-) -> dict[str, list[float]]:
-    """Seconds of every run; each turn runs every peer once, so that a busy machine slows them alike.
+@dataclass
+class Times:
+    """Seconds of the first call of each turn, and of all the others."""
 
-    Two turns come first unmeasured.
+    first: list[float] = field(default_factory=list)
+    further: list[float] = field(default_factory=list)
+
+    def medians(self) -> tuple[float, float]:
+        """Of the further calls, and of the first ones."""
+        return statistics.median(self.further), statistics.median(self.first)
+
+
+def interleaved(runs: Mapping[str, Callable[[], Any]], seconds: float, min_turns: int = MIN_TURNS) -> dict[str, Times]:
+    """The peers take turns, so that a busy machine slows them alike. A turn is a first call, and calls for 20 ms.
+
+    Each peer has two calls unmeasured before.
     """
-    for _ in range(2):
-        for run in runs.values():
-            run()
-    times: dict[str, list[float]] = {name: [] for name in runs}
+    for run in runs.values():
+        run()
+        run()
+    times = {name: Times() for name in runs}
     gc.collect()
     gc.disable()
     try:
         end = time.perf_counter() + seconds
-        while time.perf_counter() < end or min(map(len, times.values())) < min_turns:
+        while time.perf_counter() < end or min(len(found.first) for found in times.values()) < min_turns:
             for name, run in runs.items():
-                start = time.perf_counter()
-                run()
-                times[name].append(time.perf_counter() - start)
+                _turn(run, times[name])
     finally:
         gc.enable()
     return times
 
 
-def medians(times: Mapping[str, list[float]]) -> dict[str, float]:
-    return {name: statistics.median(values) for name, values in times.items()}
+def _turn(run: Callable[[], Any], times: Times) -> None:
+    times.first.append(_seconds(run))
+    end = time.perf_counter() + TURN
+    while True:
+        times.further.append(_seconds(run))
+        if time.perf_counter() >= end:
+            return
+
+
+def _seconds(run: Callable[[], Any]) -> float:
+    start = time.perf_counter()
+    run()
+    return time.perf_counter() - start
 
 
 def relative_error(got: Any, expected: Any) -> float:

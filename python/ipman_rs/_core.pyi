@@ -248,8 +248,15 @@ def terms(
     height: NDArray[np.float64],
     valid: NDArray[np.bool_] | None,
     reduction: str,
-) -> tuple[NDArray[_Float], NDArray[_Float]]:
-    """(terms, shares) of `weighted`, without a gradient."""
+) -> tuple[NDArray[_Float], NDArray[_Float], NDArray[_Float]]:
+    """(terms, shares, jacobian): the first two as in `weighted`; for each body the gradient of the first term by the
+    vertices, V·3 numbers, then those of pull and of push by the vertices' heights: (B, 5·V).
+    """
+
+def terms_backward(
+    jacobian: NDArray[_Float], shares: NDArray[_Float], d_terms: NDArray[_Float], normal: NDArray[np.float64]
+) -> NDArray[_Float]:
+    """A backward of `terms`: the gradient (B, V, 3) of terms put together by their upstream d_terms, (K,) or (B, K)."""
 
 def simd_levels() -> list[str]:
     """The CPU levels that this machine has, best first."""

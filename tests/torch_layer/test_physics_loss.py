@@ -145,6 +145,31 @@ def test_backward_twice_and_second_derivatives(tiny):
     torch.testing.assert_close(mapped, first / 3, rtol=1e-12, atol=1e-18)
 
 
+@pytest.mark.parametrize("preset", ["paper-r", "released", "balanced"])
+@pytest.mark.parametrize("reduction", ["mean", "none"])
+def test_separate_terms_take_any_upstream_twice(tiny, preset, reduction):
+    """The kept Jacobian serves every backward of the graph: each against the reference with an upstream of its own."""
+    loss = ipt.IntuitivePhysicsLoss(tiny.template, preset=preset, reduction=reduction)
+    vertices = tiny.vertices.clone().requires_grad_()
+    terms = torch.stack(list(loss(vertices, tiny.ground).values()))
+    generator = torch.Generator().manual_seed(4)
+    for _ in range(2):
+        upstream = torch.randn(terms.shape, dtype=F64, generator=generator)
+        (found,) = torch.autograd.grad(terms, vertices, upstream, retain_graph=True)
+        with ipt.dispatch._reference_path():
+            reference = torch.stack(list(loss(vertices, tiny.ground).values()))
+        (expected,) = torch.autograd.grad(reference, vertices, upstream)
+        # Sums in another order in double precision; the balance cost's inner solve ends at 1e-12 of a metre.
+        torch.testing.assert_close(found, expected, rtol=0, atol=1e-10 * expected.abs().max().item())
+
+
+def test_separate_terms_of_nobody(tiny):
+    vertices = tiny.vertices[:0].clone().requires_grad_()
+    terms = ipt.IntuitivePhysicsLoss(tiny.template)(vertices, ipt.Ground.y_up())
+    sum(terms.values()).backward()
+    assert vertices.grad.shape == vertices.shape
+
+
 def test_the_gradient_is_handed_over_without_a_copy(tiny):
     """A leaf's .grad is the very buffer the core wrote: a copy would cost as much as the gradient."""
     loss = ipt.IntuitivePhysicsLoss(tiny.template)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
 import torch
 from torch import Tensor
 from torch._C._functorch import is_functorch_wrapped_tensor
@@ -99,7 +98,7 @@ class WeightedTotal(Function):
 class Terms(Function):
     """vertices (B, V, 3) -> terms (K,), reduced, or (B, K).
 
-    The backward computes the forward again: keeping it would hold four numbers a vertex of each body in memory.
+    The forward keeps the Jacobian, five numbers a vertex: what a backward with any upstream is made of.
     """
 
     @staticmethod
@@ -107,9 +106,10 @@ class Terms(Function):
         arrays = _arrays(vertices, ground)
         mask = None if valid is None else valid.numpy(force=True)
         follow_torch()
-        terms, shares = _core.terms(call.template._core, call.quantity, call.options, *arrays, mask, call.reduction)
+        template, quantity, options = call[:3]
+        terms, shares, jacobian = _core.terms(template._core, quantity, options, *arrays, mask, call.reduction)
         ctx.save_for_backward(vertices)
-        ctx.call, ctx.ground, ctx.shares, ctx.arrays = call, arrays[1:], shares, arrays
+        ctx.call, ctx.ground, ctx.shares, ctx.jacobian = call, arrays[1:], shares, jacobian
         return torch.from_numpy(terms)
 
     @staticmethod
@@ -117,10 +117,9 @@ class Terms(Function):
         (vertices,) = ctx.saved_tensors  # complains about vertices that were changed in place
         if _is_differentiated(d_terms):
             return _vjp(ctx, vertices, torch.from_numpy(ctx.shares)[:, None] * d_terms), None, None, None
-        d_out = np.ascontiguousarray(ctx.shares[:, None] * d_terms.numpy(force=True))
         follow_torch()
-        template, quantity, options = ctx.call[:3]
-        gradient = _core.vjp(template._core, quantity, options, *ctx.arrays, d_out)  # pyright: ignore[reportCallIssue]
+        d_terms = d_terms.contiguous()
+        gradient = _core.terms_backward(ctx.jacobian, ctx.shares, d_terms.numpy(force=True), ctx.ground[0])
         return torch.from_numpy(gradient), None, None, None
 
 

@@ -6,6 +6,7 @@
 use crate::analysis::{Analysis, Polygon};
 use crate::error::{Error, Result, status};
 use crate::ground::Ground;
+use crate::losses::terms::Terms;
 use crate::mass::Method;
 use crate::number::gate::{Level, Work};
 use crate::number::vector::{Vec3, sub};
@@ -109,6 +110,15 @@ impl<'a, T: Data> Batch<'a, T> {
     pub fn vjp_into<Q: Quantity>(&self, quantity: &Q, d_out: &[T], d_vertices: &mut [T]) -> Result<()> {
         let mut out = vec![T::zero(); d_out.len()];
         self.value_and_vjp_into(quantity, d_out, &mut out, d_vertices)
+    }
+
+    /// The terms, and their Jacobian: for each body the gradient of the first term by the vertices, V·3 numbers, then
+    /// those of pull and of push by the vertices' heights, V each.
+    pub fn value_and_jacobian_into<Q: Terms>(&self, quantity: &Q, out: &mut [T], jacobian: &mut [T]) -> Result<()> {
+        let (size, row) = (quantity.len(self.template), 5 * self.template.mesh.num_vertices);
+        self.each([(out, size), (jacobian, row)], |group, [out, jacobian]| {
+            self.on_lanes(group, ForwardAndJacobian { template: self.template, quantity, size, out, jacobian });
+        })
     }
 
     /// The derivative of the value along `d_vertices`: B·K numbers.
@@ -443,6 +453,33 @@ impl<T: Data, Q: Quantity> OnLanes<T> for ForwardAndBackward<'_, T, Q> {
         for (row, d_out) in self.d_vertices.iter_mut().zip(&self.d_out) {
             zero_if_undefined(row, d_out.iter().all(|d| d.value().is_finite()));
         }
+    }
+}
+
+struct ForwardAndJacobian<'a, T, Q> {
+    template: &'a Template,
+    quantity: &'a Q,
+    size: usize,
+    out: Vec<&'a mut [T]>,
+    jacobian: Vec<&'a mut [T]>,
+}
+
+impl<T: Data, Q: Terms> OnLanes<T> for ForwardAndJacobian<'_, T, Q> {
+    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
+        let count = self.template.mesh.num_vertices;
+        let mut out = vec![R::zero(); self.size];
+        let mut d_first = vec![[R::zero(); 3]; scene.points.len()];
+        let (mut d_pull, mut d_push) = (vec![R::zero(); count], vec![R::zero(); count]);
+        self.quantity.forward_and_jacobian(scene, &mut out, &mut d_first, [&mut d_pull, &mut d_push]);
+        self.template.closing.backward(&mut d_first);
+        R::write_rows(&out, &mut self.out);
+        let mut start = 0;
+        for numbers in [d_first[..count].as_flattened(), &d_pull, &d_push] {
+            let rows = self.jacobian.iter_mut().map(|row| &mut row[start..start + numbers.len()]);
+            R::write_rows(numbers, &mut rows.collect::<Vec<_>>());
+            start += numbers.len();
+        }
+        self.jacobian.into_iter().for_each(|row| zero_if_undefined(row, true));
     }
 }
 

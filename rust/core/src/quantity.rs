@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::losses::balance::{BalanceCost, Wrap};
 use crate::losses::ground::{GroundLoss, Tanh};
 use crate::losses::stability::StabilityLoss;
-use crate::losses::terms::{BalanceTerms, StabilityTerms};
+use crate::losses::terms::{BalanceTerms, StabilityTerms, Terms};
 use crate::mass::{CenterOfMass, Method};
 use crate::number::Real;
 use crate::number::vector::Vec3;
@@ -60,12 +60,10 @@ pub fn named<V: Visitor>(template: &Template, name: &str, options: &[f64], visit
         (["stability_loss", m], o @ [_, _, _]) => visitor.visit(stability(m, o)?),
         (["ground_loss", points, tanh], o @ [_, _, _, _]) => visitor.visit(ground(points, tanh, o)?),
         (["balance_cost", wrap, m], o @ [_, _, _]) => visitor.visit(balance(wrap, m, o)?),
-        (["terms", "stability", m, points, tanh], o @ [_, _, _, _, _, _, _]) => {
-            visitor.visit(StabilityTerms { stability: stability(m, &o[..3])?, ground: ground(points, tanh, &o[3..])? })
-        }
-        (["terms", "balance", wrap, m, points, tanh], o @ [_, _, _, _, _, _, _]) => {
-            visitor.visit(BalanceTerms { balance: balance(wrap, m, &o[..3])?, ground: ground(points, tanh, &o[3..])? })
-        }
+        (["terms", "stability", m, points, tanh], o @ [_, _, _, _, _, _, _]) => visitor
+            .visit_terms(StabilityTerms { stability: stability(m, &o[..3])?, ground: ground(points, tanh, &o[3..])? }),
+        (["terms", "balance", wrap, m, points, tanh], o @ [_, _, _, _, _, _, _]) => visitor
+            .visit_terms(BalanceTerms { balance: balance(wrap, m, &o[..3])?, ground: ground(points, tanh, &o[3..])? }),
         _ => return Err(unknown()),
     })
 }
@@ -74,6 +72,14 @@ pub fn named<V: Visitor>(template: &Template, name: &str, options: &[f64], visit
 pub trait Visitor {
     type Output;
     fn visit<Q: Quantity>(self, quantity: Q) -> Self::Output;
+
+    /// For a visitor that wants more of loss terms.
+    fn visit_terms<Q: Terms>(self, quantity: Q) -> Self::Output
+    where
+        Self: Sized,
+    {
+        self.visit(quantity)
+    }
 }
 
 fn stability(method: &str, options: &[f64]) -> Result<StabilityLoss> {

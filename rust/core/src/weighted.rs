@@ -1,9 +1,12 @@
-//! The weighted total of a training step: Σ_k λ_k term_k of each body, reduced over a batch, with its gradient in one pass.
+//! The terms of a training step, reduced over a batch: their weighted total with its gradient, or each of them with the
+//! Jacobian that its backward needs, in one pass.
 
 use crate::batch::Batch;
 use crate::error::{Error, Result};
+use crate::losses::terms::{NUM_TERMS, Terms};
 use crate::number::Data;
 use crate::quantity::{Quantity, unknown_choice};
+use crate::threads;
 
 /// How bodies are put together.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,76 +30,62 @@ impl Reduction {
 }
 
 /// A body counts if `valid` says so (or is None) and its first term is a number: it is NaN for a broken body.
-pub struct Weighted<'a> {
-    /// λ, one a term.
-    pub weights: &'a [f64],
+pub struct Pool<'a> {
     /// One a body.
     pub valid: Option<&'a [bool]>,
     pub reduction: Reduction,
 }
 
-/// What is known of a batch besides the gradient.
-pub struct Totals<T> {
-    /// Σ λ · term: one number, or one a body where nothing is reduced; 0 where no body counts.
-    pub totals: Vec<T>,
-    /// The unweighted terms: K numbers, or B·K.
-    pub terms: Vec<T>,
+/// A batch's terms, pooled.
+pub struct Pooled {
+    /// K numbers, or B·K where nothing is reduced; 0 where no body counts.
+    pub terms: Vec<f64>,
     /// What each body counts for.
-    pub shares: Vec<T>,
+    pub shares: Vec<f64>,
 }
 
-impl Weighted<'_> {
-    /// Writes the gradient of the total (of Σ totals where nothing is reduced) by the vertices, B·V·3 numbers.
-    pub fn evaluate<T: Data, Q: Quantity>(
+impl Pool<'_> {
+    /// The terms and their Σ λ · term by the `weights` λ: one number, or one a body where nothing is reduced. Writes the
+    /// gradient of the total (of Σ totals where nothing is reduced) by the vertices, B·V·3 numbers.
+    pub fn weighted<T: Data, Q: Quantity>(
         &self,
         batch: &Batch<T>,
         quantity: &Q,
+        weights: &[f64],
         gradient: &mut [T],
-    ) -> Result<Totals<T>> {
-        let (bodies, size) = (batch.len(), self.size(batch, quantity)?);
+    ) -> Result<(Vec<f64>, Pooled)> {
+        let (bodies, size) = (batch.len(), quantity.len(batch.template()));
+        if size != weights.len() {
+            let expected = format!("{size} numbers, one a term");
+            return Err(Error::Argument { name: "weights", expected, got: weights.len().to_string() });
+        }
         let dealt = self.share((0..bodies).filter(|&body| self.valid(body)).count());
         let d_out: Vec<T> = (0..bodies * size)
-            .map(|i| if self.valid(i / size) { T::of(self.weights[i % size] * dealt) } else { T::zero() })
+            .map(|i| if self.valid(i / size) { T::of(weights[i % size] * dealt) } else { T::zero() })
             .collect();
         let mut values = vec![T::zero(); bodies * size];
         batch.value_and_vjp_into(quantity, &d_out, &mut values, gradient)?;
 
         // Broken bodies are known only now, after the shares of a mean were dealt out: put that right.
-        let counts = self.counts(&values, size);
-        let share = self.share(counts.iter().filter(|&&counts| counts).count());
+        let (pooled, share) = self.pool(&values, size);
         if share != dealt {
             let factor = T::of(share / dealt);
             gradient.iter_mut().for_each(|d| *d = *d * factor);
         }
-        Ok(self.reduce(&values, &counts, share))
+        let total = |terms: &[f64]| -> f64 { terms.iter().zip(weights).map(|(term, weight)| term * weight).sum() };
+        Ok((pooled.terms.chunks_exact(size).map(total).collect(), pooled))
     }
 
-    /// The same without a gradient.
-    pub fn evaluate_alone<T: Data, Q: Quantity>(&self, batch: &Batch<T>, quantity: &Q) -> Result<Totals<T>> {
-        let size = self.size(batch, quantity)?;
-        let values = batch.value(quantity)?;
-        let counts = self.counts(&values, size);
-        let share = self.share(counts.iter().filter(|&&counts| counts).count());
-        Ok(self.reduce(&values, &counts, share))
-    }
-
-    /// Numbers a body, if there is a weight for each.
-    fn size<T: Data, Q: Quantity>(&self, batch: &Batch<T>, quantity: &Q) -> Result<usize> {
+    /// The terms. Writes the Jacobian of [`Batch::value_and_jacobian_into`].
+    pub fn terms<T: Data, Q: Terms>(&self, batch: &Batch<T>, quantity: &Q, jacobian: &mut [T]) -> Result<Pooled> {
         let size = quantity.len(batch.template());
-        if size == self.weights.len() {
-            return Ok(size);
-        }
-        let expected = format!("{size} numbers, one a term");
-        Err(Error::Argument { name: "weights", expected, got: self.weights.len().to_string() })
+        let mut values = vec![T::zero(); batch.len() * size];
+        batch.value_and_jacobian_into(quantity, &mut values, jacobian)?;
+        Ok(self.pool(&values, size).0)
     }
 
     fn valid(&self, body: usize) -> bool {
         self.valid.is_none_or(|valid| valid[body])
-    }
-
-    fn counts<T: Data>(&self, values: &[T], size: usize) -> Vec<bool> {
-        let number = |body: usize| !values[body * size].value().is_nan();
-        (0..values.len() / size).map(|body| self.valid(body) && number(body)).collect()
     }
 
     /// What one of `count` bodies counts for.
@@ -104,21 +93,55 @@ impl Weighted<'_> {
         if self.reduction == Reduction::Mean { 1.0 / count.max(1) as f64 } else { 1.0 }
     }
 
-    fn reduce<T: Data>(&self, values: &[T], counts: &[bool], share: f64) -> Totals<T> {
-        let size = self.weights.len();
-        let shares: Vec<f64> = counts.iter().map(|&counts| if counts { share } else { 0.0 }).collect();
-        let rows = || values.chunks_exact(size).zip(&shares).filter(|(_, share)| **share > 0.0);
-        let weigh = |terms: &[f64]| -> f64 { terms.iter().zip(self.weights).map(|(term, weight)| term * weight).sum() };
-        let (totals, terms) = if self.reduction == Reduction::None {
-            let terms: Vec<f64> =
-                (0..values.len()).map(|i| if counts[i / size] { values[i].value() } else { 0.0 }).collect();
-            (terms.chunks_exact(size).map(weigh).collect(), terms)
-        } else {
-            let terms: Vec<f64> =
-                (0..size).map(|k| rows().map(|(row, share)| row[k].value() * share).sum::<f64>()).collect();
-            (vec![weigh(&terms)], terms)
+    /// And what a body that counts does so for.
+    fn pool<T: Data>(&self, values: &[T], size: usize) -> (Pooled, f64) {
+        let rows = || values.chunks_exact(size);
+        let counts: Vec<bool> =
+            rows().enumerate().map(|(body, row)| self.valid(body) && !row[0].value().is_nan()).collect();
+        let share = self.share(counts.iter().filter(|&&counts| counts).count());
+        let counted = |body: usize, term: T, share: f64| if counts[body] { term.value() * share } else { 0.0 };
+        let terms = match self.reduction {
+            Reduction::None => values.iter().enumerate().map(|(i, &term)| counted(i / size, term, 1.0)).collect(),
+            _ => (0..size).map(|k| rows().enumerate().map(|(body, row)| counted(body, row[k], share)).sum()).collect(),
         };
-        let narrow = |numbers: Vec<f64>| numbers.into_iter().map(T::of).collect();
-        Totals { totals: narrow(totals), terms: narrow(terms), shares: narrow(shares) }
+        let shares = counts.iter().map(|&counts| if counts { share } else { 0.0 }).collect();
+        (Pooled { terms, shares }, share)
     }
+}
+
+/// The backward of [`Pool::terms`] from what it wrote: the gradient by the vertices, B·V·3 numbers. `d_terms` is the
+/// upstream of a batch's three terms, or of each body's; `normals` are the ground's, one or B.
+pub fn terms_backward<T: Data>(
+    jacobian: &[T],
+    shares: &[T],
+    d_terms: &[T],
+    normals: &[[T; 3]],
+    gradient: &mut [T],
+    interrupted: &(dyn Fn() -> bool + Sync),
+) -> Result<()> {
+    if shares.is_empty() {
+        return Ok(());
+    }
+    let row = gradient.len() / shares.len();
+    let bodies = jacobian.chunks_exact(row / 3 * 5).zip(gradient.chunks_exact_mut(row)).enumerate();
+    let bodies: Vec<_> = bodies.map(|(body, (jacobian, gradient))| (body, jacobian, gradient)).collect();
+    threads::each(bodies, true, interrupted, &|(body, jacobian, gradient)| {
+        if shares[body].value() == 0.0 {
+            return gradient.fill(T::zero());
+        }
+        // One row may stand for all bodies.
+        let d_terms = d_terms.as_chunks::<NUM_TERMS>().0;
+        let [first, pull, push] = d_terms[body % d_terms.len()].map(|d_term| shares[body] * d_term);
+        let normal = normals[body % normals.len()];
+        let (d_first, d_ground) = jacobian.split_at(row);
+        let (d_pull, d_push) = d_ground.split_at(row / 3);
+        for (d_point, ((d_first, &d_pull), &d_push)) in
+            gradient.as_chunks_mut::<3>().0.iter_mut().zip(d_first.as_chunks::<3>().0.iter().zip(d_pull).zip(d_push))
+        {
+            let along = pull * d_pull + push * d_push;
+            for k in 0..3 {
+                d_point[k] = first * d_first[k] + along * normal[k];
+            }
+        }
+    })
 }

@@ -28,7 +28,7 @@ mod _core {
     #[pymodule_export]
     use crate::threads::{follow_threads, get_num_threads, set_num_threads, simd_level, simd_levels};
     #[pymodule_export]
-    use crate::weighted::{terms, weighted};
+    use crate::weighted::{terms, terms_backward, weighted};
 
     use pyo3::prelude::*;
 

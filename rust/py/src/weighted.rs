@@ -1,16 +1,19 @@
-//! The weighted total of a training step.
+//! The terms of a training step, reduced: their weighted total, or each of them.
 
-use crate::array::Vertices;
+use crate::array::{Vertices, flat, triples};
 use crate::bodies::{Grounds, on_batch};
-use crate::error::value_error;
-use crate::evaluate::{output_size, unwritten};
+use crate::error::{detached, value_error};
+use crate::evaluate::unwritten;
 use crate::template::Template;
 use ipman::Batch;
+use ipman::error::Error;
+use ipman::losses::terms::{NUM_TERMS, Terms};
 use ipman::number::Data;
 use ipman::quantity::{Quantity, Visitor, named};
-use ipman::weighted::{Reduction, Totals, Weighted};
+use ipman::weighted::{Pool, Pooled, Reduction, terms_backward as gradient_of_terms};
 use numpy::{
-    Element, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods, ToPyArray,
+    Element, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods, ToPyArray,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -32,16 +35,16 @@ pub fn weighted<'py>(
     reduction: &str,
 ) -> PyResult<Bound<'py, PyTuple>> {
     let reduction = Reduction::named(reduction).map_err(value_error)?;
-    let valid = valid.as_ref().map(|valid| valid.as_slice()).transpose()?;
-    let question = Question { py, template, quantity, options, grounds: Grounds::new(normal, height) };
-    let weighted = Weighted { weights: &weights, valid, reduction };
+    let question =
+        Question { py, template, quantity, options, grounds: Grounds::new(normal, height), valid, reduction };
     match vertices {
-        Vertices::Single(vertices) => question.answer(&vertices, &weighted),
-        Vertices::Double(vertices) => question.answer(&vertices, &weighted),
+        Vertices::Single(vertices) => question.answer(&vertices, Some(&weights)),
+        Vertices::Double(vertices) => question.answer(&vertices, Some(&weights)),
     }
 }
 
-/// (terms, shares) of `weighted`, without a gradient.
+/// (terms, shares, jacobian): the first two as in `weighted`; for each body the gradient of the first term by the
+/// vertices, V·3 numbers, then those of pull and of push by the vertices' heights: (B, 5·V).
 #[pyfunction]
 pub fn terms<'py>(
     py: Python<'py>,
@@ -55,14 +58,50 @@ pub fn terms<'py>(
     reduction: &str,
 ) -> PyResult<Bound<'py, PyTuple>> {
     let reduction = Reduction::named(reduction).map_err(value_error)?;
-    let valid = valid.as_ref().map(|valid| valid.as_slice()).transpose()?;
-    let size = output_size(template, quantity, options.clone())?;
-    let question = Question { py, template, quantity, options, grounds: Grounds::new(normal, height) };
-    let weighted = Weighted { weights: &vec![0.0; size], valid, reduction };
+    let question =
+        Question { py, template, quantity, options, grounds: Grounds::new(normal, height), valid, reduction };
     match vertices {
-        Vertices::Single(vertices) => question.answer_alone(&vertices, &weighted),
-        Vertices::Double(vertices) => question.answer_alone(&vertices, &weighted),
+        Vertices::Single(vertices) => question.answer(&vertices, None),
+        Vertices::Double(vertices) => question.answer(&vertices, None),
     }
+}
+
+/// A backward of `terms`: the gradient (B, V, 3) of terms put together by their upstream d_terms, (K,) or (B, K).
+#[pyfunction]
+pub fn terms_backward<'py>(
+    py: Python<'py>,
+    jacobian: Bound<'py, PyAny>,
+    shares: Bound<'py, PyAny>,
+    d_terms: Bound<'py, PyAny>,
+    normal: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyAny>> {
+    if jacobian.cast::<PyArray2<f32>>().is_ok() {
+        return put_together::<f32>(py, jacobian.extract()?, shares.extract()?, d_terms.extract()?, &normal);
+    }
+    put_together::<f64>(py, jacobian.extract()?, shares.extract()?, d_terms.extract()?, &normal)
+}
+
+fn put_together<'py, T: Data + Element>(
+    py: Python<'py>,
+    jacobian: PyReadonlyArray2<'py, T>,
+    shares: PyReadonlyArray1<'py, T>,
+    d_terms: PyReadonlyArrayDyn<'py, T>,
+    normal: &PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (bodies, vertices) = (jacobian.shape()[0], jacobian.shape()[1] / 5);
+    let normals: Vec<_> = triples(normal, "normal")?.iter().map(|normal| normal.map(T::of)).collect();
+    let d_terms = flat(&d_terms, "d_terms")?;
+    let one_or_all = |count| count == 1 || count == bodies;
+    if shares.len() != bodies || !one_or_all(normals.len()) || ![NUM_TERMS, NUM_TERMS * bodies].contains(&d_terms.len())
+    {
+        let got = format!("{} shares, {} normals and {} d_terms", shares.len(), normals.len(), d_terms.len());
+        return Err(PyValueError::new_err(format!("jacobian: of {bodies} bodies, but there are {got}")));
+    }
+    let gradient = unwritten::<T>(py, &[bodies, vertices, 3]);
+    let mut written = gradient.readwrite();
+    let (written, jacobian, shares) = (written.as_slice_mut()?, jacobian.as_slice()?, shares.as_slice()?);
+    detached(py, |interrupted| gradient_of_terms(jacobian, shares, d_terms, &normals, written, interrupted))?;
+    Ok(gradient.into_any())
 }
 
 struct Question<'a, 'py> {
@@ -71,73 +110,69 @@ struct Question<'a, 'py> {
     quantity: &'a str,
     options: Vec<f64>,
     grounds: Grounds<'py>,
+    valid: Option<PyReadonlyArray1<'py, bool>>,
+    reduction: Reduction,
 }
 
 impl<'py> Question<'_, 'py> {
+    /// The total by the weights, with its gradient; without weights, the terms with their Jacobian.
     fn answer<T: Data + Element>(
         &self,
         vertices: &PyReadonlyArray3<'py, T>,
-        weighted: &Weighted<'_>,
+        weights: Option<&[f64]>,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let (py, template, bodies) = (self.py, &self.template.inner, vertices.shape()[0]);
-        check_valid(weighted, bodies)?;
-        let gradient = unwritten::<T>(py, vertices.shape());
-        let mut written = gradient.readwrite();
+        let (py, bodies) = (self.py, vertices.shape()[0]);
+        let valid = self.valid.as_ref().map(|valid| valid.as_slice()).transpose()?;
+        if let Some(valid) = valid.filter(|valid| valid.len() != bodies) {
+            let message = format!("valid: expected {bodies} bools, one a body, got {}", valid.len());
+            return Err(PyValueError::new_err(message));
+        }
+        let pool = &Pool { valid, reduction: self.reduction };
+        let derivative = match weights {
+            Some(_) => unwritten::<T>(py, vertices.shape()),
+            None => unwritten::<T>(py, &[bodies, 5 * vertices.shape()[1]]),
+        };
+        let mut written = derivative.readwrite();
         let written = written.as_slice_mut()?;
         let (quantity, options) = (self.quantity, &self.options);
-        let Totals { totals, terms, shares } = on_batch(py, self.template, vertices, &self.grounds, |batch| {
-            named(template, quantity, options, Run { batch, weighted, gradient: Some(written) })?
+        let (totals, Pooled { terms, shares }) = on_batch(py, self.template, vertices, &self.grounds, |batch| {
+            named(&self.template.inner, quantity, options, Run { batch, pool, weights, derivative: written })?
         })?;
-        let (totals, terms, shares) = (totals.to_pyarray(py), terms.to_pyarray(py), shares.to_pyarray(py));
-        if weighted.reduction == Reduction::None {
-            let terms = terms.reshape([bodies, weighted.weights.len()])?;
-            return (totals, terms, shares, gradient).into_pyobject(py);
+        let array = |numbers: Vec<f64>| numbers.into_iter().map(T::of).collect::<Vec<_>>().to_pyarray(py);
+        let batch: &[usize] = if self.reduction == Reduction::None { &[bodies] } else { &[] };
+        let terms = array(terms).reshape([batch, &[weights.map_or(NUM_TERMS, <[f64]>::len)]].concat().as_slice())?;
+        match weights {
+            Some(_) => (array(totals).reshape(batch)?, terms, array(shares), derivative).into_pyobject(py),
+            None => (terms, array(shares), derivative).into_pyobject(py),
         }
-        (totals.reshape(())?, terms, shares, gradient).into_pyobject(py)
-    }
-
-    fn answer_alone<T: Data + Element>(
-        &self,
-        vertices: &PyReadonlyArray3<'py, T>,
-        weighted: &Weighted<'_>,
-    ) -> PyResult<Bound<'py, PyTuple>> {
-        let (py, template, bodies) = (self.py, &self.template.inner, vertices.shape()[0]);
-        check_valid(weighted, bodies)?;
-        let (quantity, options) = (self.quantity, &self.options);
-        let Totals { terms, shares, .. } = on_batch(py, self.template, vertices, &self.grounds, |batch| {
-            named(template, quantity, options, Run { batch, weighted, gradient: None })?
-        })?;
-        let (terms, shares) = (terms.to_pyarray(py), shares.to_pyarray(py));
-        if weighted.reduction == Reduction::None {
-            return (terms.reshape([bodies, weighted.weights.len()])?, shares).into_pyobject(py);
-        }
-        (terms, shares).into_pyobject(py)
-    }
-}
-
-fn check_valid(weighted: &Weighted<'_>, bodies: usize) -> PyResult<()> {
-    match weighted.valid {
-        Some(valid) if valid.len() != bodies => {
-            Err(PyValueError::new_err(format!("valid: expected {bodies} bools, one a body, got {}", valid.len())))
-        }
-        _ => Ok(()),
     }
 }
 
 struct Run<'a, T> {
     batch: &'a Batch<'a, T>,
-    weighted: &'a Weighted<'a>,
-    /// None: not asked for.
-    gradient: Option<&'a mut [T]>,
+    pool: &'a Pool<'a>,
+    weights: Option<&'a [f64]>,
+    /// The gradient, or the Jacobian.
+    derivative: &'a mut [T],
 }
 
 impl<T: Data> Visitor for Run<'_, T> {
-    type Output = ipman::Result<Totals<T>>;
+    type Output = ipman::Result<(Vec<f64>, Pooled)>;
 
     fn visit<Q: Quantity>(self, quantity: Q) -> Self::Output {
-        match self.gradient {
-            Some(gradient) => self.weighted.evaluate(self.batch, &quantity, gradient),
-            None => self.weighted.evaluate_alone(self.batch, &quantity),
+        match self.weights {
+            Some(weights) => self.pool.weighted(self.batch, &quantity, weights, self.derivative),
+            None => {
+                let (expected, got) = ("loss terms".into(), "another".into());
+                Err(Error::Argument { name: "quantity", expected, got })
+            }
+        }
+    }
+
+    fn visit_terms<Q: Terms>(self, quantity: Q) -> Self::Output {
+        match self.weights {
+            Some(_) => self.visit(quantity),
+            None => Ok((Vec::new(), self.pool.terms(self.batch, &quantity, self.derivative)?)),
         }
     }
 }

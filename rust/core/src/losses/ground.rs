@@ -66,22 +66,57 @@ struct Sides<R> {
     shares: [R; 2],
 }
 
-/// The sums of both curves as the points are looked at.
+/// The sums of both curves as the points are looked at, and their gradients by the vertices' heights where wanted.
 pub struct GroundSums<'a, R: Real> {
     of: &'a GroundLoss,
+    sides: Sides<R>,
     pull: R::Wide,
     push: R::Wide,
+    gradient: Gradient<'a, R>,
     /// Of the points that are looked at.
     slopes: Row<R>,
 }
 
+/// Where the gradient by the vertices' heights is added.
+enum Gradient<'a, R> {
+    Unasked,
+    /// Of both terms together.
+    Of(&'a mut [R]),
+    /// Of pull and of push.
+    OfEach([&'a mut [R]; 2]),
+}
+
 impl GroundLoss {
     pub fn sums<R: Real>(&self) -> GroundSums<'_, R> {
-        GroundSums { of: self, pull: R::Wide::zero(), push: R::Wide::zero(), slopes: [R::zero(); CHUNK] }
+        self.sums_and(Gradient::Unasked, [R::zero(); 2])
+    }
+
+    /// With the gradient of what the upstream `d_out` makes of (pull, push).
+    pub fn sums_and_gradient<'a, R: Real>(
+        &'a self,
+        template: &Template,
+        d_out: &[R],
+        d_heights: &'a mut [R],
+    ) -> GroundSums<'a, R> {
+        self.sums_and(Gradient::Of(d_heights), self.shares(template, d_out))
+    }
+
+    /// With the gradients of pull and of push.
+    pub fn sums_and_jacobian<'a, R: Real>(
+        &'a self,
+        template: &Template,
+        d_heights: [&'a mut [R]; 2],
+    ) -> GroundSums<'a, R> {
+        self.sums_and(Gradient::OfEach(d_heights), self.shares(template, &[R::of(1.0); 2]))
+    }
+
+    fn sums_and<'a, R: Real>(&'a self, gradient: Gradient<'a, R>, shares: [R; 2]) -> GroundSums<'a, R> {
+        let (sides, slopes) = (Sides::new(self, shares), [R::zero(); CHUNK]);
+        GroundSums { of: self, sides, pull: R::Wide::zero(), push: R::Wide::zero(), gradient, slopes }
     }
 
     /// What the slope of each side is worth: the gradients by (pull, push) over the number of points.
-    pub fn shares<R: Real>(&self, template: &Template, d_out: &[R]) -> [R; 2] {
+    fn shares<R: Real>(&self, template: &Template, d_out: &[R]) -> [R; 2] {
         let share = 1.0 / self.points.count(template) as f64;
         [d_out[0] * R::of(self.alpha1 * share), d_out[1] * R::of(self.beta1 * share)]
     }
@@ -103,18 +138,29 @@ impl<R: Real> Sides<R> {
 }
 
 impl<R: Real> GroundSums<'_, R> {
+    /// Looks at the points of a place.
     pub fn read(&mut self, place: &Place, heights: &Row<R>) {
         let sums = [&mut self.pull, &mut self.push];
-        let sides = Sides::new(self.of, [R::zero(); 2]);
-        R::apart::<Look, _>((&sides, heights, place.len(), &mut self.slopes, sums));
+        R::apart::<Look, _>((&self.sides, heights, place.len(), &mut self.slopes, sums));
+        match &mut self.gradient {
+            Gradient::Unasked => {}
+            Gradient::Of(d_heights) => place.hand_back(&self.slopes, d_heights),
+            Gradient::OfEach([pull, push]) => {
+                let mut below = [R::zero(); CHUNK];
+                R::apart::<Part, _>((heights, &mut self.slopes, &mut below));
+                place.hand_back(&self.slopes, pull);
+                place.hand_back(&below, push);
+            }
+        }
     }
 
-    /// Reads and hands back at one look.
-    pub fn read_and_hand_back(&mut self, place: &Place, heights: &Row<R>, shares: [R; 2], d_heights: &mut [R]) {
-        let sums = [&mut self.pull, &mut self.push];
-        let sides = Sides::new(self.of, shares);
-        R::apart::<Look, _>((&sides, heights, place.len(), &mut self.slopes, sums));
-        place.hand_back(&self.slopes, d_heights);
+    /// Looks at all its points.
+    pub fn read_all(&mut self, template: &Template, heights: &[R]) {
+        let mut row = [R::zero(); CHUNK];
+        for place in self.of.points.places(template) {
+            place.read(heights, &mut row);
+            self.read(&place, &row);
+        }
     }
 
     pub fn finish(&self, template: &Template, out: &mut [R]) {
@@ -158,6 +204,21 @@ impl<R: Real> Room<Looked<'_, R>> for Look {
     }
 }
 
+/// Moves the slopes of the points below the ground to a row of their own.
+struct Part;
+
+impl<R: Real> Room<(&Row<R>, &mut Row<R>, &mut Row<R>)> for Part {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((heights, above, below): (&Row<R>, &mut Row<R>, &mut Row<R>)) {
+        for ((&height, above), below) in heights.iter().zip(above).zip(below) {
+            *below = height.if_negative(*above, R::zero());
+            *above = height.if_negative(R::zero(), *above);
+        }
+    }
+}
+
 impl Quantity for GroundLoss {
     /// The vertices' heights.
     type Saved<R: Real> = Vec<R>;
@@ -169,11 +230,7 @@ impl Quantity for GroundLoss {
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Vec<R> {
         let heights = scene.heights();
         let mut sums = self.sums();
-        let mut row = [R::zero(); CHUNK];
-        for place in self.points.places(scene.template) {
-            place.read(&heights, &mut row);
-            sums.read(&place, &row);
-        }
+        sums.read_all(scene.template, &heights);
         sums.finish(scene.template, out);
         heights
     }

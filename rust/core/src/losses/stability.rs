@@ -21,6 +21,22 @@ pub fn distance_on_ground<R: Real>(scene: &Scene<R>, centre: &Centre<R>, cop: &C
     (length, scale(R::Wide::of(1.0) / length.at_least(R::Wide::of(1e-300)), offset))
 }
 
+impl StabilityLoss {
+    /// The backward, which adds what `d_heights` holds already, too: a gradient by the vertices' heights.
+    pub fn backward_with<R: Real>(
+        &self,
+        scene: &Scene<R>,
+        (centre, cop, heights): &(Centre<R>, Cop<R>, Vec<R>),
+        d_out: R,
+        d_heights: Vec<R>,
+        d_points: &mut [Vec3<R>],
+    ) {
+        let d_centre = scale(d_out.widen(), distance_on_ground(scene, centre, cop).1);
+        cop.backward(scene, heights, scale(R::Wide::of(-1.0), d_centre), d_heights, d_points);
+        self.method.backward(scene, centre, d_centre, d_points);
+    }
+}
+
 impl Quantity for StabilityLoss {
     /// m̄, s̄ and the vertices' heights.
     type Saved<R: Real> = (Centre<R>, Cop<R>, Vec<R>);
@@ -38,10 +54,6 @@ impl Quantity for StabilityLoss {
     }
 
     fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        let (centre, cop, heights) = saved;
-        let d_centre = scale(d_out[0].widen(), distance_on_ground(scene, centre, cop).1);
-        self.method.backward(scene, centre, d_centre, d_points);
-        let d_heights = vec![R::zero(); heights.len()];
-        cop.backward(scene, heights, scale(R::Wide::of(-1.0), d_centre), d_heights, d_points);
+        self.backward_with(scene, saved, d_out[0], vec![R::zero(); saved.2.len()], d_points);
     }
 }

@@ -3,16 +3,32 @@
 //! Stability and ground look at the samples together.
 
 use crate::losses::balance::{Balance, BalanceCost};
-use crate::losses::ground::GroundLoss;
+use crate::losses::ground::{GroundLoss, GroundSums};
 use crate::losses::stability::{StabilityLoss, distance_on_ground};
 use crate::mass::Centre;
 use crate::number::Real;
-use crate::number::vector::{Vec3, scale};
+use crate::number::vector::Vec3;
 use crate::pressure::{Cop, LoadSums};
 use crate::quantity::Quantity;
 use crate::sampling::{CHUNK, Points};
 use crate::scene::Scene;
 use crate::template::Template;
+
+/// A first term, pull and push.
+pub const NUM_TERMS: usize = 3;
+
+/// A first term, and pull and push. The gradients of these two run along the ground's normal.
+pub trait Terms: Quantity {
+    /// The values; the gradient of the first term, added to `d_first`, the virtual vertices' included; and the gradients
+    /// of pull and push by the vertices' heights, added to `d_ground`.
+    fn forward_and_jacobian<R: Real>(
+        &self,
+        scene: &Scene<R>,
+        out: &mut [R],
+        d_first: &mut [Vec3<R>],
+        d_ground: [&mut [R]; 2],
+    );
+}
 
 pub struct StabilityTerms {
     pub stability: StabilityLoss,
@@ -20,36 +36,21 @@ pub struct StabilityTerms {
 }
 
 impl StabilityTerms {
-    /// Values, and what the stability's backward needs. With `d_ground` the ground's backward is done at the same look at
-    /// the samples: its gradient by the vertices' heights is added there.
-    fn look<R: Real>(
-        &self,
-        scene: &Scene<R>,
-        out: &mut [R],
-        mut d_ground: Option<([R; 2], &mut [R])>,
-    ) -> (Centre<R>, Cop<R>, Vec<R>) {
+    /// Values, and what the stability's backward needs. Where the sums ask for it, the ground's backward is done at the
+    /// same look at the samples.
+    fn look<R: Real>(&self, scene: &Scene<R>, mut ground: GroundSums<R>, out: &mut [R]) -> (Centre<R>, Cop<R>, Vec<R>) {
         let heights = scene.heights();
         let mut loads = LoadSums::new(self.stability.pressure, &heights);
-        let mut ground = self.ground.sums();
         let mut row = [R::zero(); CHUNK];
         for place in Points::Samples.places(scene.template) {
             place.read(&heights, &mut row);
             loads.read(&place, &row);
             if self.ground.points == Points::Samples {
-                match &mut d_ground {
-                    Some((shares, d_heights)) => ground.read_and_hand_back(&place, &row, *shares, d_heights),
-                    None => ground.read(&place, &row),
-                }
+                ground.read(&place, &row);
             }
         }
         if self.ground.points == Points::Vertices {
-            for place in Points::Vertices.places(scene.template) {
-                place.read(&heights, &mut row);
-                match &mut d_ground {
-                    Some((shares, d_heights)) => ground.read_and_hand_back(&place, &row, *shares, d_heights),
-                    None => ground.read(&place, &row),
-                }
-            }
+            ground.read_all(scene.template, &heights);
         }
         let (centre, cop) = (self.stability.method.forward(scene), loads.finish(scene));
         out[0] = R::narrow(distance_on_ground(scene, &centre, &cop).0);
@@ -62,11 +63,11 @@ impl Quantity for StabilityTerms {
     type Saved<R: Real> = (Centre<R>, Cop<R>, Vec<R>);
 
     fn len(&self, _: &Template) -> usize {
-        3
+        NUM_TERMS
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
-        self.look(scene, out, None)
+        self.look(scene, self.ground.sums(), out)
     }
 
     fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
@@ -76,11 +77,22 @@ impl Quantity for StabilityTerms {
 
     fn forward_and_backward<R: Real>(&self, scene: &Scene<R>, d_out: &[R], out: &mut [R], d_points: &mut [Vec3<R>]) {
         let mut d_heights = vec![R::zero(); scene.template.mesh.num_vertices];
-        let shares = self.ground.shares(scene.template, &d_out[1..]);
-        let (centre, cop, heights) = self.look(scene, out, Some((shares, &mut d_heights)));
-        let d_centre = scale(d_out[0].widen(), distance_on_ground(scene, &centre, &cop).1);
-        cop.backward(scene, &heights, scale(R::Wide::of(-1.0), d_centre), d_heights, d_points);
-        self.stability.method.backward(scene, &centre, d_centre, d_points);
+        let ground = self.ground.sums_and_gradient(scene.template, &d_out[1..], &mut d_heights);
+        let saved = self.look(scene, ground, out);
+        self.stability.backward_with(scene, &saved, d_out[0], d_heights, d_points);
+    }
+}
+
+impl Terms for StabilityTerms {
+    fn forward_and_jacobian<R: Real>(
+        &self,
+        scene: &Scene<R>,
+        out: &mut [R],
+        d_first: &mut [Vec3<R>],
+        d_ground: [&mut [R]; 2],
+    ) {
+        let saved = self.look(scene, self.ground.sums_and_jacobian(scene.template, d_ground), out);
+        self.stability.backward(scene, &saved, &[R::of(1.0)], d_first);
     }
 }
 
@@ -93,7 +105,7 @@ impl Quantity for BalanceTerms {
     type Saved<R: Real> = (Balance<R>, Vec<R>);
 
     fn len(&self, _: &Template) -> usize {
-        3
+        NUM_TERMS
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
@@ -104,5 +116,22 @@ impl Quantity for BalanceTerms {
     fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
         self.ground.backward(scene, &saved.1, &d_out[1..], d_points);
         self.balance.backward(scene, &saved.0, &d_out[..1], d_points);
+    }
+}
+
+impl Terms for BalanceTerms {
+    fn forward_and_jacobian<R: Real>(
+        &self,
+        scene: &Scene<R>,
+        out: &mut [R],
+        d_first: &mut [Vec3<R>],
+        d_ground: [&mut [R]; 2],
+    ) {
+        let (first, rest) = out.split_at_mut(1);
+        let saved = self.balance.forward(scene, first);
+        self.balance.backward(scene, &saved, &[R::of(1.0)], d_first);
+        let mut ground = self.ground.sums_and_jacobian(scene.template, d_ground);
+        ground.read_all(scene.template, &scene.heights());
+        ground.finish(scene.template, rest);
     }
 }
