@@ -167,6 +167,12 @@ def test_half_precision_bodies_have_float_losses(tiny):
     total.backward()
     assert vertices.grad.dtype == torch.bfloat16
 
+    single = vertices.detach().float().requires_grad_()
+    expected, _ = loss.weighted(single, tiny.ground)
+    expected.backward()
+    assert torch.equal(total, expected)
+    assert torch.equal(vertices.grad, single.grad.bfloat16())
+
 
 def test_options_reach_the_formula(tiny):
     loss = ipt.IntuitivePhysicsLoss(

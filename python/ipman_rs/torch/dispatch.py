@@ -17,7 +17,7 @@ from torch import Tensor
 from ipman_rs import Ground as NumpyGround
 
 from . import device, reference
-from .autograd import CompiledValue, CompiledWeighted, Value, Weighted
+from .autograd import CompiledValue, CompiledWeighted, Value
 from .ground import Ground, as_ground
 
 if TYPE_CHECKING:
@@ -98,15 +98,19 @@ def _broadcasts(shape: torch.Size, batch_shape: torch.Size) -> bool:
 def bodies(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround | None) -> Bodies:
     """Check the arguments and fold the batch dimensions into one; raises as `check`."""
     batch_shape, plane = check(vertices, template, ground)
-    floating = torch.promote_types(vertices.dtype, torch.float32)
-    if vertices.dtype != floating:
-        vertices = vertices.to(floating)
+    vertices = single_or_double(vertices)
     if vertices.ndim != 3:
         vertices = vertices.reshape(math.prod(batch_shape), *vertices.shape[-2:])
     normal, height = plane.normal.expand(*batch_shape, 3), plane.height.expand(batch_shape)
     if len(batch_shape) != 1:
         normal, height = normal.reshape(len(vertices), 3), height.reshape(len(vertices))
     return Bodies(vertices, normal, height, batch_shape)
+
+
+def single_or_double(vertices: Tensor) -> Tensor:
+    """Half precision in float32, all else as it is; the gradient goes back in the type that was given."""
+    computed = torch.promote_types(vertices.dtype, torch.float32)
+    return vertices if vertices.dtype == computed else vertices.to(computed)
 
 
 def evaluate(
@@ -143,22 +147,17 @@ def weighted_values_of(
 ) -> tuple[Tensor, Tensor]:
     """Σ_k weights (B, K) · values (B,), differentiable, and the values (B, K), detached.
 
-    Where a gradient will be asked for, it is computed in the same pass.
+    On devices and in compiled code a gradient that will be asked for is computed in the same pass; eager code on the
+    CPU has `one_pass.py` for that.
     """
-    vertices = batch.vertices
-    if _on_device(quantity, vertices) and vertices.requires_grad and torch.is_grad_enabled():
-        numbers = [float(option) for option in options]
+    vertices, numbers = batch.vertices, [float(option) for option in options]
+    wants_gradient = vertices.requires_grad and torch.is_grad_enabled()
+    if wants_gradient and _on_device(quantity, vertices):
         return device.weighted(template, quantity, numbers, vertices, batch.normal, batch.height, weights)
-    fused = vertices.requires_grad and torch.is_grad_enabled() and not _on_reference(vertices)
-    if not fused:
-        values = values_of(batch, template, quantity, options)
-        return (values * weights).sum(dim=-1), values.detach()
-    normal, height = _for_core(batch)
-    numbers = [float(option) for option in options]
-    if torch.compiler.is_compiling():
-        return CompiledWeighted.apply(vertices, normal, height, weights, template._key, quantity, numbers)
-    outputs = Weighted.apply(vertices, normal, height, weights, template, quantity, numbers)
-    return outputs[0], outputs[1]
+    if wants_gradient and torch.compiler.is_compiling() and not _on_reference(vertices):
+        return CompiledWeighted.apply(vertices, *_for_core(batch), weights, template._key, quantity, numbers)
+    values = values_of(batch, template, quantity, numbers)
+    return (values * weights).sum(dim=-1), values.detach()
 
 
 def _on_reference(vertices: Tensor) -> bool:

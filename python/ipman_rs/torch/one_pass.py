@@ -37,7 +37,7 @@ def serves(vertices: Any) -> bool:
         isinstance(vertices, Tensor)
         and vertices.requires_grad
         and vertices.device.type == "cpu"
-        and vertices.dtype in (torch.float32, torch.float64)
+        and vertices.is_floating_point()
         and torch.is_grad_enabled()
         and not torch.compiler.is_compiling()
         and forward_ad._current_level < 0
