@@ -17,6 +17,7 @@ from torch import Tensor
 from ipman_rs import Ground as NumpyGround
 
 from . import device, reference
+from .arrays import single_or_double
 from .autograd import CompiledValue, CompiledWeighted, Value
 from .ground import Ground, as_ground
 
@@ -105,12 +106,6 @@ def bodies(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGroun
     if len(batch_shape) != 1:
         normal, height = normal.reshape(len(vertices), 3), height.reshape(len(vertices))
     return Bodies(vertices, normal, height, batch_shape)
-
-
-def single_or_double(vertices: Tensor) -> Tensor:
-    """Half precision in float32, all else as it is; the gradient goes back in the type that was given."""
-    computed = torch.promote_types(vertices.dtype, torch.float32)
-    return vertices if vertices.dtype == computed else vertices.to(computed)
 
 
 def evaluate(

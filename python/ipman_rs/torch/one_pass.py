@@ -16,6 +16,7 @@ from torch.autograd import Function, forward_ad
 
 from ipman_rs import BodyTemplate, _core
 
+from .arrays import memory
 from .autograd import Vjp
 from .ground import Ground
 from .threads import follow_torch
@@ -51,9 +52,9 @@ def _arrays(vertices: Tensor, ground: Ground) -> tuple[Any, Any, Any]:
     if len(normal) != len(height):
         normal, height = normal.expand(len(vertices), 3), height.expand(len(vertices))
     return (
-        vertices.detach().contiguous().numpy(),
-        normal.to("cpu", torch.float64).contiguous().numpy(),
-        height.to("cpu", torch.float64).contiguous().numpy(),
+        memory(vertices),
+        memory(normal.to("cpu", torch.float64)),
+        memory(height.to("cpu", torch.float64)),
     )
 
 
@@ -67,7 +68,7 @@ class WeightedTotal(Function):
     @staticmethod
     def forward(ctx: Any, vertices: Tensor, ground: Ground, valid: Tensor | None, call: Call) -> tuple[Tensor, Tensor]:
         arrays = _arrays(vertices, ground)
-        mask = None if valid is None else valid.numpy(force=True)
+        mask = memory(valid)
         follow_torch()
         template, quantity, options, weights, reduction = call
         total, terms, shares, gradient = _core.weighted(

@@ -15,7 +15,8 @@ from ipman_rs.losses import Curve, Points, Wrap
 from ipman_rs.mass import Method
 
 from . import one_pass
-from .dispatch import Bodies, bodies, check, forced, single_or_double, values_of, weighted_values_of
+from .arrays import single_or_double
+from .dispatch import Bodies, bodies, check, forced, values_of, weighted_values_of
 from .ground import Ground
 
 Reduction = Literal["mean", "sum", "none"]
