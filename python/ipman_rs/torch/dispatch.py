@@ -82,16 +82,19 @@ def check(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround
     plane = _ANY_GROUND if ground is None else as_ground(ground)
     if plane.normal.requires_grad or plane.height.requires_grad:
         raise ValueError("ground: a ground that requires grad is not differentiable here; detach its tensors")
-    if not (_broadcasts(plane.normal.shape[:-1], shape[:-2]) and _broadcasts(plane.height.shape, shape[:-2])):
+    batch_shape = shape[:-2]
+    if not (_broadcasts(plane.normal.shape[:-1], batch_shape) and _broadcasts(plane.height.shape, batch_shape)):
         raise ValueError(
             f"ground: normal {tuple(plane.normal.shape)} and height {tuple(plane.height.shape)} do not broadcast to "
-            f"the batch {tuple(shape[:-2])}; give one plane, or one a body"
+            f"the batch {tuple(batch_shape)}; give one plane, or one a body"
         )
-    return shape[:-2], plane
+    return batch_shape, plane
 
 
 def _broadcasts(shape: torch.Size, batch_shape: torch.Size) -> bool:
     """Whether it broadcasts to the batch without making it larger."""
+    if not shape:
+        return True
     sizes = zip(reversed(shape), reversed(batch_shape), strict=False)
     return len(shape) <= len(batch_shape) and all(size in (1, wanted) for size, wanted in sizes)
 

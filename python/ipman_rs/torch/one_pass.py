@@ -37,7 +37,7 @@ def serves(vertices: Any) -> bool:
     return (
         isinstance(vertices, Tensor)
         and vertices.requires_grad
-        and vertices.device.type == "cpu"
+        and vertices.is_cpu
         and vertices.is_floating_point()
         and torch.is_grad_enabled()
         and not torch.compiler.is_compiling()
@@ -48,14 +48,12 @@ def serves(vertices: Any) -> bool:
 
 def _arrays(vertices: Tensor, ground: Ground) -> tuple[Any, Any, Any]:
     """Vertices (B, V, 3), and normal and height of one ground or of B."""
-    normal, height = ground.normal.reshape(-1, 3), ground.height.reshape(-1)
+    normal = memory(ground.normal.to("cpu", torch.float64)).reshape(-1, 3)
+    height = memory(ground.height.to("cpu", torch.float64)).reshape(-1)
     if len(normal) != len(height):
-        normal, height = normal.expand(len(vertices), 3), height.expand(len(vertices))
-    return (
-        memory(vertices),
-        memory(normal.to("cpu", torch.float64)),
-        memory(height.to("cpu", torch.float64)),
-    )
+        batch = len(vertices)
+        normal, height = np.broadcast_to(normal, (batch, 3)).copy(), np.broadcast_to(height, batch).copy()
+    return memory(vertices), normal, height
 
 
 class WeightedTotal(Function):
