@@ -42,7 +42,7 @@ def serves(vertices: Any) -> bool:
         and torch.is_grad_enabled()
         and not torch.compiler.is_compiling()
         and forward_ad._current_level < 0
-        and not is_functorch_wrapped_tensor(vertices)
+        and not torch._C._are_functorch_transforms_active()
     )
 
 
