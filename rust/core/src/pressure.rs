@@ -3,8 +3,8 @@
 use crate::number::vector::{Vec3, add_scaled, dot, narrow, scale, widen};
 use crate::number::{Real, Room};
 use crate::quantity::Quantity;
-use crate::sampling::{CHUNK, Place, Points, Row, SUMS, Walk, sum_row};
-use crate::scene::Scene;
+use crate::sampling::{CHUNK, Place, Points, Row, Walk, sum_row};
+use crate::scene::{self, Scene};
 use crate::template::Template;
 
 /// The paper's heuristic: ρ = 1 − αh below the ground, e^(−γh) from the ground up. No unit.
@@ -129,7 +129,7 @@ const BLOCK: usize = 16;
 
 impl<R: Real> LoadSums<R> {
     pub fn new(of: CenterOfPressure, heights: &[R]) -> Self {
-        let shift = if of.epsilon > 0.0 { R::zero() } else { R::apart::<LowestAbove, _>((heights,)) };
+        let shift = if of.epsilon > 0.0 { R::zero() } else { scene::lowest(heights).at_least(R::zero()) };
         LoadSums {
             of,
             shift,
@@ -147,7 +147,7 @@ impl<R: Real> LoadSums<R> {
 
     /// Σ ρ_i, the shift taken back.
     pub fn total_pressure(&self) -> R::Wide {
-        R::apart::<Unshifted, _>((self.of.curve, self.shift, self.total))
+        self.total * (R::Wide::of(-self.of.curve.gamma) * self.shift.widen()).exp()
     }
 
     /// s̄ from the sums. Epsilon pulls towards the world's origin, which lies at −origin here.
@@ -158,28 +158,6 @@ impl<R: Real> LoadSums<R> {
         R::apart::<Moment, _>((scene.points, loads.as_slice(), &mut moment));
         let total = total + epsilon;
         Cop { point: [moment[0] / total, moment[1] / total, moment[2] / total], of, shift, total, loads }
-    }
-}
-
-/// The lowest height, or 0 if that is below the ground.
-struct LowestAbove;
-
-impl<R: Real> Room<(&[R],)> for LowestAbove {
-    type Output = R;
-
-    #[inline(always)]
-    fn enter((heights,): (&[R],)) -> R {
-        let mut lowest = [R::of(1e30); SUMS];
-        let (whole, rest) = heights.as_chunks::<SUMS>();
-        for heights in whole {
-            for k in 0..SUMS {
-                lowest[k] = lowest[k].at_most(heights[k]);
-            }
-        }
-        for &height in lowest[1..].to_owned().iter().chain(rest) {
-            lowest[0] = lowest[0].at_most(height);
-        }
-        lowest[0].at_least(R::zero())
     }
 }
 
@@ -197,18 +175,6 @@ impl<R: Real> Room<(PressureCurve, R, &Row<R>, usize, &mut Row<R>, &mut R::Wide)
             *density = curve.density(height, shift);
         }
         sum_row(density, len).add_to(total);
-    }
-}
-
-/// [`LoadSums::total_pressure`]
-struct Unshifted;
-
-impl<R: Real> Room<(PressureCurve, R, R::Wide)> for Unshifted {
-    type Output = R::Wide;
-
-    #[inline(always)]
-    fn enter((curve, shift, total): (PressureCurve, R, R::Wide)) -> R::Wide {
-        total * (R::Wide::of(-curve.gamma) * shift.widen()).exp()
     }
 }
 
