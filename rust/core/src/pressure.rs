@@ -1,7 +1,7 @@
 //! Pressure: from the height above the ground to pressure to the centre of pressure.
 
-use crate::number::vector::{Vec3, add_scaled, dot, narrow, scale, widen};
-use crate::number::{Real, Room};
+use crate::number::vector::{Vec3, add_scaled, add_to, dot, narrow, over, scale, widen};
+use crate::number::{BLOCK, Real, Room};
 use crate::quantity::Quantity;
 use crate::sampling::{CHUNK, Place, Points, Row, Walk, sum_row};
 use crate::scene::{self, Scene};
@@ -124,9 +124,6 @@ pub struct Cop<R: Real> {
     loads: Vec<R>,
 }
 
-/// Numbers of vertices that are summed in the points' own precision before the sum goes on in double precision.
-const BLOCK: usize = 16;
-
 impl<R: Real> LoadSums<R> {
     pub fn new(of: CenterOfPressure, heights: &[R]) -> Self {
         let shift = if of.epsilon > 0.0 { R::zero() } else { scene::lowest(heights).at_least(R::zero()) };
@@ -157,7 +154,7 @@ impl<R: Real> LoadSums<R> {
         let mut moment = scale(-epsilon, scene.origin);
         R::apart::<Moment, _>((scene.points, loads.as_slice(), &mut moment));
         let total = total + epsilon;
-        Cop { point: [moment[0] / total, moment[1] / total, moment[2] / total], of, shift, total, loads }
+        Cop { point: over(moment, total), of, shift, total, loads }
     }
 }
 
@@ -191,9 +188,7 @@ impl<R: Real> Room<(&[Vec3<R>], &[R], &mut Vec3<R::Wide>)> for Moment {
             for (&point, &load) in points.iter().zip(loads) {
                 add_scaled(&mut partial, load, point);
             }
-            for k in 0..3 {
-                partial[k].add_to(&mut moment[k]);
-            }
+            add_to(partial, moment);
         }
     }
 }
@@ -209,7 +204,7 @@ impl<R: Real> Cop<R> {
         mut d_heights: Vec<R>,
         d_points: &mut [Vec3<R>],
     ) {
-        let d_wide = [d_point[0] / self.total, d_point[1] / self.total, d_point[2] / self.total];
+        let d_wide = over(d_point, self.total);
         let (d, lever) = (narrow::<R>(d_wide), R::narrow(dot(d_wide, self.point)));
         let arms = R::apart::<Arms, _>((&scene.points[..heights.len()], d, lever));
         let (mut row, mut arm) = ([R::zero(); CHUNK], [R::zero(); CHUNK]);

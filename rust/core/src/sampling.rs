@@ -7,8 +7,8 @@
 
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::number::vector::{Vec3, add_scaled, cross, dot, narrow, sub, widen};
-use crate::number::{Data, Real, Room, Scalar, WideScalar};
+use crate::number::vector::{Vec3, add_scaled, add_to, cross, dot, narrow, sub, widen};
+use crate::number::{BLOCK, Data, Real, Room, Scalar, WideScalar};
 use crate::quantity::{Quantity, unknown_choice};
 use crate::scene::Scene;
 use crate::template::Template;
@@ -497,9 +497,6 @@ impl<R: Real> Room<(&Samples, &[R], &mut [Vec3<R>])> for SurfaceBackward {
     }
 }
 
-/// Numbers of vertices that are summed in the points' own precision before the sum goes on in double precision.
-const BLOCK: usize = 16;
-
 impl PartSum {
     /// The sum of the part's sample positions.
     #[inline(always)]
@@ -510,9 +507,7 @@ impl PartSum {
             for (i, &vertex) in indices.iter().enumerate() {
                 add_scaled(&mut partial, self.weights.get(block * BLOCK + i), vertices[vertex as usize]);
             }
-            for k in 0..3 {
-                partial[k].add_to(&mut sum[k]);
-            }
+            add_to(partial, &mut sum);
         }
         sum
     }

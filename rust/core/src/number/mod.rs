@@ -28,6 +28,10 @@ pub use fused::Fused;
 use std::mem::MaybeUninit;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+/// So many numbers are summed in their own precision before the sum goes on in [`Real::Wide`]: sums that short lose
+/// next to nothing, and the step to the wider number is paid once for all of them.
+pub const BLOCK: usize = 16;
+
 /// A function that is compiled once for each number, see [`Real::apart`].
 pub trait Room<Arguments> {
     type Output;
