@@ -9,7 +9,7 @@ use crate::ground::Ground;
 use crate::mass::Method;
 use crate::number::gate::{Level, Work};
 use crate::number::vector::{Vec3, sub};
-use crate::number::{Data, Dual, Real, Scalar};
+use crate::number::{Data, Dual, Real, Scalar, all_finite};
 use crate::quantity::Quantity;
 use crate::scene::{self, Scene};
 use crate::support::{BaseOfSupport, Contact};
@@ -139,7 +139,7 @@ impl<'a, T: Data> Batch<'a, T> {
                 for (out, d) in out.iter_mut().zip(d_points.as_flattened()) {
                     *out = T::of(d.slope);
                 }
-                zero_if_undefined(out, d_out.iter().all(|d| d.value.is_finite()));
+                zero_if_undefined(out, all_finite(&d_out));
             });
         })
     }
@@ -244,9 +244,7 @@ impl<'a, T: Data> Batch<'a, T> {
     /// The body's local origin, if all its vertices are finite.
     fn origin(&self, body: usize) -> Option<Vec3<f64>> {
         let vertices = self.vertices_of(body);
-        let broken = |piece: &[T]| piece.iter().fold(false, |broken, x| broken | !x.value().is_finite());
-        let finite = !vertices.chunks(1024).any(broken);
-        finite.then(|| scene::origin(std::array::from_fn(|k| vertices[k].value())))
+        all_finite(vertices).then(|| scene::origin(std::array::from_fn(|k| vertices[k].value())))
     }
 
     fn vertices_of(&self, body: usize) -> &[T] {
@@ -441,7 +439,7 @@ impl<T: Data, Q: Quantity> OnLanes<T> for ForwardAndBackward<'_, T, Q> {
         let d_vertices = &d_points[..self.template.mesh.num_vertices];
         R::write_rows(d_vertices.as_flattened(), &mut self.d_vertices);
         for (row, d_out) in self.d_vertices.iter_mut().zip(&self.d_out) {
-            zero_if_undefined(row, d_out.iter().all(|d| d.value().is_finite()));
+            zero_if_undefined(row, all_finite(d_out));
         }
     }
 }
@@ -515,8 +513,7 @@ fn status_of<R: Real>(scene: &Scene<R>, lane: usize, num_contacts: usize) -> u32
 /// A gradient that is not finite, though the upstream gradient is, belongs to a body on which the quantity is undefined
 /// (no volume, coordinates out of range): it becomes zero.
 fn zero_if_undefined<T: Scalar>(gradient: &mut [T], upstream_is_finite: bool) {
-    let broken = |piece: &[T]| piece.iter().fold(false, |broken, x| broken | !x.value().is_finite());
-    if upstream_is_finite && gradient.chunks(1024).any(broken) {
+    if upstream_is_finite && !all_finite(gradient) {
         gradient.fill(T::zero());
     }
 }

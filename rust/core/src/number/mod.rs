@@ -159,6 +159,12 @@ pub trait Scalar: Real<Scalar = Self> {
     fn data(self) -> Self::Data;
 }
 
+/// Looks at 1024 numbers before it decides whether to go on: so the look vectorises.
+pub fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
+    let broken = |piece: &[S]| piece.iter().fold(false, |broken, x| broken | !x.value().is_finite());
+    !numbers.chunks(1024).any(broken)
+}
+
 /// A floating-point format of the caller's arrays, itself a number with one lane.
 pub trait Data: Scalar<Data = Self> + gate::Gates {
     /// The distance from 1 to the next number.
