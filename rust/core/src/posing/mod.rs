@@ -5,7 +5,7 @@ mod passes;
 
 use crate::error::{Error, Result};
 use crate::number::gate::Level;
-use crate::number::{Dual, Real, Scalar};
+use crate::number::{Dual, Real, Scalar, all_finite};
 use crate::skinning::blend::Tile;
 use crate::skinning::rotation::Form;
 use crate::skinning::{Body, Gradient, Parameters, Skin, Start, Wanted};
@@ -263,10 +263,6 @@ fn hand_out<R: Scalar, T: Scalar>(
             *out = if good { number(d) } else { T::zero() };
         }
     }
-}
-
-fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
-    numbers.iter().all(|x| x.value().is_finite())
 }
 
 /// How many leading columns have a number other than zero.
