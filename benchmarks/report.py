@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ Rows = list[dict[str, Any]]
 
 def write(result: dict[str, Any], out: Path) -> None:
     """performance.md and performance.svg."""
-    rows = result["rows"]
+    rows, million = result["rows"], out / "million.json"
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE), trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
     )
@@ -34,6 +35,7 @@ def write(result: dict[str, Any], out: Path) -> None:
         others=_others(rows),
         grids=_grids(rows),
         memory=result["memory"],
+        million=json.loads(million.read_text()) if million.is_file() else None,
     )
     (out / "performance.md").write_text(page)
     _plot(rows, out / "performance.svg")
