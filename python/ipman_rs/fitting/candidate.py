@@ -1,0 +1,58 @@
+"""Bodies as a fit proposes them: computed when a term first looks at them, and then kept for the others."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import torch
+from torch import Tensor
+
+from ipman_rs.torch.body import BodyOutput
+
+from .camera import Camera
+from .problem import Problem
+from .rotations import matrix
+from .variables import Variables
+
+
+class Candidate:
+    """B proposed bodies and cameras."""
+
+    def __init__(self, problem: Problem, variables: Variables):
+        self.problem = problem
+        self.variables = variables
+
+    @cached_property
+    def full_pose(self) -> Tensor:
+        """(B, J, 3), the root first."""
+        return torch.cat([self.variables["orient"][:, None], self.variables["pose"]], dim=1)
+
+    @cached_property
+    def posed(self) -> BodyOutput:
+        """The whole mesh: dearer than `landmarks`, which look at a few points of it."""
+        return self.problem.body(self.full_pose, self.variables["betas"], self.variables["transl"])
+
+    @property
+    def vertices(self) -> Tensor:
+        """(B, V, 3) m, in the world."""
+        return self.posed.vertices
+
+    @cached_property
+    def landmarks(self) -> Tensor:
+        """(B, K, 3) m, in the world."""
+        return self.problem.landmarks(self.full_pose, self.variables["betas"], self.variables["transl"])
+
+    @cached_property
+    def camera(self) -> Camera:
+        start, variables = self.problem.camera, self.variables
+        return Camera(
+            start.focal * variables["log_focal"].exp(),
+            start.center,
+            matrix(variables["camera_orient"]),
+            variables["camera_transl"],
+        )
+
+    @cached_property
+    def projected(self) -> Tensor:
+        """The landmarks (B, K, 2), pixels."""
+        return self.camera.project(self.landmarks)
