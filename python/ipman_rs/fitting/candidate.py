@@ -29,8 +29,10 @@ class Candidate:
 
     @cached_property
     def posed(self) -> BodyOutput:
-        """The whole mesh: dearer than `landmarks`, which look at a few points of it."""
-        return self.problem.body(self.full_pose, self.variables["betas"], self.variables["transl"])
+        """The whole mesh, in the body's own precision: dearer than `landmarks`, which look at a few points of it."""
+        dtype = self.problem.body.dtype
+        given = (self.full_pose, self.variables["betas"], self.variables["transl"])
+        return self.problem.body(*(value.to(dtype) for value in given))
 
     @property
     def vertices(self) -> Tensor:

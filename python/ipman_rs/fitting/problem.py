@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
 
 from torch import Tensor
 
@@ -39,3 +39,23 @@ class Problem:
     height: Tensor | None = None  # (B,) m, of the person
     mass: Tensor | None = None  # (B,) kg
     presented: Presented | None = None
+
+    @property
+    def num_bodies(self) -> int:
+        return len(self.camera.focal)
+
+    def rows(self, index: Tensor) -> Problem:
+        """The bodies of these indices, in this order; an index may come more than once."""
+        return replace(self, **{field.name: _rows(getattr(self, field.name), index) for field in fields(self)})
+
+
+def _rows(value: Any, index: Tensor) -> Any:
+    if isinstance(value, Tensor):
+        return value[index]
+    if isinstance(value, Camera):
+        return Camera(*(getattr(value, field.name)[index] for field in fields(value)))
+    if isinstance(value, ipt.Ground):
+        return ipt.Ground.of_unit(value.normal.expand(-1, 3)[index], value.height[index]) if value.height.ndim else value
+    if isinstance(value, Presented):
+        return replace(value, pose=value.pose[index])
+    return value

@@ -1,0 +1,103 @@
+"""Fitting: the stages of a preset one after the other, each by its solver, for a batch of bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+
+from .candidate import Candidate
+from .config import Config, Stage
+from .objective import Objective
+from .problem import Problem
+from .solvers import SOLVERS, Look, Options, Outcome, minimise
+from .variables import Variables, pack, unpack
+
+CHUNK = 64  # bodies side by side: beyond, nothing gets faster and the Jacobian of the landmarks gets large
+
+
+@dataclass(frozen=True)
+class StageReport:
+    """How a stage went, an entry a body: reason (`solvers.Outcome`), iterations, and the terms' weighted costs."""
+
+    name: str
+    reasons: list[str]
+    iterations: list[int]
+    terms: dict[str, np.ndarray]  # (B,) each
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Fitted bodies: their variables (rows a body) and how each stage went."""
+
+    problem: Problem
+    variables: Variables
+    stages: list[StageReport] = field(default_factory=list)
+
+    @property
+    def converged(self) -> np.ndarray:
+        """(B,) bool: whether every stage converged."""
+        reasons = np.array([stage.reasons for stage in self.stages])
+        return np.isin(reasons, ("gradient", "decrease")).all(axis=0)
+
+    @property
+    def candidate(self) -> Candidate:
+        """The fitted bodies and cameras."""
+        return Candidate(self.problem, self.variables)
+
+
+def fit(
+    problem: Problem, variables: Variables, config: Config, progress: Callable[[str, int], None] | None = None
+) -> Fit:
+    """Fit B bodies from `variables` on by the stages of `config`; `progress` hears a stage's name and bodies that ended."""
+    reports = []
+    for stage in config.stages:
+        variables, report = run_stage(problem, variables, stage, config.terms, progress)
+        reports.append(report)
+    return Fit(problem, variables, reports)
+
+
+def run_stage(
+    problem: Problem,
+    variables: Variables,
+    stage: Stage,
+    terms: Mapping[str, Mapping[str, Any]],
+    progress: Callable[[str, int], None] | None = None,
+) -> tuple[dict[str, torch.Tensor], StageReport]:
+    objective = Objective(problem, variables, stage.free, stage.weights, terms)
+    starts = pack(variables, stage.free).numpy()
+    outcomes: list[Outcome] = []
+    for first in range(0, len(starts), CHUNK):
+        part = _Shrinking(objective.rows(range(first, min(first + CHUNK, len(starts)))), stage.solver == "levenberg")
+        told = None if progress is None else (lambda ended, first=first: progress(stage.name, first + ended))
+        outcomes += minimise(SOLVERS[stage.solver], starts[first : first + CHUNK], part, stage.options, told)
+    rows = torch.from_numpy(np.stack([outcome.point for outcome in outcomes]))
+    variables = unpack(rows, stage.free, variables)
+    with torch.no_grad():
+        costs = objective.costs(objective.candidate(rows))
+    reasons, iterations = [outcome.reason for outcome in outcomes], [outcome.iterations for outcome in outcomes]
+    return variables, StageReport(stage.name, reasons, iterations, {name: cost.numpy() for name, cost in costs.items()})
+
+
+class _Shrinking:
+    """An objective's evaluation for the bodies that still run, made anew when half of them have ended."""
+
+    def __init__(self, objective: Objective, wants_models: bool):
+        self.whole, self.wants_models = objective, wants_models
+        self.bodies: Sequence[int] = range(objective.problem.num_bodies)
+        self.objective = objective
+
+    def __call__(self, bodies: Sequence[int], points: np.ndarray) -> list[Look]:
+        if 2 * len(bodies) <= len(self.bodies):
+            self.bodies, self.objective = bodies, self.whole.rows(bodies)
+        place = [self.bodies.index(body) for body in bodies]
+        everywhere = np.repeat(points[:1], len(self.bodies), axis=0)
+        everywhere[place] = points
+        looks = self.objective.models(everywhere) if self.wants_models else self.objective.looks(everywhere)
+        return [looks[i] for i in place]
+
+
+__all__ = ["Fit", "Options", "StageReport", "fit", "run_stage"]
