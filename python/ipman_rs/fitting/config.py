@@ -24,6 +24,7 @@ class Stage:
     weights: Mapping[str, float]
     solver: str
     options: Options
+    find_ground: bool = False  # lay the ground under the feet before it, unless the ground is known
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def _config(name: str, content: Any) -> Config:
 
 def _stage(number: int, stage: Any, content: Mapping[str, Any]) -> Stage:
     place = f"stage {number}"
-    _known(place, stage, ("name", "free", "weights", "solver", "iterations"))
+    _known(place, stage, ("name", "free", "weights", "solver", "iterations", "find_ground"))
     _known(f"{place}, weights", stage.get("weights") or {}, TERMS)
     _known(f"{place}, free", dict.fromkeys(stage.get("free") or ()), BLOCKS)
     solver = stage.get("solver", content.get("solver", "levenberg"))
@@ -78,7 +79,8 @@ def _stage(number: int, stage: Any, content: Mapping[str, Any]) -> Stage:
             raise ValueError(f"{place}, weights, {term}: expected a number ≥ 0, got {weight!r}")
         weights[term] = float(weight)
     options = Options(**{"iterations": int(stage.get("iterations", 100)), **(content.get("tolerance") or {})})
-    return Stage(str(stage.get("name", number)), tuple(stage["free"]), weights, solver, options)
+    find_ground = bool(stage.get("find_ground", False))
+    return Stage(str(stage.get("name", number)), tuple(stage["free"]), weights, solver, options, find_ground)
 
 
 def _known(place: str, given: Any, known: Any) -> None:
