@@ -170,6 +170,25 @@ def test_separate_terms_of_nobody(tiny):
     assert vertices.grad.shape == vertices.shape
 
 
+def test_inside_a_transform_of_something_else(tiny):
+    """torch.func over the ground or the weight of a loss whose vertices are an ordinary leaf."""
+    loss = ipt.IntuitivePhysicsLoss(tiny.template)
+    vertices = tiny.vertices.clone().requires_grad_()
+
+    def total(height):
+        return loss.weighted(vertices, ipt.Ground((0.1, 1.0, 0.05), height))[0]
+
+    heights = torch.tensor([-0.02, 0.0, 0.03], dtype=F64)
+    mapped = torch.func.vmap(total)(heights)
+    expected = torch.stack([total(height) for height in heights])
+    torch.testing.assert_close(mapped, expected, rtol=1e-13, atol=0)
+    (slope,) = torch.autograd.grad(mapped.sum(), vertices)
+    (expected_slope,) = torch.autograd.grad(expected.sum(), vertices)
+    torch.testing.assert_close(slope, expected_slope, rtol=1e-12, atol=1e-18)
+    by_weight = torch.func.grad(lambda weight: weight * total(heights[0]))(heights[1])
+    torch.testing.assert_close(by_weight, expected[0], rtol=1e-13, atol=0)
+
+
 def test_the_gradient_is_handed_over_without_a_copy(tiny):
     """A leaf's .grad is the very buffer the core wrote: a copy would cost as much as the gradient."""
     loss = ipt.IntuitivePhysicsLoss(tiny.template)
@@ -191,6 +210,12 @@ def test_half_precision_bodies_have_float_losses(tiny):
     assert total.dtype == terms["pull"].dtype == torch.float32
     total.backward()
     assert vertices.grad.dtype == torch.bfloat16
+
+    single = vertices.detach().float().requires_grad_()
+    expected, _ = loss.weighted(single, tiny.ground)
+    expected.backward()
+    assert torch.equal(total, expected)
+    assert torch.equal(vertices.grad, single.grad.bfloat16())
 
 
 def test_options_reach_the_formula(tiny):

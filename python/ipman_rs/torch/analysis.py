@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -13,11 +12,12 @@ import ipman_rs as ip
 from ipman_rs import BaseOfSupport, BodyTemplate, presets
 from ipman_rs import Ground as NumpyGround
 
+from .arrays import as_array, memory, single_or_double
 from .ground import Ground, as_numpy_ground
 from .losses import balance_cost, ground_loss, stability_loss
 from .mass import center_of_mass
 from .pressure import center_of_pressure, pressure
-from .support import as_array, base_of_support
+from .support import base_of_support
 from .volume import mass_properties, part_volumes
 
 
@@ -94,7 +94,7 @@ def analyze(
 
 def _arrays(value: Any) -> Any:
     if isinstance(value, Tensor):
-        return np.asarray(as_array(value) if value.is_floating_point() else value.numpy(force=True))
+        return memory(single_or_double(value) if value.is_floating_point() else value)
     if isinstance(value, BaseOfSupport):
         return BaseOfSupport(**{name: _arrays(field) for name, field in vars(value).items()})
     if isinstance(value, list):

@@ -11,18 +11,13 @@ Function that defines `jvp`, so compiled code gets classes of its own, different
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import torch
 from torch import Tensor
-from torch._C._functorch import is_functorch_wrapped_tensor
 from torch.autograd import Function
 
 from . import ops
 from .folding import fold, unfold
-
-if TYPE_CHECKING:
-    pass
 
 THIRD = "third derivatives (and forward over forward) are not implemented; use jacfwd(jacrev(f)) for a Hessian"
 
@@ -120,54 +115,6 @@ class VjpJvp(_Op):
         raise NotImplementedError(THIRD)
 
 
-class Weighted(Function):
-    """One pass: vertices, normal, height, weights (B, K) -> totals (B,), values (B, K), gradient of the totals' sum.
-
-    Only the totals Σ_k weights · values are differentiable. The gradient waits for the backward, which scales it by its
-    upstream in place and hands it over; a second backward through the same graph computes it again.
-    """
-
-    @staticmethod
-    def forward(*args: Any) -> tuple[Tensor, Tensor, Tensor]:
-        *tensors, template, quantity, options = args
-        values, gradient = ops.value_and_vjp(*tensors, template._key, quantity, options)
-        return (values * tensors[-1]).sum(dim=-1), values, gradient
-
-    @staticmethod
-    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
-        *tensors, template, quantity, options = inputs
-        ctx.save_for_backward(*tensors)
-        ctx.save_for_forward(*tensors)
-        ctx.quantity = (template, quantity, options)
-        ctx.gradient = output[2]
-        ctx.mark_non_differentiable(*output[1:])
-        ctx.set_materialize_grads(False)
-
-    @staticmethod
-    def backward(ctx: Any, d_totals: Tensor | None, *_: Any) -> tuple[Tensor | None, ...]:
-        nothing = (None,) * 6
-        if d_totals is None:
-            return None, *nothing
-        vertices, normal, height, weights = ctx.saved_tensors
-        gradient, ctx.gradient = ctx.gradient, None
-        if gradient is None or torch.is_grad_enabled() or is_functorch_wrapped_tensor(d_totals):
-            return Vjp.apply(vertices, normal, height, weights * d_totals[:, None], *ctx.quantity), *nothing
-        if not bool((d_totals == 1).all()):
-            gradient.mul_(d_totals[:, None, None])
-        return gradient, *nothing
-
-    @staticmethod
-    def jvp(ctx: Any, d_vertices: Tensor, *_: Any) -> tuple[Tensor, None, None]:
-        vertices, normal, height, weights = ctx.saved_tensors
-        d_values = Jvp.apply(vertices, normal, height, d_vertices, *ctx.quantity)
-        return (d_values * weights).sum(dim=-1), None, None
-
-    @staticmethod
-    def vmap(info: Any, in_dims: Sequence[int | None], *args: Any) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
-        outputs = Weighted.apply(*fold(info.batch_size, in_dims, args))
-        return tuple(unfold(info.batch_size, output) for output in outputs), (0, 0, 0)
-
-
 class CompiledValue(Function):
     """`Value` for torch.compile."""
 
@@ -185,7 +132,10 @@ class CompiledValue(Function):
 
 
 class CompiledWeighted(Function):
-    """`Weighted` for torch.compile: totals and values."""
+    """One pass for torch.compile: vertices, normal, height, weights (B, K) -> totals (B,), values (B, K).
+
+    Only the totals Σ_k weights · values are differentiable. Their gradient comes along; the backward scales it.
+    """
 
     @staticmethod
     def forward(

@@ -17,7 +17,8 @@ from torch import Tensor
 from ipman_rs import Ground as NumpyGround
 
 from . import device, reference
-from .autograd import CompiledValue, CompiledWeighted, Value, Weighted
+from .arrays import single_or_double
+from .autograd import CompiledValue, CompiledWeighted, Value
 from .ground import Ground, as_ground
 
 if TYPE_CHECKING:
@@ -81,16 +82,19 @@ def check(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround
     plane = _ANY_GROUND if ground is None else as_ground(ground)
     if plane.normal.requires_grad or plane.height.requires_grad:
         raise ValueError("ground: a ground that requires grad is not differentiable here; detach its tensors")
-    if not (_broadcasts(plane.normal.shape[:-1], shape[:-2]) and _broadcasts(plane.height.shape, shape[:-2])):
+    batch_shape = shape[:-2]
+    if not (_broadcasts(plane.normal.shape[:-1], batch_shape) and _broadcasts(plane.height.shape, batch_shape)):
         raise ValueError(
             f"ground: normal {tuple(plane.normal.shape)} and height {tuple(plane.height.shape)} do not broadcast to "
-            f"the batch {tuple(shape[:-2])}; give one plane, or one a body"
+            f"the batch {tuple(batch_shape)}; give one plane, or one a body"
         )
-    return shape[:-2], plane
+    return batch_shape, plane
 
 
 def _broadcasts(shape: torch.Size, batch_shape: torch.Size) -> bool:
     """Whether it broadcasts to the batch without making it larger."""
+    if not shape:
+        return True
     sizes = zip(reversed(shape), reversed(batch_shape), strict=False)
     return len(shape) <= len(batch_shape) and all(size in (1, wanted) for size, wanted in sizes)
 
@@ -98,9 +102,7 @@ def _broadcasts(shape: torch.Size, batch_shape: torch.Size) -> bool:
 def bodies(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround | None) -> Bodies:
     """Check the arguments and fold the batch dimensions into one; raises as `check`."""
     batch_shape, plane = check(vertices, template, ground)
-    floating = torch.promote_types(vertices.dtype, torch.float32)
-    if vertices.dtype != floating:
-        vertices = vertices.to(floating)
+    vertices = single_or_double(vertices)
     if vertices.ndim != 3:
         vertices = vertices.reshape(math.prod(batch_shape), *vertices.shape[-2:])
     normal, height = plane.normal.expand(*batch_shape, 3), plane.height.expand(batch_shape)
@@ -143,22 +145,17 @@ def weighted_values_of(
 ) -> tuple[Tensor, Tensor]:
     """Σ_k weights (B, K) · values (B,), differentiable, and the values (B, K), detached.
 
-    Where a gradient will be asked for, it is computed in the same pass.
+    On devices and in compiled code a gradient that will be asked for is computed in the same pass; eager code on the
+    CPU has `one_pass.py` for that.
     """
-    vertices = batch.vertices
-    if _on_device(quantity, vertices) and vertices.requires_grad and torch.is_grad_enabled():
-        numbers = [float(option) for option in options]
+    vertices, numbers = batch.vertices, [float(option) for option in options]
+    wants_gradient = vertices.requires_grad and torch.is_grad_enabled()
+    if wants_gradient and _on_device(quantity, vertices):
         return device.weighted(template, quantity, numbers, vertices, batch.normal, batch.height, weights)
-    fused = vertices.requires_grad and torch.is_grad_enabled() and not _on_reference(vertices)
-    if not fused:
-        values = values_of(batch, template, quantity, options)
-        return (values * weights).sum(dim=-1), values.detach()
-    normal, height = _for_core(batch)
-    numbers = [float(option) for option in options]
-    if torch.compiler.is_compiling():
-        return CompiledWeighted.apply(vertices, normal, height, weights, template._key, quantity, numbers)
-    outputs = Weighted.apply(vertices, normal, height, weights, template, quantity, numbers)
-    return outputs[0], outputs[1]
+    if wants_gradient and torch.compiler.is_compiling() and not _on_reference(vertices):
+        return CompiledWeighted.apply(vertices, *_for_core(batch), weights, template._key, quantity, numbers)
+    values = values_of(batch, template, quantity, numbers)
+    return (values * weights).sum(dim=-1), values.detach()
 
 
 def _on_reference(vertices: Tensor) -> bool:

@@ -108,7 +108,7 @@ def as_ground(ground: Ground | NumpyGround) -> Ground:
     if isinstance(ground, Ground):
         return ground
     if isinstance(ground, NumpyGround):
-        return Ground.of_unit(torch.as_tensor(ground.normal), torch.as_tensor(ground.height))
+        return Ground.of_unit(torch.from_numpy(ground.normal), torch.from_numpy(ground.height))
     raise TypeError(f"ground: expected ipman_rs.torch.Ground or ipman_rs.Ground, got {type(ground).__name__}")
 
 

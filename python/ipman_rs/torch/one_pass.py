@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch._C._functorch import is_functorch_wrapped_tensor
@@ -15,6 +16,7 @@ from torch.autograd import Function, forward_ad
 
 from ipman_rs import BodyTemplate, _core
 
+from .arrays import memory
 from .autograd import Vjp
 from .ground import Ground
 from .threads import follow_torch
@@ -35,25 +37,23 @@ def serves(vertices: Any) -> bool:
     return (
         isinstance(vertices, Tensor)
         and vertices.requires_grad
-        and vertices.device.type == "cpu"
-        and vertices.dtype in (torch.float32, torch.float64)
+        and vertices.is_cpu
+        and vertices.is_floating_point()
         and torch.is_grad_enabled()
         and not torch.compiler.is_compiling()
         and forward_ad._current_level < 0
-        and not is_functorch_wrapped_tensor(vertices)
+        and not torch._C._are_functorch_transforms_active()
     )
 
 
 def _arrays(vertices: Tensor, ground: Ground) -> tuple[Any, Any, Any]:
     """Vertices (B, V, 3), and normal and height of one ground or of B."""
-    normal, height = ground.normal.reshape(-1, 3), ground.height.reshape(-1)
+    normal = memory(ground.normal.to("cpu", torch.float64)).reshape(-1, 3)
+    height = memory(ground.height.to("cpu", torch.float64)).reshape(-1)
     if len(normal) != len(height):
-        normal, height = normal.expand(len(vertices), 3), height.expand(len(vertices))
-    return (
-        vertices.detach().contiguous().numpy(),
-        normal.to("cpu", torch.float64).contiguous().numpy(),
-        height.to("cpu", torch.float64).contiguous().numpy(),
-    )
+        batch = len(vertices)
+        normal, height = np.broadcast_to(normal, (batch, 3)).copy(), np.broadcast_to(height, batch).copy()
+    return memory(vertices), normal, height
 
 
 class WeightedTotal(Function):
@@ -66,7 +66,7 @@ class WeightedTotal(Function):
     @staticmethod
     def forward(ctx: Any, vertices: Tensor, ground: Ground, valid: Tensor | None, call: Call) -> tuple[Tensor, Tensor]:
         arrays = _arrays(vertices, ground)
-        mask = None if valid is None else valid.numpy(force=True)
+        mask = memory(valid)
         follow_torch()
         template, quantity, options, weights, reduction = call
         total, terms, shares, gradient = _core.weighted(
@@ -104,7 +104,7 @@ class Terms(Function):
     @staticmethod
     def forward(ctx: Any, vertices: Tensor, ground: Ground, valid: Tensor | None, call: Call) -> Tensor:
         arrays = _arrays(vertices, ground)
-        mask = None if valid is None else valid.numpy(force=True)
+        mask = memory(valid)
         follow_torch()
         template, quantity, options = call[:3]
         terms, shares, jacobian = _core.terms(template._core, quantity, options, *arrays, mask, call.reduction)
@@ -118,8 +118,7 @@ class Terms(Function):
         if _is_differentiated(d_terms):
             return _vjp(ctx, vertices, torch.from_numpy(ctx.shares)[:, None] * d_terms), None, None, None
         follow_torch()
-        d_terms = d_terms.contiguous()
-        gradient = _core.terms_backward(ctx.jacobian, ctx.shares, d_terms.numpy(force=True), ctx.ground[0])
+        gradient = _core.terms_backward(ctx.jacobian, ctx.shares, memory(d_terms), ctx.ground[0])
         return torch.from_numpy(gradient), None, None, None
 
 

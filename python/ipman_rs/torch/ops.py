@@ -8,7 +8,7 @@ have no autograd of their own: `autograd.py` wraps them. CPU only.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -16,11 +16,9 @@ from torch import Tensor
 from ipman_rs import _core
 from ipman_rs.template import by_key
 
+from .arrays import memory
 from .folding import fold, unfold
 from .threads import follow_torch
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 GROUND = "Tensor vertices, Tensor normal, Tensor height"
 QUANTITY = "int template_key, str quantity, float[] options"
@@ -44,7 +42,7 @@ def _compiled(verb: Callable[..., Any]) -> Callable[..., Any]:
 
     def implementation(*args: Any) -> Any:
         *tensors, template_key, quantity, options = args
-        vertices, normal, height, *directions = (_array(tensor) for tensor in tensors)
+        vertices, normal, height, *directions = map(memory, tensors)
         core = by_key(template_key)._core
         follow_torch()
         result = verb(core, quantity, options, vertices, normal, height, *directions)
@@ -53,11 +51,6 @@ def _compiled(verb: Callable[..., Any]) -> Callable[..., Any]:
         return torch.from_numpy(result)
 
     return implementation
-
-
-def _array(tensor: Tensor) -> NDArray[Any]:
-    """The tensor's memory, copied only if it is not contiguous."""
-    return tensor.contiguous().numpy(force=True)
 
 
 def _fake_output(vertices: Tensor, normal: Tensor, height: Tensor, *rest: Any) -> Tensor:

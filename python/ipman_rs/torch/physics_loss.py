@@ -15,6 +15,7 @@ from ipman_rs.losses import Curve, Points, Wrap
 from ipman_rs.mass import Method
 
 from . import one_pass
+from .arrays import single_or_double
 from .dispatch import Bodies, bodies, check, forced, values_of, weighted_values_of
 from .ground import Ground
 
@@ -122,6 +123,7 @@ class IntuitivePhysicsLoss(nn.Module):
     ) -> tuple[Any, torch.Size]:
         """A function of `one_pass` on checked arguments, and the batch shape."""
         shape, plane = check(vertices, self.template, ground)
+        vertices = single_or_double(vertices)
         mask = None if valid is None else _mask(shape, valid, vertices)
         if len(shape) != 1:
             plane = Ground.of_unit(plane.normal.expand(*shape, 3), plane.height.expand(shape))

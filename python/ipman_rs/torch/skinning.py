@@ -21,13 +21,12 @@ from torch.autograd import Function
 
 from ipman_rs.body.model import by_key
 
+from .arrays import memory
 from .autograd import THIRD
 from .folding import fold, unfold
 from .threads import follow_torch
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from ipman_rs.body import BodyModel
 
 Four = Sequence[Tensor | None]
@@ -56,7 +55,7 @@ def _skin_vjp(*args: Any) -> tuple[Tensor, ...]:
     parameters, (d_vertices, d_joints, needs, key) = args[:4], args[4:]
     gradients = _gradients(parameters, needs)
     core = _core_of(key, parameters[0])
-    upstream = _array(d_vertices), _array(d_joints)
+    upstream = memory(d_vertices), memory(d_joints)
     core.vjp(len(parameters[0]), _arrays(parameters), *upstream, _written(gradients))
     return gradients
 
@@ -73,7 +72,7 @@ def _skin_vjp_jvp(*args: Any) -> tuple[Tensor, ...]:
     parameters, (d_vertices, d_joints), along, (needs, key) = args[:4], args[4:6], args[6:10], args[10:]
     gradients = _gradients(parameters, needs)
     core = _core_of(key, parameters[0])
-    upstream = _array(d_vertices), _array(d_joints)
+    upstream = memory(d_vertices), memory(d_joints)
     core.vjp_jvp(len(parameters[0]), _arrays(parameters), *upstream, _arrays(along), _written(gradients))
     return gradients
 
@@ -89,12 +88,8 @@ def _arrays(tensors: Four) -> tuple[Any, Any, Any, Any]:
     rows = (
         tensor[:1] if tensor is not None and len(tensor) and tensor.stride(0) == 0 else tensor for tensor in tensors
     )
-    pose, betas, expression, transl = map(_array, rows)
+    pose, betas, expression, transl = map(memory, rows)
     return pose, betas, expression, transl
-
-
-def _array(tensor: Tensor | None) -> NDArray[Any] | None:
-    return None if tensor is None else tensor.contiguous().numpy(force=True)
 
 
 def _outputs(*args: Any) -> tuple[Tensor, Tensor]:

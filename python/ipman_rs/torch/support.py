@@ -15,9 +15,9 @@ from ipman_rs.checks import choice, positive
 from ipman_rs.mass import Method
 from ipman_rs.support import Contact, Solver
 
+from .arrays import as_array
 from .dispatch import evaluate
 from .ground import Ground, as_numpy_ground
-from .threads import follow_torch
 
 
 def support_margin(
@@ -75,9 +75,3 @@ def bose(
         return support_margin(vertices.detach(), template, ground, threshold, com_method, contact) >= 0
     inside = ip.bose(as_array(vertices), template, as_numpy_ground(ground), threshold, "lp", com_method, contact)
     return torch.as_tensor(inside, device=vertices.device)
-
-
-def as_array(vertices: Tensor) -> Any:
-    """Detached, on the CPU, in a dtype numpy has."""
-    follow_torch()
-    return vertices.detach().to(torch.promote_types(vertices.dtype, torch.float32)).numpy(force=True)

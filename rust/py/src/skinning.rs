@@ -72,10 +72,7 @@ impl Skin {
         vertices: Bound<'_, PyAny>,
         joints: Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        match &self.tables {
-            Tables::Single(skin) => Call { py, skin, batch }.forward(&parameters, &vertices, &joints),
-            Tables::Double(skin) => Call { py, skin, batch }.forward(&parameters, &vertices, &joints),
-        }
+        self.answer(Call { py, batch, parameters, along: None, filled: Filled::Bodies { vertices, joints } })
     }
 
     /// Fills the gradients by the parameters that are asked for, given those by vertices and joints (None: zero).
@@ -88,11 +85,8 @@ impl Skin {
         d_joints: Given<'_>,
         gradients: Four<'_>,
     ) -> PyResult<()> {
-        let upstream = (d_vertices, d_joints);
-        match &self.tables {
-            Tables::Single(skin) => Call { py, skin, batch }.vjp(&parameters, &upstream, None, &gradients),
-            Tables::Double(skin) => Call { py, skin, batch }.vjp(&parameters, &upstream, None, &gradients),
-        }
+        let filled = Filled::Gradients { d_vertices, d_joints, gradients };
+        self.answer(Call { py, batch, parameters, along: None, filled })
     }
 
     /// Fills vertices and joints with their derivatives along a direction of the parameters (None: no movement).
@@ -105,10 +99,7 @@ impl Skin {
         vertices: Bound<'_, PyAny>,
         joints: Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        match &self.tables {
-            Tables::Single(skin) => Call { py, skin, batch }.jvp(&parameters, &along, &vertices, &joints),
-            Tables::Double(skin) => Call { py, skin, batch }.jvp(&parameters, &along, &vertices, &joints),
-        }
+        self.answer(Call { py, batch, parameters, along: Some(along), filled: Filled::Bodies { vertices, joints } })
     }
 
     /// Fills the gradients' derivatives along a direction of the parameters.
@@ -122,86 +113,69 @@ impl Skin {
         along: Four<'_>,
         gradients: Four<'_>,
     ) -> PyResult<()> {
-        let upstream = (d_vertices, d_joints);
+        let filled = Filled::Gradients { d_vertices, d_joints, gradients };
+        self.answer(Call { py, batch, parameters, along: Some(along), filled })
+    }
+}
+
+impl Skin {
+    fn answer(&self, call: Call<'_>) -> PyResult<()> {
         match &self.tables {
-            Tables::Single(skin) => Call { py, skin, batch }.vjp(&parameters, &upstream, Some(&along), &gradients),
-            Tables::Double(skin) => Call { py, skin, batch }.vjp(&parameters, &upstream, Some(&along), &gradients),
+            Tables::Single(skin) => call.run(skin),
+            Tables::Double(skin) => call.run(skin),
         }
     }
 }
 
-/// One call in the tables' precision T.
-struct Call<'a, 'py, T> {
+/// The parameters of a batch and what they are to fill, with a direction: its derivatives along that one.
+struct Call<'py> {
     py: Python<'py>,
-    skin: &'a skinning::Skin<T, TILE>,
     batch: usize,
+    parameters: Four<'py>,
+    along: Option<Four<'py>>,
+    filled: Filled<'py>,
 }
 
-impl<'py, T: Scalar + Element> Call<'_, 'py, T> {
-    fn forward(
-        &self,
-        parameters: &Four<'py>,
-        vertices: &Bound<'py, PyAny>,
-        joints: &Bound<'py, PyAny>,
-    ) -> PyResult<()> {
-        let parameters = Inputs::new(["pose", "betas", "expression", "transl"], parameters)?;
-        let (mut vertices, mut joints) = (output(vertices, "vertices")?, output(joints, "joints")?);
-        let (vertices, joints) = (slice(&mut vertices, "vertices")?, slice(&mut joints, "joints")?);
-        self.run(parameters.bodies(self.batch)?, |posing| posing.forward(vertices, joints))
-    }
+enum Filled<'py> {
+    Bodies { vertices: Bound<'py, PyAny>, joints: Bound<'py, PyAny> },
+    Gradients { d_vertices: Given<'py>, d_joints: Given<'py>, gradients: Four<'py> },
+}
 
-    fn jvp(
-        &self,
-        parameters: &Four<'py>,
-        along: &Four<'py>,
-        vertices: &Bound<'py, PyAny>,
-        joints: &Bound<'py, PyAny>,
-    ) -> PyResult<()> {
-        let parameters = Inputs::new(["pose", "betas", "expression", "transl"], parameters)?;
-        let along = Inputs::<T>::new(["along_pose", "along_betas", "along_expression", "along_transl"], along)?;
-        let along = along.bodies(self.batch)?;
-        let (mut vertices, mut joints) = (output(vertices, "vertices")?, output(joints, "joints")?);
-        let (vertices, joints) = (slice(&mut vertices, "vertices")?, slice(&mut joints, "joints")?);
-        self.run(parameters.bodies(self.batch)?, |posing| posing.jvp(&along, vertices, joints))
-    }
-
-    fn vjp(
-        &self,
-        parameters: &Four<'py>,
-        upstream: &(Given<'py>, Given<'py>),
-        along: Option<&Four<'py>>,
-        gradients: &Four<'py>,
-    ) -> PyResult<()> {
-        let parameters = Inputs::new(["pose", "betas", "expression", "transl"], parameters)?;
-        let (d_vertices, d_joints) = (input::<T>(&upstream.0, "d_vertices")?, input(&upstream.1, "d_joints")?);
-        let upstream =
-            Upstream { vertices: numbers(&d_vertices, "d_vertices")?, joints: numbers(&d_joints, "d_joints")? };
-        let along = along
-            .map(|along| Inputs::<T>::new(["along_pose", "along_betas", "along_expression", "along_transl"], along));
-        let along = along.transpose()?;
-        let along = along.as_ref().map(|along| along.bodies(self.batch)).transpose()?;
-
-        const NAMES: [&str; 4] = ["d_pose", "d_betas", "d_expression", "d_transl"];
-        let (pose, betas, expression, transl) = gradients;
-        let mut arrays = Vec::new();
-        for (array, name) in [pose, betas, expression, transl].into_iter().zip(NAMES) {
-            arrays.push(array.as_ref().map(|array| output(array, name)).transpose()?);
-        }
-        let mut gradients: Gradients<T> = Default::default();
-        for ((gradient, array), name) in gradients.iter_mut().zip(&mut arrays).zip(NAMES) {
-            if let Some(array) = array {
-                *gradient = slice(array, name)?;
+impl<'py> Call<'py> {
+    fn run<T: Scalar + Element>(&self, skin: &skinning::Skin<T, TILE>) -> PyResult<()> {
+        let (py, batch) = (self.py, self.batch);
+        let parameters = Inputs::new(["pose", "betas", "expression", "transl"], &self.parameters)?;
+        let parameters = parameters.bodies(batch)?;
+        let names = ["along_pose", "along_betas", "along_expression", "along_transl"];
+        let along = self.along.as_ref().map(|along| Inputs::new(names, along)).transpose()?;
+        let along = along.as_ref().map(|along| along.bodies(batch)).transpose()?;
+        match &self.filled {
+            Filled::Bodies { vertices, joints } => {
+                let (mut vertices, mut joints) = (output(vertices, "vertices")?, output(joints, "joints")?);
+                let (vertices, joints) = (slice(&mut vertices, "vertices")?, slice(&mut joints, "joints")?);
+                detached(py, |interrupted| {
+                    let posing = Posing::new(skin, batch, parameters, interrupted)?;
+                    match &along {
+                        None => posing.forward(vertices, joints),
+                        Some(along) => posing.jvp(along, vertices, joints),
+                    }
+                })
+            }
+            Filled::Gradients { d_vertices, d_joints, gradients } => {
+                let (d_vertices, d_joints) = (input(d_vertices, "d_vertices")?, input(d_joints, "d_joints")?);
+                let (vertices, joints) = (numbers(&d_vertices, "d_vertices")?, numbers(&d_joints, "d_joints")?);
+                let upstream = Upstream { vertices, joints };
+                let mut gradients = Outputs::new(["d_pose", "d_betas", "d_expression", "d_transl"], gradients)?;
+                let gradients = gradients.slices()?;
+                detached(py, |interrupted| {
+                    let posing = Posing::new(skin, batch, parameters, interrupted)?;
+                    match &along {
+                        None => posing.vjp(upstream, gradients),
+                        Some(along) => posing.vjp_jvp(upstream, along, gradients),
+                    }
+                })
             }
         }
-        self.run(parameters.bodies(self.batch)?, |posing| match &along {
-            None => posing.vjp(upstream, gradients),
-            Some(along) => posing.vjp_jvp(upstream, along, gradients),
-        })
-    }
-
-    fn run(&self, bodies: Bodies<T>, work: impl FnOnce(&Posing<T>) -> ipman::Result<()> + Send) -> PyResult<()> {
-        let (skin, batch) = (self.skin, self.batch);
-        detached(self.py, |interrupted| work(&Posing::new(skin, batch, bodies, interrupted)?))
     }
 }
 
@@ -243,6 +217,33 @@ impl<'py, T: Scalar + Element> Inputs<'py, T> {
             }
             _ => Err(PyValueError::new_err(format!("{name}: expected {batch} rows or one, got shape {shape:?}"))),
         }
+    }
+}
+
+/// Four arrays that are written, None for what is not asked for.
+struct Outputs<'py, T: Element> {
+    names: Names,
+    arrays: [Option<PyReadwriteArrayDyn<'py, T>>; 4],
+}
+
+impl<'py, T: Element> Outputs<'py, T> {
+    fn new(names: Names, given: &Four<'py>) -> PyResult<Self> {
+        let (pose, betas, expression, transl) = given;
+        let mut arrays = [const { None }; 4];
+        for ((place, array), name) in arrays.iter_mut().zip([pose, betas, expression, transl]).zip(names) {
+            *place = array.as_ref().map(|array| output(array, name)).transpose()?;
+        }
+        Ok(Outputs { names, arrays })
+    }
+
+    fn slices(&mut self) -> PyResult<Gradients<'_, T>> {
+        let mut slices = Gradients::default();
+        for ((place, array), name) in slices.iter_mut().zip(&mut self.arrays).zip(self.names) {
+            if let Some(array) = array {
+                *place = slice(array, name)?;
+            }
+        }
+        Ok(slices)
     }
 }
 
