@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import torch
+
+import ipman_rs.torch as ipt
 
 from .candidate import Candidate
 from .config import Config, Stage
@@ -54,10 +57,34 @@ def fit(
 ) -> Fit:
     """Fit B bodies from `variables` on by the stages of `config`; `progress` hears a stage's name and bodies that ended."""
     reports = []
-    for stage in config.stages:
-        variables, report = run_stage(problem, variables, stage, config.terms, progress)
-        reports.append(report)
+    with one_thread():
+        for stage in config.stages:
+            if stage.find_ground:
+                problem = on_the_ground(problem, variables)
+            variables, report = run_stage(problem, variables, stage, config.terms, progress)
+            reports.append(report)
     return Fit(problem, variables, reports)
+
+
+def on_the_ground(problem: Problem, variables: Variables) -> Problem:
+    """The problem with a level ground under the lowest vertex of each body, unless its ground is known."""
+    if problem.ground is not None:
+        return problem
+    with torch.no_grad():
+        lowest = Candidate(problem, variables).vertices[..., 1].amin(dim=1)
+    up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(len(lowest), 3)
+    return replace(problem, ground=ipt.Ground(up, lowest.double()))
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Torch on one thread: a body's matrices are too small for more, and their bits must not depend on it."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def run_stage(

@@ -72,7 +72,7 @@ class Objective:
         looks = []
         for body in range(len(points)):
             r, j = residuals[body], jacobians[body]
-            value, gradient, hessian = float(r @ r), 2 * j @ r, 2 * j @ j.T
+            value, gradient, hessian = float(r @ r), (2 * j @ r).numpy(), (2 * j @ j.T).numpy()
             for values, gradients in others:
                 cost, slope = float(values[body]), gradients[body]
                 value, gradient = value + cost, gradient + slope
@@ -93,11 +93,11 @@ class Objective:
         (gradient,) = torch.autograd.grad(total.sum(), rows)
         return total.detach().numpy(), gradient.numpy()
 
-    def _jacobian(self, points: np.ndarray, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    def _jacobian(self, points: np.ndarray, names: Sequence[str]) -> tuple[Tensor, Tensor]:
         """Weighted residuals (B, R) and their Jacobians (B, P, R): every body once a direction, by forward mode."""
         bodies, size = points.shape
         if not names:
-            return np.zeros((bodies, 0)), np.zeros((bodies, size, 0))
+            return torch.zeros(bodies, 0, dtype=torch.float64), torch.zeros(bodies, size, 0, dtype=torch.float64)
         if self._repeated is None:
             self._repeated = self.rows(np.repeat(np.arange(bodies), size).tolist())
         rows = torch.from_numpy(points).repeat_interleave(size, dim=0)
@@ -112,4 +112,4 @@ class Objective:
             values = torch.cat([part.primal for part in parts], dim=1)[::size]
             tangents = [torch.zeros_like(part.primal) if part.tangent is None else part.tangent for part in parts]
             jacobian = torch.cat(tangents, dim=1).reshape(bodies, size, -1)
-        return values.numpy().copy(), jacobian.numpy()
+        return values, jacobian

@@ -30,7 +30,7 @@ class Problem:
     body: ipt.BodyModel
     landmarks: Landmarks  # K named points of the body
     camera: Camera
-    ground: ipt.Ground
+    ground: ipt.Ground | None = None  # None: not known yet
     points: Tensor | None = None  # (B, K, 2) pixels
     confidence: Tensor | None = None  # (B, K), 0 to 1
     points_3d: Tensor | None = None  # (B, K, 3) m, in the world

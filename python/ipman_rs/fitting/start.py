@@ -69,7 +69,7 @@ def neutral(problem: Problem) -> dict[str, Tensor]:
 
 def before_camera(problem: Problem, yaws: int = 4, iterations: int = 12) -> dict[str, Tensor]:
     """Variables with the body placed before the camera, which stays. Needs points in an image."""
-    return _best(problem, neutral(problem), yaws, ("orient", "transl", "pose"), iterations, moves_camera=False)
+    return _best(problem, neutral(problem), yaws, ("orient", "transl"), iterations, moves_camera=False)
 
 
 def camera_around(problem: Problem, yaws: int = 12, iterations: int = 12) -> dict[str, Tensor]:

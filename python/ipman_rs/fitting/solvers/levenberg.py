@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Generator
 
 import numpy as np
+import scipy.linalg
 
 from .outcome import Look, Options, Outcome, Vector
 
@@ -45,8 +46,7 @@ def _step(look: Look, damping: float) -> tuple[Vector, float]:
         raise ValueError("levenberg: expected a model of the Hessian, got none")
     diagonal = hessian.diagonal()
     stiff = damping * np.maximum(diagonal, 1e-6 * diagonal.max(initial=0) + 1e-12)
-    try:
-        step = -np.linalg.solve(hessian + np.diag(stiff), look.gradient)
-    except np.linalg.LinAlgError:
+    step, info = scipy.linalg.lapack.dposv(hessian + np.diag(stiff), -look.gradient)[1:]
+    if info:  # not positive definite: more damping
         return np.zeros_like(look.gradient), 0.0
     return step, float(-look.gradient @ step - 0.5 * step @ hessian @ step)
