@@ -70,7 +70,7 @@ class Skin:
             eye = nose[:2] + scale * np.array([0.21 * sign, 0.24])
             off = np.linalg.norm(self.vertices[:, :2] - eye, axis=1)
             found[f"{side}_eye"] = best(head, z - 3 * off)  # in front, not the socket behind it
-            found[f"{side}_ear"] = self.farthest(head & (abs(y - nose[1] - 0.1 * scale) < 0.2 * scale), x=sign)
+            found[f"{side}_ear"] = self.farthest(head & (abs(y - nose[1] - 0.1 * scale) < 0.12 * scale), x=sign)
         return found
 
     def foot(self, side: str) -> dict[str, int]:
