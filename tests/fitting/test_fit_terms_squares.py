@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
 
 import fit_terms_cases as cases
 import pytest
 import torch
 
 from ipman_rs.body import joints
+from ipman_rs.fitting.problem import Presented
 from ipman_rs.fitting.terms.bending import Bending
+from ipman_rs.fitting.terms.gmm_prior import GaussianMixture
 from ipman_rs.fitting.terms.hand_prior import HandPrior
 from ipman_rs.fitting.terms.joint_limits import JointLimits
 from ipman_rs.fitting.terms.points_3d import Points3D
@@ -100,9 +105,9 @@ def test_points_by_hand():
     values = cases.zeros(1)
     at = problem.landmarks(torch.zeros(1, 24, 3).double(), values["betas"], values["transl"])
     points = at.clone()
-    points[0, 1] += torch.tensor([0.3, 0.0, 0.4]).double()  # the head, 0.5 m off
+    points[0, 1] += torch.tensor([0.3, 0.0, 0.4], dtype=torch.float64)  # the head, 0.5 m off
     points[0, 2, 1] += 0.1
-    confidence = torch.tensor([[1.0, 0.5, 1.0, 1.0, 0.0]]).double()
+    confidence = torch.tensor([[1.0, 0.5, 1.0, 1.0, 0.0]], dtype=torch.float64)
     points[0, 4] += 7.0  # not seen
     problem = cases.problem(1, points_3d=points, confidence_3d=confidence)
     body = cases.candidate(problem, **values)
@@ -130,7 +135,7 @@ def test_presented_pose_leaves_hands_out():
     shown = cases.presented()
     problem = cases.problem(1, presented=shown)
     pose = shown.pose.clone()
-    pose[0, joints.SMPL.index("left_knee") - 1] += torch.tensor([0.1, 0.2, 0.2]).double()
+    pose[0, joints.SMPL.index("left_knee") - 1] += torch.tensor([0.1, 0.2, 0.2], dtype=torch.float64)
     pose[0, joints.SMPL.index("left_hand") - 1] += 1.0
     body = cases.candidate(problem, pose=pose)
     assert PresentedPose(problem).cost(body).item() == pytest.approx(0.09, rel=1e-12)
@@ -161,3 +166,28 @@ def test_what_is_missing_is_named():
         PresentedPose(flat)
     with pytest.raises(ValueError, match="rho: expected positive"):
         Points3D(cases.problem(1, points_3d=torch.zeros(1, 5, 3)), rho=0.0)
+
+
+def test_models_with_fingers_and_face(tmp_path):
+    """SMPL-X's names: hands are 30 joints, jaw and eyes belong to no prior here, the mixture's hand joints count as 0."""
+    template = torch.zeros(3, 3, dtype=torch.float64)
+    body = SimpleNamespace(body=SimpleNamespace(joint_names=joints.SMPLX), v_template=template)
+    pose = torch.randn(2, 54, 3, generator=torch.Generator().manual_seed(5), dtype=torch.float64)
+    shown = torch.zeros(2, 54, 3, dtype=torch.float64)
+    problem = replace(cases.problem(2), body=body, presented=Presented(shown))
+    smpl = cases.problem(2)
+    given = SimpleNamespace(variables={"pose": pose})
+    without_hands = cases.candidate(smpl, pose=torch.cat([pose[:, :21], torch.zeros_like(pose[:, :2])], dim=1))
+
+    def cost(make):
+        return make(problem).cost(given)
+
+    torch.testing.assert_close(cost(HandPrior), pose[:, 24:].square().sum((1, 2)))
+    torch.testing.assert_close(cost(PresentedPose), pose[:, :21].square().sum((1, 2)))
+    assert JointLimits(problem).residuals(given).shape == (2, 21 * 3)
+    for make in (JointLimits, PosePrior):
+        torch.testing.assert_close(cost(make), make(smpl).cost(without_hands))
+    cases.fake_mixture(tmp_path / "gmm.npz")
+    mixture = partial(GaussianMixture, path=tmp_path / "gmm.npz")
+    torch.testing.assert_close(cost(mixture), mixture(smpl).cost(without_hands))
+    assert cost(Bending).isfinite().all()

@@ -79,7 +79,7 @@ class JointLimits(LeastSquares):
         if not names:
             raise ValueError("joint_limits: expected a body with SMPL's joints, this one has none of them")
         self.joints = [problem.body.body.joint_names.index(name) - 1 for name in names]
-        self.bones = torch.tensor([0 if name.partition("_")[2] in ARM else 1 for name in names])
+        self.bones = torch.tensor([0 if name.partition("_")[2] in ARM else 1 for name in names], device=like.device)
         ranges = like.new_tensor([range_of(name) for name in names])  # (J, 3, 2)
         self.middle = ranges.mean(dim=-1).deg2rad()
         self.reach = ((ranges[..., 1] - ranges[..., 0]) / 2 + margin).deg2rad()
@@ -95,9 +95,10 @@ def swing_twist(pose: Tensor, bones: Tensor) -> Tensor:
 
     With arctangents of half the half angles: torch's atan2 rounds by where in its vector registers a number lies.
     """
+    axes = torch.arange(3, device=bones.device)
     q = quaternion(pose)
     q = torch.where(q[..., 3:] < 0, -q, q)  # the same rotation by less than 180°
-    cyclic = (bones[:, None] + torch.arange(3)) % 3  # the bone's axis, then the two others, right-handed
+    cyclic = (bones[:, None] + axes) % 3  # the bone's axis, then the two others, right-handed
     twist, u, v = q[..., :3].gather(-1, cyclic.expand(pose.shape)).unbind(-1)
     w = q[..., 3]
     squared = w * w + twist * twist
@@ -107,7 +108,7 @@ def swing_twist(pose: Tensor, bones: Tensor) -> Tensor:
     swing_u, swing_v = (u * w - v * twist) / cosine, (v * w + u * twist) / cosine
     ratio = _angle_by_sine(swing_u * swing_u + swing_v * swing_v, torch.where(sound, cosine, 0))
     angles = torch.stack([4 * torch.atan(twist / (cosine + w)), ratio * swing_u, ratio * swing_v], dim=-1)
-    return angles.gather(-1, ((torch.arange(3) - bones[:, None]) % 3).expand(pose.shape))
+    return angles.gather(-1, ((axes - bones[:, None]) % 3).expand(pose.shape))
 
 
 def _angle_by_sine(squared_sine: Tensor, cosine: Tensor) -> Tensor:
