@@ -169,7 +169,7 @@ def test_what_is_missing_is_named():
 
 
 def test_models_with_fingers_and_face(tmp_path):
-    """SMPL-X's names: hands are 30 joints, jaw and eyes belong to no prior here, the mixture's hand joints count as 0."""
+    """SMPL-X: hands are 30 joints, jaw and eyes belong to no prior here, the mixture's hand joints count as 0."""
     template = torch.zeros(3, 3, dtype=torch.float64)
     body = SimpleNamespace(body=SimpleNamespace(joint_names=joints.SMPLX), v_template=template)
     pose = torch.randn(2, 54, 3, generator=torch.Generator().manual_seed(5), dtype=torch.float64)

@@ -44,7 +44,7 @@ RANGES: dict[str, tuple[Range, Range, Range]] = {
     "ankle": ((-20, 50), (-20, 20), (-35, 20)),
     # the toes: extension 70, flexion 45
     "foot": ((-70, 45), (-10, 10), (-10, 10)),
-    # thirds of lumbar and thoracic spine (Kapandji): flexion 105, extension 60, lateral 40, rotation 45
+    # thirds of lumbar and thoracic spine: flexion 105, extension 60, lateral 40 (Kapandji), rotation 45
     "spine1": ((-20, 35), (-15, 15), (-14, 14)),
     "spine2": ((-20, 35), (-15, 15), (-14, 14)),
     "spine3": ((-20, 35), (-15, 15), (-14, 14)),
