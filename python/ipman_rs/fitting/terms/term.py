@@ -1,7 +1,8 @@
 """What a term of a fitting objective is.
 
-A term is made once a fit, by `SomeTerm(problem, **options)`, and looked at once an evaluation. Rows must not know of each
-other: nothing may be summed, sorted or multiplied across bodies, so that a body's result does not depend on its batch.
+A term is made once a fit, by `SomeTerm(problem, **options)`, and looked at once an evaluation. Rows must not know of
+each other: nothing may be summed, sorted or multiplied across bodies, so that a body's result does not depend on its
+batch.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ class Term(ABC):
     def __init__(self, problem: Problem, **options: Any):
         self.problem = problem
         self.options = options
+
+    def begin(self, candidate: Candidate) -> None:  # noqa: B027  most terms have nothing to note
+        """Called with the bodies that a stage starts from, before its first evaluation."""
 
     @abstractmethod
     def cost(self, candidate: Candidate) -> Tensor:
