@@ -37,9 +37,9 @@ def trunk(share: float, forwards: float) -> Place:
     return _between("mid_shoulder", "mid_hip", share, 0, 0, forwards)
 
 
-def head(out: float, forwards: float) -> Place:
-    """On a band around the forehead."""
-    return {"left_ear": 0.325, "right_ear": 0.325, "head_top": 0.35}, (out, 0, forwards)
+def head(share: float, out: float, forwards: float) -> Place:
+    """On a band around the head, `share` of the way from the ears to its top."""
+    return {"left_ear": (1 - share) / 2, "right_ear": (1 - share) / 2, "head_top": share}, (out, 0, forwards)
 
 
 def thigh(share: float, out: float, forwards: float) -> Place:
@@ -56,41 +56,41 @@ def foot(share: float, out: float, up: float, forwards: float) -> Place:
 
 
 MIDDLE: dict[str, Place] = {
-    "c7": trunk(-0.145, -1),
+    "c7": trunk(-0.17, -1),
     "clavicle": trunk(0, 1),
-    "sternum": trunk(0.17, 1),
+    "sternum": trunk(0.14, 1),
     "lower_sternum": trunk(0.34, 1),
     "t10": trunk(0.31, -1),
     "sacrum": ({"mid_hip": 1.33, "mid_knee": -0.33}, (0, 0, -1)),
     "head_top": ({"left_ear": 0.5, "right_ear": 0.5}, (0, 1, 0)),
 }
 SIDED: dict[str, Place] = {
-    "forehead": head(0.7, 0.7),
-    "occiput": head(0.7, -0.7),
-    "temple": head(1, 0.6),
-    "acromion": ({"shoulder": 0.85, "mid_shoulder": 0.15}, (0, 1, 0)),
+    "forehead": head(0.35, 0.7, 0.7),
+    "occiput": head(0.35, 0.7, -0.7),
+    "temple": head(0.15, 1, 0.6),
+    "acromion": ({"shoulder": 0.75, "mid_shoulder": 0.25}, (0, 1, 0)),
     "sternoclavicular": ({"shoulder": 0.13, "mid_shoulder": 0.87}, (0, 0, 1)),
     "scapula": _between("shoulder", "mid_hip", 0.3, 0, 0, -1),
-    "upper_arm": _between("shoulder", "elbow", 0.35, 0, 1, 1),
+    "upper_arm": _between("shoulder", "elbow", 0.28, 0, 1, 1),
     "biceps": _between("shoulder", "elbow", 0.6, 0, 1, 0.2),
     "elbow_lateral": ({"elbow": 1}, (0, 1, 0)),
     "elbow_medial": ({"elbow": 1}, (0, -1, 0)),
-    "forearm": _between("elbow", "wrist", 0.2, 0, 0.6, 0.8),
+    "forearm": _between("elbow", "wrist", 0.3, 0, 0.6, 0.8),
     "radius": ({"wrist": 1}, (0, 0, 1)),
     "ulna": ({"wrist": 1}, (0, 0, -1)),
     "hand_back": ({"index": 1}, (0, 1, 0)),
-    "asis": ({"hip": 1.21, "knee": -0.21}, (0.25, 0, 1)),
+    "asis": ({"hip": 1.16, "knee": -0.16}, (0, 0, 1)),
     "psis": ({"mid_hip": 0.93, "hip": 0.4, "mid_knee": -0.33}, (0, 0, -1)),
-    "knee_lateral": ({"knee": 1}, (1, 0, 0)),
-    "knee_medial": ({"knee": 1}, (-1, 0, 0)),
+    "knee_lateral": shank(0.02, 1, 0),
+    "knee_medial": shank(0.04, -1, 0),
     "malleolus_lateral": ({"ankle": 1}, (1, 0, -0.2)),
     "malleolus_medial": ({"ankle": 1}, (-1, 0, 0.1)),
-    "heel_marker": ({"heel": 0.6, "ankle": 0.4}, (0, 0, -1)),
-    "midfoot": foot(0.5, 0, 1, 0),
+    "heel_marker": ({"heel": 0.75, "ankle": 0.25}, (0, 0, -1)),
     "midfoot_lateral": foot(0.5, 1, 0.3, 0),
     "metatarsal_1": foot(1, -1, 0.2, 0),
-    "metatarsal_2": foot(1, 0, 1, 0),
-    "metatarsal_5": foot(0.85, 1, 0, 0),
+    "metatarsal_2": foot(1, -0.5, 1, 0),
+    "midfoot_medial": foot(0.5, -1, 0.8, 0),
+    "metatarsal_5": foot(0.85, 1, -0.3, 0),
     "toe_tip": ({"foot": 0.5, "big_toe": 0.5}, (0, 0.2, 1)),
 }
 

@@ -36,7 +36,7 @@ OPENSIM_GAIT: dict[str, Meaning] = {
             "Ankle.Lat": "malleolus_lateral",
             "Ankle.Med": "malleolus_medial",
             "Heel": "heel_marker",
-            "Midfoot.Sup": "midfoot",
+            "Midfoot.Sup": "midfoot_medial",
             "Midfoot.Lat": "midfoot_lateral",
             "Toe.Tip": "toe_tip",
             "Toe.Lat": "metatarsal_5",
