@@ -12,6 +12,7 @@ import torch
 
 import ipman_rs.torch as ipt
 
+from . import switch
 from .candidate import Candidate
 from .config import Config, Stage
 from .objective import Objective
@@ -61,6 +62,7 @@ def fit(
         for stage in config.stages:
             if stage.find_ground:
                 problem = on_the_ground(problem, variables)
+            problem = judged(problem, variables)
             variables, report = run_stage(problem, variables, stage, config.terms, progress)
             reports.append(report)
     return Fit(problem, variables, reports)
@@ -74,6 +76,15 @@ def on_the_ground(problem: Problem, variables: Variables) -> Problem:
         lowest = Candidate(problem, variables).vertices[..., 1].amin(dim=1)
     up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(len(lowest), 3)
     return replace(problem, ground=ipt.Ground(up, lowest.double()))
+
+
+def judged(problem: Problem, variables: Variables) -> Problem:
+    """The problem with the judgement which bodies are static now; the same where no ground is known."""
+    if problem.ground is None:
+        return problem
+    with torch.no_grad():
+        vertices = Candidate(problem, variables).vertices
+        return replace(problem, static=switch.static(vertices, problem.body.template, problem.ground))
 
 
 @contextmanager
