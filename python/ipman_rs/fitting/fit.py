@@ -56,7 +56,7 @@ class Fit:
 def fit(
     problem: Problem, variables: Variables, config: Config, progress: Callable[[str, int], None] | None = None
 ) -> Fit:
-    """Fit B bodies from `variables` on by the stages of `config`; `progress` hears a stage's name and how many ended."""
+    """Fit B bodies from `variables` on by the stages of `config`; `progress` hears a stage and how many ended."""
     reports = []
     with one_thread():
         for stage in config.stages:
