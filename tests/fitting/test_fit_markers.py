@@ -12,7 +12,8 @@ torch = pytest.importorskip("torch", reason="torch is an extra")
 
 import ipman_rs.torch as ipt  # noqa: E402
 from ipman_rs.fitting import markers  # noqa: E402
-from ipman_rs.fitting.landmarks import Landmarks  # noqa: E402
+from ipman_rs.fitting.landmarks import Landmarks, Site  # noqa: E402
+from ipman_rs.fitting.markers.calibration import calibrated  # noqa: E402
 from ipman_rs.fitting.markers.sets import OPENCAP, OPENSIM_GAIT, PLUG_IN_GAIT  # noqa: E402
 
 
@@ -206,4 +207,26 @@ def closest(landmarks, points, seen):
             return total
 
         optimizer.step(loss)
-    return float(errors().norm(dim=-1).sum() / seen.sum())
+    return (errors().norm(dim=-1).sum() / seen.sum()).item()
+
+
+def test_calibration_finds_where_the_markers_are(body):
+    sites = markers.sites(body.body, ["C7", "L.ASIS", "R.Heel", "L_HJC"])
+    rng = np.random.default_rng(2)
+    pose = torch.tensor(rng.normal(scale=0.4, size=(6, 24, 3)))
+    people = pose, torch.tensor(rng.normal(size=(6, 10))), torch.tensor(rng.normal(size=(6, 3)))
+    move = np.array([0.01, -0.02, 0.03])
+    true = {
+        name: Site(site.vertex, tuple(move + site.shift)) if isinstance(site, Site) else site
+        for name, site in sites.items()
+    }
+    seen = torch.tensor([[1.0, 1, 0, 1]] * 3 + [[0.5, 0, 0, 1]] * 3, dtype=torch.float64)
+    observed = Landmarks(body, true, true)(*people) + 9 * (seen == 0)[..., None]
+    found = calibrated(body, sites, people, observed, seen)
+    for name in ("C7", "L.ASIS"):
+        np.testing.assert_allclose(found[name].shift, true[name].shift, atol=1e-12)
+    assert found["R.Heel"] == sites["R.Heel"]  # never seen
+    assert found["L_HJC"] == "left_hip"
+    far = calibrated(body, sites, people, observed + 1, torch.ones_like(seen))
+    moved = np.subtract(far["R.Heel"].shift, sites["R.Heel"].shift)
+    assert np.linalg.norm(moved) == pytest.approx(0.05)
