@@ -1,0 +1,195 @@
+//! A body that touches or penetrates itself: which vertices are inside another part of it, what surface of other parts is
+//! nearest, and the cost of both.
+//!
+//! Skin is no obstacle to itself: faces within a distance of a vertex, along the rest shape's surface, are not opposite to
+//! it. A vertex is inside another part where the winding number of the body there is more than its own surface explains
+//! ([`winding`]) and the opposite surface has the larger share in that, so that a crease of skin is none.
+
+pub mod contact;
+pub mod geodesic;
+pub mod nearest;
+pub mod tree;
+pub mod winding;
+
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use crate::number::Data;
+use crate::number::gate::Level;
+use crate::number::vector::{Vec3, zero};
+use crate::threads;
+use contact::SelfContact;
+use geodesic::Neighbourhoods;
+use nearest::{Nearest, nearest};
+use tree::{Aabb, Tree};
+
+/// The body's winding number above which a vertex is inside another part.
+pub const INSIDE: f64 = 0.99;
+/// The share of opposite surface in it: half of the directions, so that a body that ends inside another counts.
+const OPPOSITE: f64 = 0.5;
+/// Numbers that several vertices' worth of work must have before a second thread pays.
+const INLINE_VERTICES: usize = 100;
+
+/// All that is known of a template's collisions before a pose.
+pub struct Collision {
+    num_vertices: usize,
+    tree: Tree,
+    neighbourhoods: Neighbourhoods,
+}
+
+/// A vertex with opposite surface around it, or near.
+#[derive(Clone, Copy, Debug)]
+pub struct Touch {
+    pub vertex: u32,
+    pub inside: bool,
+    pub nearest: Nearest,
+}
+
+impl Collision {
+    /// Surface within `geodesic` metres of a vertex along the edges of the rest shape `vertices` is not opposite to it.
+    pub fn new(
+        mesh: &Mesh,
+        vertices: &[Vec3<f64>],
+        geodesic: f64,
+        interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Self> {
+        let wrong = |name, expected: String, got: String| Err(Error::Argument { name, expected, got });
+        if vertices.len() != mesh.num_vertices {
+            return wrong("vertices", format!("{} vertices", mesh.num_vertices), vertices.len().to_string());
+        }
+        if let Some(vertex) = vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
+            return Err(Error::TemplateNotFinite { vertex });
+        }
+        if !(geodesic >= 0.0 && geodesic.is_finite()) {
+            return wrong("geodesic", "zero metres or more".into(), geodesic.to_string());
+        }
+        let tree = Tree::new(mesh, vertices);
+        let neighbourhoods = Neighbourhoods::new(mesh, &tree, vertices, geodesic, interrupted)?;
+        Ok(Collision { num_vertices: mesh.num_vertices, tree, neighbourhoods })
+    }
+
+    pub fn num_vertices(&self) -> usize {
+        self.num_vertices
+    }
+
+    /// The body's winding number at each vertex: B·V numbers, NaN for bodies that are not finite.
+    pub fn windings_into<T: Data>(
+        &self,
+        vertices: &[T],
+        out: &mut [T],
+        interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<()> {
+        self.each(vertices, [(out, self.num_vertices)], interrupted, |body, [out]| {
+            for (out, winding) in out.iter_mut().zip(body.windings()) {
+                *out = T::of(winding);
+            }
+        })
+    }
+
+    /// How deep each vertex is inside another part, B·V metres, 0 outside; NaN for bodies that are not finite.
+    pub fn depths_into<T: Data>(
+        &self,
+        vertices: &[T],
+        out: &mut [T],
+        interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<()> {
+        self.each(vertices, [(out, self.num_vertices)], interrupted, |body, [out]| {
+            out.fill(T::zero());
+            for touch in body.touches(0.0) {
+                out[touch.vertex as usize] = T::of(touch.nearest.squared_distance.sqrt());
+            }
+        })
+    }
+
+    /// push and pull of each body, B·2 numbers, and their gradients, B·2·V·3. NaN and zero for bodies that are not finite.
+    pub fn self_contact_into<T: Data>(
+        &self,
+        contact: &SelfContact,
+        vertices: &[T],
+        out: &mut [T],
+        jacobian: &mut [T],
+        interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<()> {
+        let row = 3 * self.num_vertices;
+        self.each(vertices, [(out, 2), (jacobian, 2 * row)], interrupted, |body, [out, jacobian]| {
+            let mut gradients = [vec![zero::<f64>(); self.num_vertices], vec![zero::<f64>(); self.num_vertices]];
+            let costs =
+                contact.cost(&body.touches(contact.near), &self.tree.faces, gradients.each_mut().map(|g| &mut g[..]));
+            out.iter_mut().zip(costs).for_each(|(out, cost)| *out = T::of(cost));
+            for (own, gradient) in jacobian.chunks_exact_mut(row).zip(&gradients) {
+                own.iter_mut().zip(gradient.as_flattened()).for_each(|(own, x)| *own = T::of(*x));
+            }
+        })
+    }
+
+    /// Shows every finite body to `f`, with its rows of the outputs, which are NaN and then zero for the others.
+    fn each<T: Data, const N: usize>(
+        &self,
+        vertices: &[T],
+        outputs: [(&mut [T], usize); N],
+        interrupted: &(dyn Fn() -> bool + Sync),
+        f: impl Fn(&Posed<T>, [&mut [T]; N]) + Sync,
+    ) -> Result<()> {
+        let level = Level::current()?;
+        let mut rest = outputs.map(|(data, size)| data.chunks_exact_mut(size));
+        let bodies = vertices.chunks_exact(3 * self.num_vertices);
+        let parallel = bodies.len() * self.num_vertices >= INLINE_VERTICES;
+        let items: Vec<_> =
+            bodies.map(|body| (body, rest.each_mut().map(|rows| rows.next().expect("one row a body")))).collect();
+        threads::each(items, parallel, interrupted, &|(body, mut rows)| {
+            if body.iter().all(|x| x.value().is_finite()) {
+                return f(&Posed::new(self, body, level), rows);
+            }
+            rows.iter_mut().enumerate().for_each(|(k, row)| row.fill(T::of([f64::NAN, 0.0][k])));
+        })
+    }
+}
+
+/// A body in its pose, in coordinates of its own.
+struct Posed<'a, T> {
+    collision: &'a Collision,
+    points: Vec<Vec3<f64>>,
+    rounded: Vec<Vec3<T>>,
+    boxes: Vec<Aabb>,
+    level: Level,
+}
+
+impl<'a, T: Data> Posed<'a, T> {
+    fn new(collision: &'a Collision, vertices: &[T], level: Level) -> Self {
+        let origin = crate::scene::origin(std::array::from_fn(|k| vertices[k].value()));
+        let local = |vertex: &[T; 3]| [0, 1, 2].map(|k| vertex[k].value() - origin[k]);
+        let points: Vec<_> = vertices.as_chunks::<3>().0.iter().map(local).collect();
+        let rounded = points.iter().map(|point| point.map(T::of)).collect();
+        let boxes = collision.tree.boxes(&points);
+        Posed { collision, points, rounded, boxes, level }
+    }
+
+    fn windings(&self) -> Vec<f64> {
+        let Posed { collision, points, rounded, boxes, level } = self;
+        let work = winding::AtVertices { tree: &collision.tree, boxes, points, rounded };
+        T::enter(*level, T::widths(*level)[0], work)
+    }
+
+    /// The vertices inside another part, and those outside with opposite surface less than `near` away, ascending.
+    fn touches(&self, near: f64) -> Vec<Touch> {
+        let Collision { tree, neighbourhoods, .. } = self.collision;
+        let mut touches = Vec::new();
+        let windings = self.windings();
+        let mut vertices = tree.vertices.clone();
+        vertices.sort_unstable();
+        for vertex in vertices {
+            let at = self.points[vertex as usize];
+            let whole = |node: usize| neighbourhoods.has_node(vertex, node);
+            let single = |face: [u32; 3]| neighbourhoods.has_face(vertex, face);
+            let total = windings[vertex as usize];
+            let inside = total > INSIDE && {
+                let own = winding::of_some(tree, &self.boxes, &self.points, at, &whole, &single);
+                total - own > OPPOSITE
+            };
+            let reach = if inside { f64::INFINITY } else { near };
+            if let Some(nearest) = nearest(tree, &self.boxes, &self.points, at, reach, &whole, &single) {
+                touches.push(Touch { vertex, inside, nearest });
+            }
+        }
+        touches
+    }
+}

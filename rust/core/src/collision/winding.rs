@@ -1,0 +1,121 @@
+//! Generalised winding numbers: how often a surface goes around a point (Jacobson et al. 2013).
+//!
+//! Exact: a group of faces whose box does not hold the point is replaced by the few triangles that close it, which have the
+//! same winding number there. The solid angle of a triangle is van Oosterom and Strackee's; a triangle that has the point
+//! as its corner counts nothing. So a vertex of a surface has what the surface's inside takes up of the directions around
+//! it, between 0 and 1, and 1 more for every other part of the body that it is inside of.
+
+use super::tree::{Aabb, Tree};
+use crate::number::gate::Work;
+use crate::number::vector::{Vec3, cross, dot, sub};
+use crate::number::{Data, Real, Room, Scalar};
+use std::f64::consts::TAU;
+
+/// The winding number of the whole surface at each vertex.
+pub struct AtVertices<'a, T> {
+    pub tree: &'a Tree,
+    pub boxes: &'a [Aabb],
+    pub points: &'a [Vec3<f64>],
+    /// The same in the caller's precision.
+    pub rounded: &'a [Vec3<T>],
+}
+
+impl<T: Data> Work<T> for AtVertices<'_, T> {
+    type Output = Vec<f64>;
+
+    /// Lanes are vertices that lie beside each other: they look at the same triangles.
+    fn run<R: Real<Data = T>>(self) -> Vec<f64> {
+        let mut windings = vec![0.0; self.points.len()];
+        let mut triangles = Vec::new();
+        for group in self.tree.vertices.chunks(R::LANES) {
+            let own = Aabb::around(group.iter().map(|&vertex| self.points[vertex as usize]));
+            triangles.clear();
+            gather(self.tree, self.boxes, &own, 0, &mut triangles);
+            let vertex = |lane: usize| self.rounded[group[lane.min(group.len() - 1)] as usize];
+            let at: Vec3<R> = [0, 1, 2].map(|k| R::from_lanes(|lane| R::Scalar::read(vertex(lane)[k])));
+            let [re, im, turns] = R::apart::<SumOfAngles, _>((triangles.as_slice(), self.rounded, at));
+            for (lane, &vertex) in group.iter().enumerate() {
+                let [re, im, turns] = [re, im, turns].map(|x| x.lane(lane).value());
+                windings[vertex as usize] = im.atan2(re) / TAU + turns;
+            }
+        }
+        windings
+    }
+}
+
+/// The winding number at `at` of those faces of `node` and below that `skipped` says: of all of a node, or of a face.
+pub fn of_some(
+    tree: &Tree,
+    boxes: &[Aabb],
+    points: &[Vec3<f64>],
+    at: Vec3<f64>,
+    whole: &impl Fn(usize) -> bool,
+    single: &impl Fn([u32; 3]) -> bool,
+) -> f64 {
+    let own = Aabb::around(std::iter::once(at));
+    let (mut triangles, mut stack) = (Vec::new(), vec![0]);
+    while let Some(index) = stack.pop() {
+        let node = &tree.nodes[index];
+        match node.children {
+            _ if whole(index) => gather(tree, boxes, &own, index, &mut triangles),
+            Some(children) => stack.extend(children),
+            None => triangles.extend(tree.faces[node.faces.clone()].iter().filter(|&&face| single(face))),
+        }
+    }
+    let [re, im, turns] = f64::apart::<SumOfAngles, _>((triangles.as_slice(), points, at));
+    im.atan2(re) / TAU + turns
+}
+
+/// The triangles that stand for `node`, seen from anywhere in a box.
+fn gather(tree: &Tree, boxes: &[Aabb], from: &Aabb, node: usize, triangles: &mut Vec<[u32; 3]>) {
+    let mut stack = vec![node];
+    while let Some(index) = stack.pop() {
+        let node = &tree.nodes[index];
+        if boxes[index].is_apart_from(from) {
+            triangles.extend_from_slice(&tree.closures[node.closure.clone()]);
+        } else if let Some(children) = node.children {
+            stack.extend(children);
+        } else {
+            triangles.extend_from_slice(&tree.faces[node.faces.clone()]);
+        }
+    }
+}
+
+/// Half the triangles' solid angles, added up as complex numbers are multiplied: (re, im) points along the sum, and whole
+/// turns are counted. No arc tangents but the last.
+struct SumOfAngles;
+
+impl<R: Real> Room<(&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)> for SumOfAngles {
+    type Output = [R; 3];
+
+    #[inline(always)]
+    fn enter((triangles, points, at): (&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)) -> [R; 3] {
+        let (zero, one, tiny) = (R::zero(), R::of(1.0), R::of(1e-37));
+        let (mut re, mut im, mut turns) = (one, zero, zero);
+        for triangle in triangles {
+            let a = seen_from(at, points[triangle[0] as usize]);
+            let b = seen_from(at, points[triangle[1] as usize]);
+            let c = seen_from(at, points[triangle[2] as usize]);
+            let (la, lb, lc) = (dot(a, a).sqrt(), dot(b, b).sqrt(), dot(c, c).sqrt());
+            let y = dot(a, cross(b, c));
+            let x = la * lb * lc + (dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+            // A corner, or a point of an edge, sees no angle.
+            let nothing = x.abs() + y.abs() - tiny;
+            let (x, y) = (nothing.if_negative(one, x), nothing.if_negative(zero, y));
+            let (next_re, next_im) = (re * x - im * y, re * y + im * x);
+            // Two angles above the axis have a sum below it, or the other way round: it went past half a turn.
+            let down = next_im.if_negative(one, zero);
+            let above = im.if_negative(zero, y.if_negative(zero, one));
+            let below = im.if_negative(y.if_negative(one, zero), zero);
+            turns = turns + above * down - below * (one - down);
+            let size = one / (next_re.abs() + next_im.abs());
+            (re, im) = (next_re * size, next_im * size);
+        }
+        [re, im, turns]
+    }
+}
+
+#[inline(always)]
+fn seen_from<R: Real>(at: Vec3<R>, point: Vec3<R::Data>) -> Vec3<R> {
+    sub([R::splat(point[0]), R::splat(point[1]), R::splat(point[2])], at)
+}
