@@ -64,6 +64,10 @@ fn edges(mesh: &Mesh, vertices: &[Vec3<f64>]) -> Vec<Vec<(u32, f64)>> {
             edges[b as usize].push((a, length));
         }
     }
+    for row in &mut edges {
+        row.sort_unstable_by_key(|(vertex, _)| *vertex);
+        row.dedup_by_key(|(vertex, _)| *vertex);
+    }
     edges
 }
 

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::number::Data;
 use crate::number::gate::Level;
-use crate::number::vector::{Vec3, zero};
+use crate::number::vector::{Vec3, cross, dot, sub, zero};
 use crate::threads;
 use contact::SelfContact;
 use geodesic::Neighbourhoods;
@@ -26,6 +26,12 @@ use tree::{Aabb, Tree};
 pub const INSIDE: f64 = 0.99;
 /// The share of opposite surface in it: half of the directions, so that a body that ends inside another counts.
 const OPPOSITE: f64 = 0.5;
+/// Winding numbers nearer than this to a decision are looked at once more in double precision: single precision is right
+/// to 1e-4.
+const CLOSE: f64 = 0.01;
+/// The cosine between the way out to the nearest opposite surface and the surface's normal. Less, and it is the rim of
+/// the vertex's own neighbourhood that is nearest: no way out, but where the opposite begins.
+const FACING: f64 = 0.5;
 /// Numbers that several vertices' worth of work must have before a second thread pays.
 const INLINE_VERTICES: usize = 100;
 
@@ -79,7 +85,7 @@ impl Collision {
         interrupted: &(dyn Fn() -> bool + Sync),
     ) -> Result<()> {
         self.each(vertices, [(out, self.num_vertices)], interrupted, |body, [out]| {
-            for (out, winding) in out.iter_mut().zip(body.windings()) {
+            for (out, winding) in out.iter_mut().zip(body.windings::<T>()) {
                 *out = T::of(winding);
             }
         })
@@ -127,7 +133,7 @@ impl Collision {
         vertices: &[T],
         outputs: [(&mut [T], usize); N],
         interrupted: &(dyn Fn() -> bool + Sync),
-        f: impl Fn(&Posed<T>, [&mut [T]; N]) + Sync,
+        f: impl Fn(&Posed, [&mut [T]; N]) + Sync,
     ) -> Result<()> {
         let level = Level::current()?;
         let mut rest = outputs.map(|(data, size)| data.chunks_exact_mut(size));
@@ -145,51 +151,69 @@ impl Collision {
 }
 
 /// A body in its pose, in coordinates of its own.
-struct Posed<'a, T> {
+struct Posed<'a> {
     collision: &'a Collision,
     points: Vec<Vec3<f64>>,
-    rounded: Vec<Vec3<T>>,
     boxes: Vec<Aabb>,
     level: Level,
 }
 
-impl<'a, T: Data> Posed<'a, T> {
-    fn new(collision: &'a Collision, vertices: &[T], level: Level) -> Self {
+impl<'a> Posed<'a> {
+    fn new<T: Data>(collision: &'a Collision, vertices: &[T], level: Level) -> Self {
         let origin = crate::scene::origin(std::array::from_fn(|k| vertices[k].value()));
         let local = |vertex: &[T; 3]| [0, 1, 2].map(|k| vertex[k].value() - origin[k]);
         let points: Vec<_> = vertices.as_chunks::<3>().0.iter().map(local).collect();
-        let rounded = points.iter().map(|point| point.map(T::of)).collect();
         let boxes = collision.tree.boxes(&points);
-        Posed { collision, points, rounded, boxes, level }
+        Posed { collision, points, boxes, level }
     }
 
-    fn windings(&self) -> Vec<f64> {
-        let Posed { collision, points, rounded, boxes, level } = self;
-        let work = winding::AtVertices { tree: &collision.tree, boxes, points, rounded };
+    fn windings<T: Data>(&self) -> Vec<f64> {
+        let Posed { collision, points, boxes, level } = self;
+        let rounded: Vec<_> = points.iter().map(|point| point.map(T::of)).collect();
+        let work = winding::AtVertices { tree: &collision.tree, boxes, points, rounded: &rounded };
         T::enter(*level, T::widths(*level)[0], work)
+    }
+
+    /// Whether a vertex with this winding number is inside another part.
+    fn is_inside(&self, vertex: u32, winding: f64) -> bool {
+        let Collision { tree, neighbourhoods, .. } = self.collision;
+        let at = self.points[vertex as usize];
+        let sum = |whole: &dyn Fn(usize) -> bool, single: &dyn Fn([u32; 3]) -> bool| {
+            winding::of_some(tree, &self.boxes, &self.points, at, &whole, &single)
+        };
+        let decided = (winding - INSIDE).abs() > CLOSE;
+        let winding = if decided { winding } else { sum(&|_| true, &|_| true) };
+        let own = || sum(&|node| neighbourhoods.has_node(vertex, node), &|face| neighbourhoods.has_face(vertex, face));
+        winding > INSIDE && winding - own() > OPPOSITE
     }
 
     /// The vertices inside another part, and those outside with opposite surface less than `near` away, ascending.
     fn touches(&self, near: f64) -> Vec<Touch> {
         let Collision { tree, neighbourhoods, .. } = self.collision;
         let mut touches = Vec::new();
-        let windings = self.windings();
+        let windings = self.windings::<f32>();
         let mut vertices = tree.vertices.clone();
         vertices.sort_unstable();
         for vertex in vertices {
             let at = self.points[vertex as usize];
             let whole = |node: usize| neighbourhoods.has_node(vertex, node);
             let single = |face: [u32; 3]| neighbourhoods.has_face(vertex, face);
-            let total = windings[vertex as usize];
-            let inside = total > INSIDE && {
-                let own = winding::of_some(tree, &self.boxes, &self.points, at, &whole, &single);
-                total - own > OPPOSITE
-            };
+            let inside = self.is_inside(vertex, windings[vertex as usize]);
             let reach = if inside { f64::INFINITY } else { near };
-            if let Some(nearest) = nearest(tree, &self.boxes, &self.points, at, reach, &whole, &single) {
-                touches.push(Touch { vertex, inside, nearest });
-            }
+            let found = nearest(tree, &self.boxes, &self.points, at, reach, &whole, &single);
+            touches.extend(found.filter(|nearest| !inside || self.leads_out(nearest)).map(|nearest| Touch {
+                vertex,
+                inside,
+                nearest,
+            }));
         }
         touches
+    }
+
+    /// Whether the way to the nearest point leaves the surface there.
+    fn leads_out(&self, nearest: &Nearest) -> bool {
+        let [a, b, c] = self.collision.tree.faces[nearest.face].map(|corner| self.points[corner as usize]);
+        let normal = cross(sub(b, a), sub(c, a));
+        -dot(normal, nearest.offset) >= FACING * (dot(normal, normal) * nearest.squared_distance).sqrt()
     }
 }
