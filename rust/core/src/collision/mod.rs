@@ -21,6 +21,7 @@ use contact::SelfContact;
 use geodesic::Neighbourhoods;
 use nearest::{Nearest, nearest};
 use tree::{Aabb, Tree};
+use winding::OfTriangles;
 
 /// The body's winding number above which a vertex is inside another part.
 pub const INSIDE: f64 = 0.99;
@@ -178,13 +179,24 @@ impl<'a> Posed<'a> {
     fn is_inside(&self, vertex: u32, winding: f64) -> bool {
         let Collision { tree, neighbourhoods, .. } = self.collision;
         let at = self.points[vertex as usize];
-        let sum = |whole: &dyn Fn(usize) -> bool, single: &dyn Fn([u32; 3]) -> bool| {
-            winding::of_some(tree, &self.boxes, &self.points, at, &whole, &single)
+        let sum = |triangles: &[[u32; 3]], precisely: bool| {
+            let work = OfTriangles { triangles, points: &self.points, at };
+            if precisely { work.sum::<f64>(self.level) } else { work.sum::<f32>(self.level) }
         };
-        let decided = (winding - INSIDE).abs() > CLOSE;
-        let winding = if decided { winding } else { sum(&|_| true, &|_| true) };
-        let own = || sum(&|node| neighbourhoods.has_node(vertex, node), &|face| neighbourhoods.has_face(vertex, face));
-        winding > INSIDE && winding - own() > OPPOSITE
+        let own = || {
+            let whole = |node: usize| neighbourhoods.has_node(vertex, node);
+            let single = |face: [u32; 3]| neighbourhoods.has_face(vertex, face);
+            winding::of_some(tree, &self.boxes, at, &whole, &single)
+        };
+        let all = || winding::of_some(tree, &self.boxes, at, &|_| true, &|_| true);
+        let is_close = |winding: f64, limit: f64| !((winding - limit).abs() > CLOSE); // NaN is, too
+        let winding = if is_close(winding, INSIDE) { sum(&all(), true) } else { winding };
+        if !(winding > INSIDE) {
+            return false;
+        }
+        let own = own();
+        let opposite = winding - sum(&own, false);
+        if is_close(opposite, OPPOSITE) { sum(&all(), true) - sum(&own, true) > OPPOSITE } else { opposite > OPPOSITE }
     }
 
     /// The vertices inside another part, and those outside with opposite surface less than `near` away, ascending.

@@ -6,7 +6,7 @@
 //! it, between 0 and 1, and 1 more for every other part of the body that it is inside of.
 
 use super::tree::{Aabb, Tree};
-use crate::number::gate::Work;
+use crate::number::gate::{Level, Work};
 use crate::number::vector::{Vec3, cross, dot, sub};
 use crate::number::{Data, Real, Room, Scalar};
 use std::f64::consts::TAU;
@@ -43,15 +43,50 @@ impl<T: Data> Work<T> for AtVertices<'_, T> {
     }
 }
 
-/// The winding number at `at` of those faces of `node` and below that `skipped` says: of all of a node, or of a face.
+/// The winding number of some triangles at one point. Lanes are triangles.
+pub struct OfTriangles<'a> {
+    pub triangles: &'a [[u32; 3]],
+    pub points: &'a [Vec3<f64>],
+    pub at: Vec3<f64>,
+}
+
+impl OfTriangles<'_> {
+    /// The same in a precision of choice.
+    pub fn sum<T: Data>(self, level: Level) -> f64 {
+        T::enter(level, T::widths(level)[0], self)
+    }
+}
+
+impl<T: Data> Work<T> for OfTriangles<'_> {
+    type Output = f64;
+
+    fn run<R: Real<Data = T>>(self) -> f64 {
+        let share = self.triangles.len().div_ceil(R::LANES);
+        let mut numbers = vec![T::zero(); 9 * share * R::LANES];
+        for (corner, numbers) in self.triangles.as_flattened().iter().zip(numbers.as_chunks_mut::<3>().0) {
+            *numbers = sub(self.points[*corner as usize], self.at).map(T::of);
+        }
+        let lane = |lane: usize| &numbers[9 * share * lane..][..9 * share];
+        let rows: Vec<_> = (0..R::LANES).map(lane).collect();
+        let mut corners = vec![R::zero(); 9 * share];
+        for (k, corner) in corners.iter_mut().enumerate() {
+            *corner = R::from_lanes(|lane| R::Scalar::read(rows[lane][k]));
+        }
+        let [re, im, turns] = R::apart::<SumOfLanes, _>(corners.as_chunks::<3>().0.as_chunks::<3>().0);
+        let winding = |lane: usize| im.lane(lane).value().atan2(re.lane(lane).value()) / TAU + turns.lane(lane).value();
+        (0..R::LANES).map(winding).sum()
+    }
+}
+
+/// Triangles with the winding number that the faces have at `at` for which `whole` says so of all of a node, or `single` of
+/// one face.
 pub fn of_some(
     tree: &Tree,
     boxes: &[Aabb],
-    points: &[Vec3<f64>],
     at: Vec3<f64>,
     whole: &impl Fn(usize) -> bool,
     single: &impl Fn([u32; 3]) -> bool,
-) -> f64 {
+) -> Vec<[u32; 3]> {
     let own = Aabb::around(std::iter::once(at));
     let (mut triangles, mut stack) = (Vec::new(), vec![0]);
     while let Some(index) = stack.pop() {
@@ -62,8 +97,7 @@ pub fn of_some(
             None => triangles.extend(tree.faces[node.faces.clone()].iter().filter(|&&face| single(face))),
         }
     }
-    let [re, im, turns] = f64::apart::<SumOfAngles, _>((triangles.as_slice(), points, at));
-    im.atan2(re) / TAU + turns
+    triangles
 }
 
 /// The triangles that stand for `node`, seen from anywhere in a box.
@@ -81,8 +115,7 @@ fn gather(tree: &Tree, boxes: &[Aabb], from: &Aabb, node: usize, triangles: &mut
     }
 }
 
-/// Half the triangles' solid angles, added up as complex numbers are multiplied: (re, im) points along the sum, and whole
-/// turns are counted. No arc tangents but the last.
+/// Half the solid angles of triangles seen from the points of lanes.
 struct SumOfAngles;
 
 impl<R: Real> Room<(&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)> for SumOfAngles {
@@ -90,29 +123,52 @@ impl<R: Real> Room<(&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)> for SumOfAngles {
 
     #[inline(always)]
     fn enter((triangles, points, at): (&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)) -> [R; 3] {
-        let (zero, one, tiny) = (R::zero(), R::of(1.0), R::of(1e-37));
-        let (mut re, mut im, mut turns) = (one, zero, zero);
+        let mut sum = [R::of(1.0), R::zero(), R::zero()];
         for triangle in triangles {
             let a = seen_from(at, points[triangle[0] as usize]);
             let b = seen_from(at, points[triangle[1] as usize]);
             let c = seen_from(at, points[triangle[2] as usize]);
-            let (la, lb, lc) = (dot(a, a).sqrt(), dot(b, b).sqrt(), dot(c, c).sqrt());
-            let y = dot(a, cross(b, c));
-            let x = la * lb * lc + (dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
-            // A corner, or a point of an edge, sees no angle.
-            let nothing = x.abs() + y.abs() - tiny;
-            let (x, y) = (nothing.if_negative(one, x), nothing.if_negative(zero, y));
-            let (next_re, next_im) = (re * x - im * y, re * y + im * x);
-            // Two angles above the axis have a sum below it, or the other way round: it went past half a turn.
-            let down = next_im.if_negative(one, zero);
-            let above = im.if_negative(zero, y.if_negative(zero, one));
-            let below = im.if_negative(y.if_negative(one, zero), zero);
-            turns = turns + above * down - below * (one - down);
-            let size = one / (next_re.abs() + next_im.abs());
-            (re, im) = (next_re * size, next_im * size);
+            add_angle(&mut sum, [a, b, c]);
         }
-        [re, im, turns]
+        sum
     }
+}
+
+/// The same of triangles on lanes, seen from the origin.
+struct SumOfLanes;
+
+impl<R: Real> Room<&[[Vec3<R>; 3]]> for SumOfLanes {
+    type Output = [R; 3];
+
+    #[inline(always)]
+    fn enter(triangles: &[[Vec3<R>; 3]]) -> [R; 3] {
+        let mut sum = [R::of(1.0), R::zero(), R::zero()];
+        for triangle in triangles {
+            add_angle(&mut sum, *triangle);
+        }
+        sum
+    }
+}
+
+/// Angles are added up as complex numbers are multiplied: (re, im) points along the sum, and whole turns are counted. No
+/// arc tangents but one at the end.
+#[inline(always)]
+fn add_angle<R: Real>(sum: &mut [R; 3], [a, b, c]: [Vec3<R>; 3]) {
+    let [re, im, turns] = *sum;
+    let (zero, one, tiny) = (R::zero(), R::of(1.0), R::of(1e-37));
+    let (la, lb, lc) = (dot(a, a).sqrt(), dot(b, b).sqrt(), dot(c, c).sqrt());
+    let y = dot(a, cross(b, c));
+    let x = la * lb * lc + (dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+    // A corner, or a point of an edge, sees no angle.
+    let nothing = x.abs() + y.abs() - tiny;
+    let (x, y) = (nothing.if_negative(one, x), nothing.if_negative(zero, y));
+    let (next_re, next_im) = (re * x - im * y, re * y + im * x);
+    // Two angles above the axis have a sum below it, or the other way round: it went past half a turn.
+    let down = next_im.if_negative(one, zero);
+    let above = im.if_negative(zero, y.if_negative(zero, one));
+    let below = im.if_negative(y.if_negative(one, zero), zero);
+    let size = one / (next_re.abs() + next_im.abs());
+    *sum = [next_re * size, next_im * size, turns + above * down - below * (one - down)];
 }
 
 #[inline(always)]
