@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 INSIDE = 0.99
 OPPOSITE = 0.5
+FACING = 0.5
 SIDE = 256  # vertices at a time
 
 
@@ -29,20 +30,30 @@ def self_contact_loss(
     faces = torch.as_tensor(template.faces.copy(), device=vertices.device)
     skipped = own_faces(template, geodesic).to(vertices.device)
     rows = []
-    for body in vertices:
+    for given in vertices:
+        finite = given.isfinite().all()
+        body = torch.where(finite, given, 0)
         with torch.no_grad():
-            broken = not bool(body.isfinite().all())
-            inside, face, weights = _nearest_opposite(torch.zeros_like(body) if broken else body, faces, skipped)
+            inside, face, weights = _nearest_opposite(body, faces, skipped)
+            normal = (_normals(body, faces)[faces[face]] * weights[..., None]).sum(dim=-2)
         nearest = (body[faces[face]] * weights[..., None]).sum(dim=-2)
         squared = (body - nearest).square().sum(dim=-1)
         distance = torch.where(squared > 0, squared, 1).sqrt() * (squared > 0)
-        found = face >= 0
+        out = ((nearest - body) * normal).sum(dim=-1) >= FACING * normal.norm(dim=-1) * distance
+        found = (face >= 0) & (out | ~inside)
         push = (distance / push_width).tanh().square() * (inside & found)
         pull = (distance / pull_width).tanh().square() * (~inside & found & (distance < near))
         both = torch.stack([0.5 * push.sum(), 0.5 * pull_weight * pull.sum()])
-        rows.append(torch.full_like(both, math.nan) if broken else both)
+        rows.append(torch.where(finite, both, math.nan))
     both = torch.stack(rows) if rows else vertices.new_zeros(0, 2)
     return both[:, 0], both[:, 1]
+
+
+def _normals(body: Tensor, faces: Tensor) -> Tensor:
+    """Unit normals of the vertices: (V, 3)."""
+    a, b, c = body[faces].unbind(dim=-2)
+    areas = torch.linalg.cross(b - a, c - a).repeat_interleave(3, dim=0)
+    return torch.nn.functional.normalize(torch.zeros_like(body).index_add(0, faces.flatten(), areas), eps=1e-300)
 
 
 def own_faces(template: BodyTemplate, geodesic: float) -> Tensor:

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::number::Data;
 use crate::number::gate::Level;
-use crate::number::vector::{Vec3, cross, dot, sub, zero};
+use crate::number::vector::{Vec3, add_scaled, cross, dot, scale, sub, zero};
 use crate::threads;
 use contact::SelfContact;
 use geodesic::Neighbourhoods;
@@ -30,7 +30,7 @@ const OPPOSITE: f64 = 0.5;
 /// Winding numbers nearer than this to a decision are looked at once more in double precision: single precision is right
 /// to 1e-4.
 const CLOSE: f64 = 0.01;
-/// The cosine between the way out to the nearest opposite surface and the surface's normal. Less, and it is the rim of
+/// The cosine between the way to the nearest opposite surface and the way out there. Less, and it is the rim of
 /// the vertex's own neighbourhood that is nearest: no way out, but where the opposite begins.
 const FACING: f64 = 0.5;
 /// Numbers that several vertices' worth of work must have before a second thread pays.
@@ -156,6 +156,8 @@ struct Posed<'a> {
     collision: &'a Collision,
     points: Vec<Vec3<f64>>,
     boxes: Vec<Aabb>,
+    /// Of the vertices, outwards, of length 1.
+    normals: Vec<Vec3<f64>>,
     level: Level,
 }
 
@@ -165,11 +167,12 @@ impl<'a> Posed<'a> {
         let local = |vertex: &[T; 3]| [0, 1, 2].map(|k| vertex[k].value() - origin[k]);
         let points: Vec<_> = vertices.as_chunks::<3>().0.iter().map(local).collect();
         let boxes = collision.tree.boxes(&points);
-        Posed { collision, points, boxes, level }
+        let normals = normals(&collision.tree.faces, &points);
+        Posed { collision, points, boxes, normals, level }
     }
 
     fn windings<T: Data>(&self) -> Vec<f64> {
-        let Posed { collision, points, boxes, level } = self;
+        let Posed { collision, points, boxes, level, .. } = self;
         let rounded: Vec<_> = points.iter().map(|point| point.map(T::of)).collect();
         let work = winding::AtVertices { tree: &collision.tree, boxes, points, rounded: &rounded };
         T::enter(*level, T::widths(*level)[0], work)
@@ -222,10 +225,29 @@ impl<'a> Posed<'a> {
         touches
     }
 
-    /// Whether the way to the nearest point leaves the surface there.
+    /// Whether the way to the nearest point leaves the surface there. The normal is one of the point, not of the face, for
+    /// on an edge it is chance which of its faces is found.
     fn leads_out(&self, nearest: &Nearest) -> bool {
-        let [a, b, c] = self.collision.tree.faces[nearest.face].map(|corner| self.points[corner as usize]);
-        let normal = cross(sub(b, a), sub(c, a));
+        let mut normal = zero();
+        for (&corner, weight) in self.collision.tree.faces[nearest.face].iter().zip(nearest.weights) {
+            add_scaled(&mut normal, weight, self.normals[corner as usize]);
+        }
         -dot(normal, nearest.offset) >= FACING * (dot(normal, normal) * nearest.squared_distance).sqrt()
     }
+}
+
+fn normals(faces: &[[u32; 3]], points: &[Vec3<f64>]) -> Vec<Vec3<f64>> {
+    let mut normals = vec![zero(); points.len()];
+    for &face in faces {
+        let [a, b, c] = face.map(|corner| points[corner as usize]);
+        let area = cross(sub(b, a), sub(c, a));
+        face.iter().for_each(|&corner| add_scaled(&mut normals[corner as usize], 1.0, area));
+    }
+    for normal in &mut normals {
+        let length = dot(*normal, *normal).sqrt();
+        if length > 0.0 {
+            *normal = scale(1.0 / length, *normal);
+        }
+    }
+    normals
 }

@@ -175,3 +175,75 @@ fn add_angle<R: Real>(sum: &mut [R; 3], [a, b, c]: [Vec3<R>; 3]) {
 fn seen_from<R: Real>(at: Vec3<R>, point: Vec3<R::Data>) -> Vec3<R> {
     sub([R::splat(point[0]), R::splat(point[1]), R::splat(point[2])], at)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Mesh;
+
+    /// A torus of 20 × 12 quads.
+    fn torus() -> (Mesh, Vec<Vec3<f64>>) {
+        let (around, across) = (20, 12);
+        let mut points = Vec::new();
+        let mut faces = Vec::new();
+        for i in 0..around {
+            for j in 0..across {
+                let (u, v) = (TAU * i as f64 / around as f64, TAU * j as f64 / across as f64);
+                let radius = 0.6 + 0.2 * v.cos();
+                points.push([radius * u.cos(), radius * u.sin(), 0.2 * v.sin()]);
+                let at = |i: usize, j: usize| ((i % around) * across + j % across) as i64;
+                faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                faces.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+        (Mesh::new(points.len(), &faces, &[]).unwrap(), points)
+    }
+
+    /// Winding numbers by the arc tangent of every face.
+    fn plainly(faces: &[[u32; 3]], points: &[Vec3<f64>], at: Vec3<f64>) -> f64 {
+        let angle = |face: &[u32; 3]| {
+            let [a, b, c] = face.map(|corner| sub(points[corner as usize], at));
+            let [la, lb, lc] = [a, b, c].map(|x| dot(x, x).sqrt());
+            let beside = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+            dot(a, cross(b, c)).atan2(beside) / TAU
+        };
+        faces.iter().map(angle).sum()
+    }
+
+    #[test]
+    fn short_cuts_change_nothing() {
+        let (mesh, points) = torus();
+        let tree = Tree::new(&mesh, &points);
+        let boxes = tree.boxes(&points);
+        for (at, expected) in
+            [([0.6, 0.0, 0.05], 1.0), ([0.0, 0.0, 0.0], 0.0), ([-0.5, 0.31, -0.02], 1.0), ([2.0; 3], 0.0)]
+        {
+            let all = of_some(&tree, &boxes, at, &|_| true, &|_| true);
+            assert!(all.len() < mesh.faces.len());
+            let work = || OfTriangles { triangles: &all, points: &points, at };
+            for level in Level::available() {
+                assert!((work().sum::<f64>(level) - expected).abs() < 1e-13);
+                assert!((work().sum::<f32>(level) - expected).abs() < 1e-5);
+            }
+            let half = |face: [u32; 3]| face[0] % 2 == 0;
+            let some = of_some(&tree, &boxes, at, &|_| false, &half);
+            let work = OfTriangles { triangles: &some, points: &points, at };
+            let faces: Vec<_> = mesh.faces.iter().copied().filter(|&face| half(face)).collect();
+            assert!((work.sum::<f64>(Level::Scalar) - plainly(&faces, &points, at)).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn a_vertex_sees_the_inside_of_its_own_surface() {
+        let (mesh, points) = torus();
+        let tree = Tree::new(&mesh, &points);
+        let boxes = tree.boxes(&points);
+        for level in Level::available() {
+            let work = AtVertices { tree: &tree, boxes: &boxes, points: &points, rounded: &points };
+            for (winding, &at) in f64::enter(level, 1, work).iter().zip(&points) {
+                assert!((winding - plainly(&mesh.faces, &points, at)).abs() < 1e-13);
+                assert!((0.3..0.7).contains(winding));
+            }
+        }
+    }
+}
