@@ -1,4 +1,4 @@
-"""Self-penetration and the cost of self-contact: libigl's winding numbers, two balls, people with arms in their trunk."""
+"""Self-penetration and the cost of self-contact: libigl's winding numbers, balls, arms in a trunk."""
 
 from __future__ import annotations
 

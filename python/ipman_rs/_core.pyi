@@ -65,7 +65,7 @@ class Collision:
     def self_contact(
         self, vertices: NDArray[_Float], options: Sequence[float]
     ) -> tuple[NDArray[_Float], NDArray[_Float]]:
-        """push and pull (B, 2), and their gradients (B, 2, V, 3). options: push_width, pull_width, pull_weight, near."""
+        """push and pull (B, 2), their gradients (B, 2, V, 3). options: push_width, pull_width, pull_weight, near."""
 
 # Pose (n, J, 3 or 6), betas (n, k), expression (n, k) and translation (n, 3), or directions or gradients of these, in
 # the skin's dtype; n is the batch, or 1 where all bodies share a parameter. None: not given, or not asked for.

@@ -1,7 +1,8 @@
 """A body's contact with itself: which vertices are inside another part of it, and what that and near misses cost.
 
-A vertex is inside another part where the body's winding number is above 0.99 and at least half of it comes from opposite
-surface: faces farther than `geodesic` metres from the vertex along the edges of the template's rest shape.
+A vertex is inside another part where the body's winding number is above 0.99, at least 0.5 of it from opposite surface,
+and the way to the nearest opposite point leads out there. Opposite is what is farther than `geodesic` metres from the
+vertex along the edges of the template's rest shape.
 """
 
 from __future__ import annotations
@@ -22,8 +23,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SelfPenetration:
-    """depth: (..., V) m from each vertex inside another part to that part's surface, 0 for the others, NaN in a body that
-    is not finite. inside: (..., V) bool. num_inside: (...,). deepest: (...,) m."""
+    """What is inside another part of the same body.
+
+    depth: (..., V) m to the nearest opposite surface, 0 for vertices outside, NaN in a body that is not finite.
+    inside: (..., V).
+    num_inside: (...,) vertices.
+    deepest: (...,) m, the largest depth.
+    """
 
     depth: NDArray[Any]
     inside: NDArray[np.bool_]

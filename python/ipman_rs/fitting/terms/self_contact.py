@@ -2,7 +2,7 @@
 
     ½ Σ_inside tanh²(d / 0.04 m)  +  0.005 · ½ Σ_near tanh²(d / 0.005 m)
 
-d the distance of a vertex to the nearest surface that is not its own neighbourhood; sums over vertices, as in SMPLify-XMC.
+d the distance of a vertex to the nearest surface outside its own neighbourhood; sums over vertices, as in SMPLify-XMC.
 """
 
 from __future__ import annotations

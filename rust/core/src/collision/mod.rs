@@ -33,7 +33,7 @@ const CLOSE: f64 = 0.01;
 /// The cosine between the way to the nearest opposite surface and the way out there. Less, and it is the rim of
 /// the vertex's own neighbourhood that is nearest: no way out, but where the opposite begins.
 const FACING: f64 = 0.5;
-/// Numbers that several vertices' worth of work must have before a second thread pays.
+/// So many vertices must there be in all before a second thread pays.
 const INLINE_VERTICES: usize = 100;
 
 /// All that is known of a template's collisions before a pose.
@@ -192,9 +192,9 @@ impl<'a> Posed<'a> {
             winding::of_some(tree, &self.boxes, at, &whole, &single)
         };
         let all = || winding::of_some(tree, &self.boxes, at, &|_| true, &|_| true);
-        let is_close = |winding: f64, limit: f64| !((winding - limit).abs() > CLOSE); // NaN is, too
+        let is_close = |winding: f64, limit: f64| winding.is_nan() || (winding - limit).abs() <= CLOSE;
         let winding = if is_close(winding, INSIDE) { sum(&all(), true) } else { winding };
-        if !(winding > INSIDE) {
+        if winding.is_nan() || winding <= INSIDE {
             return false;
         }
         let own = own();
