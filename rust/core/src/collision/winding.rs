@@ -180,6 +180,7 @@ fn seen_from<R: Real>(at: Vec3<R>, point: Vec3<R::Data>) -> Vec3<R> {
 mod tests {
     use super::*;
     use crate::mesh::Mesh;
+    use crate::number::gate::Gates;
 
     /// A torus of 20 × 12 quads.
     fn torus() -> (Mesh, Vec<Vec3<f64>>) {
