@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from functools import cached_property
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -21,6 +23,7 @@ class Candidate:
     def __init__(self, problem: Problem, variables: Variables):
         self.problem = problem
         self.variables = variables
+        self._shared: dict[Hashable, Any] = {}
 
     @cached_property
     def full_pose(self) -> Tensor:
@@ -58,3 +61,9 @@ class Candidate:
     def projected(self) -> Tensor:
         """The landmarks (B, K, 2), pixels."""
         return self.camera.project(self.landmarks)
+
+    def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """What `make` returns, made once: for terms that look at the same quantity."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        return self._shared[key]

@@ -22,6 +22,9 @@ class Term(ABC):
     def __init__(self, problem: Problem):
         self.problem = problem
 
+    def begin(self, candidate: Candidate) -> None:  # noqa: B027  most terms have nothing to note
+        """Called with the bodies that a stage starts from, before its first evaluation."""
+
     @abstractmethod
     def cost(self, candidate: Candidate) -> Tensor:
         """(B,), ≥ 0."""

@@ -1,0 +1,85 @@
+"""Named points of a body: its joints, points of its skin, and midpoints.
+
+Posing them costs microseconds: a body model is cut down to the few vertices that are asked for.
+
+Joints have the names of the body model (`left_knee`, `head`, `left_index1`, ...), points of the skin those of `surface`
+and, optionally, of `sites` that the caller brings (markers). `mid_hip` and `mid_shoulder` are midpoints of joints;
+keypoint sets call the latter "neck", which here is the joint of that name.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import torch
+from torch import Tensor
+
+import ipman_rs.torch as ipt
+from ipman_rs.body import BodyModel
+
+from .surface import skin_points
+
+MIDPOINTS = {"mid_hip": ("left_hip", "right_hip"), "mid_shoulder": ("left_shoulder", "right_shoulder")}
+
+
+@dataclasses.dataclass(frozen=True)
+class Site:
+    """A point at a vertex of the skin, moved by `shift`, m in the frame of the resting mesh (`body.v_template`)."""
+
+    vertex: int
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class Landmarks:
+    """The points `names` of bodies of one model. ValueError for a name that the body does not have.
+
+    `names`: all of `known(body)` if None.
+    """
+
+    def __init__(
+        self, body: ipt.BodyModel, names: Iterable[str] | None = None, sites: Mapping[str, Site] | None = None
+    ):
+        full = body.body
+        skin = {name: Site(vertex) for name, vertex in skin_points(full).items()}
+        skin = {name: site for name, site in skin.items() if name not in full.joint_names} | dict(sites or {})
+        self.names = known(full, sites or ()) if names is None else tuple(names)
+        ends = [MIDPOINTS.get(name, (name, name)) for name in self.names]
+        used = list(dict.fromkeys(name for pair in ends for name in pair if name in skin))
+        rows = {name: row for row, name in enumerate(used)}
+        rows |= {name: max(len(used), 1) + j for j, name in enumerate(full.joint_names) if name not in rows}
+        unknown = [name for pair in ends for name in pair if name not in rows]
+        if unknown:
+            raise ValueError(
+                f"names: the body {full.name!r} has no landmark {unknown[0]!r}; it has {', '.join(known(full))}"
+            )
+        device = body.v_template.device
+        self.points = ipt.BodyModel(_cut(full, [skin[name] for name in used] or [Site(0)]), body.dtype).to(device)
+        self.ends = [torch.tensor([rows[pair[end]] for pair in ends], device=device) for end in (0, 1)]
+
+    def __call__(self, full_pose: Tensor, betas: Tensor | None = None, transl: Tensor | None = None) -> Tensor:
+        """The points (B, K, 3) m of bodies with `full_pose` (B, J, 3), `betas` (B, b), `transl` (B, 3)."""
+        posed = self.points(full_pose, betas, transl)
+        points = torch.cat([posed.vertices, posed.joints], dim=-2)
+        return 0.5 * (points.index_select(-2, self.ends[0]) + points.index_select(-2, self.ends[1]))
+
+
+def known(body: BodyModel, sites: Iterable[str] = ()) -> tuple[str, ...]:
+    """All names that a body has."""
+    return tuple(dict.fromkeys([*body.joint_names, *MIDPOINTS, *skin_points(body), *sites]))
+
+
+def _cut(body: BodyModel, sites: list[Site]) -> BodyModel:
+    """The body with these points for vertices, and no faces."""
+    rows = np.array([site.vertex for site in sites])
+    return dataclasses.replace(
+        body,
+        name=f"{body.name}, {len(rows)} points",
+        v_template=body.v_template[rows] + np.array([site.shift for site in sites]),
+        shapedirs=body.shapedirs[rows],
+        expressiondirs=body.expressiondirs[rows],
+        posedirs=None if body.posedirs is None else body.posedirs[rows],
+        weights=body.weights[rows],
+        faces=np.zeros((0, 3), np.int64),
+    )
