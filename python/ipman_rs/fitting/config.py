@@ -12,6 +12,7 @@ from .terms import TERMS
 from .variables import BLOCKS
 
 FOLDER = Path(__file__).parent / "presets"
+PRESENTED = ("presented_pose", "presented_contact")  # terms that need a presented pose
 PRESETS = tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
 
 
@@ -35,6 +36,11 @@ class Config:
     stages: tuple[Stage, ...]
     terms: Mapping[str, Mapping[str, Any]]
     start: Mapping[str, Any]
+
+
+def presents(config: Config) -> bool:
+    """Whether a stage needs the pose that the person was shown."""
+    return any(stage.weights.get(name, 0) > 0 for stage in config.stages for name in PRESENTED)
 
 
 def load(name: str | Path) -> Config:

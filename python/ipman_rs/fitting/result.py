@@ -143,12 +143,16 @@ def results(fit: Fit, config: Config, start: Variables) -> list[Result]:
 def parameters(body: BodyModel, variables: Variables) -> Arrays:
     """SMPL's names for the pose, shape and place of one body."""
     pose = _array(torch.cat([variables["orient"][:, None], variables["pose"]], dim=1))[0]
+    found: Arrays = {name: pose[columns].reshape(1, -1) for name, columns in joints_of(body).items()}
+    return {**found, "betas": _array(variables["betas"]), "transl": _array(variables["transl"])}
+
+
+def joints_of(body: BodyModel) -> dict[str, list[int]]:
+    """The joints of each piece of a stored pose that the body has."""
     column = {name: index for index, name in enumerate(body.joint_names)}
     whole = joints.SMPL if set(joints.SMPL) <= set(column) else joints.BODY
     pieces = {"global_orient": joints.BODY[:1], "body_pose": whole[1:], **_PIECES}
-    there = {name: [column[joint] for joint in piece] for name, piece in pieces.items() if set(piece) <= set(column)}
-    found: Arrays = {name: pose[columns].reshape(1, -1) for name, columns in there.items()}
-    return {**found, "betas": _array(variables["betas"]), "transl": _array(variables["transl"])}
+    return {name: [column[joint] for joint in piece] for name, piece in pieces.items() if set(piece) <= set(column)}
 
 
 def _before_physics(fit: Fit, config: Config, start: Variables) -> Variables | None:
