@@ -33,27 +33,29 @@ class Site:
 
 
 class Landmarks:
-    """The points `names` of bodies of one model. ValueError for a name that the body does not have.
+    """The points `names` of bodies of one model, all of `known(body)` if None.
 
-    `names`: all of `known(body)` if None.
+    `sites`: further points by name, or other names for points. ValueError for a name that the body does not have.
     """
 
     def __init__(
-        self, body: ipt.BodyModel, names: Iterable[str] | None = None, sites: Mapping[str, Site] | None = None
+        self,
+        body: ipt.BodyModel,
+        names: Iterable[str] | None = None,
+        sites: Mapping[str, Site | str] | None = None,
     ):
-        full = body.body
-        skin = {name: Site(vertex) for name, vertex in skin_points(full).items()}
-        skin = {name: site for name, site in skin.items() if name not in full.joint_names} | dict(sites or {})
-        self.names = known(full, sites or ()) if names is None else tuple(names)
-        ends = [MIDPOINTS.get(name, (name, name)) for name in self.names]
+        full, sites = body.body, sites or {}
+        self.names = known(full, sites) if names is None else tuple(names)
+        skin = {name: Site(vertex) for name, vertex in skin_points(full).items() if name not in full.joint_names}
+        skin |= {name: site for name, site in sites.items() if isinstance(site, Site)}
+        ends = [_ends(name, sites) for name in self.names]
         used = list(dict.fromkeys(name for pair in ends for name in pair if name in skin))
         rows = {name: row for row, name in enumerate(used)}
         rows |= {name: max(len(used), 1) + j for j, name in enumerate(full.joint_names) if name not in rows}
         unknown = [name for pair in ends for name in pair if name not in rows]
         if unknown:
-            raise ValueError(
-                f"names: the body {full.name!r} has no landmark {unknown[0]!r}; it has {', '.join(known(full))}"
-            )
+            listed = ", ".join(known(full, sites))
+            raise ValueError(f"names: the body {full.name!r} has no landmark {unknown[0]!r}; it has {listed}")
         device = body.v_template.device
         self.points = ipt.BodyModel(_cut(full, [skin[name] for name in used] or [Site(0)]), body.dtype).to(device)
         self.ends = [torch.tensor([rows[pair[end]] for pair in ends], device=device) for end in (0, 1)]
@@ -68,6 +70,13 @@ class Landmarks:
 def known(body: BodyModel, sites: Iterable[str] = ()) -> tuple[str, ...]:
     """All names that a body has."""
     return tuple(dict.fromkeys([*body.joint_names, *MIDPOINTS, *skin_points(body), *sites]))
+
+
+def _ends(name: str, sites: Mapping[str, Site | str]) -> tuple[str, str]:
+    """The two points whose midpoint a landmark is, twice the same for most."""
+    site = sites.get(name)
+    name = site if isinstance(site, str) else name
+    return (name, name) if isinstance(site, Site) else MIDPOINTS.get(name, (name, name))
 
 
 def _cut(body: BodyModel, sites: list[Site]) -> BodyModel:

@@ -53,7 +53,9 @@ def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
         raise ValueError(f"{path}: expected an image: {error}") from None
     if min(pixels.shape[:2]) < SMALLEST:
         height, width = pixels.shape[:2]
-        raise ValueError(f"{path}: expected an image of at least {SMALLEST} × {SMALLEST} pixels, got {width} × {height}")
+        raise ValueError(
+            f"{path}: expected an image of at least {SMALLEST} × {SMALLEST} pixels, got {width} × {height}"
+        )
     return pixels
 
 

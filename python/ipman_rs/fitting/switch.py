@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import torch
 from torch import Tensor
 
 import ipman_rs.torch as ipt
+from ipman_rs import BodyTemplate
 
 REACH = 0.10  # m: a body whose lowest point is higher than this above the ground is in the air
 LEAN = 0.15  # m: a body whose centre of mass is further than this outside its base of support is falling
@@ -13,7 +13,7 @@ LEAN = 0.15  # m: a body whose centre of mass is further than this outside its b
 
 def static(
     vertices: Tensor,
-    template: ipt.BodyTemplate,
+    template: BodyTemplate,
     ground: ipt.Ground,
     reach: float = REACH,
     lean: float = LEAN,

@@ -38,7 +38,12 @@ RELATIVE = 3.0
 def matches(content: Any) -> bool:
     if isinstance(content, dict):
         return any(key in content for key in IMAGE_KEYS)
-    return isinstance(content, list) and len(content) > 0 and isinstance(content[0], dict) and {"x", "y"} <= set(content[0])
+    return (
+        isinstance(content, list)
+        and len(content) > 0
+        and isinstance(content[0], dict)
+        and {"x", "y"} <= set(content[0])
+    )
 
 
 def images(content: Any, source: str) -> list[Image]:

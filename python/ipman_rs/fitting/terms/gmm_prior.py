@@ -51,7 +51,7 @@ class GaussianMixture(Term):
 
 
 def load(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """means (K, 69), L_kᵀ (K, 69, 69) with L_k L_kᵀ = Σ_k⁻¹, and c (K,). ValueError if the file is not such a mixture."""
+    """means (K, 69), F (K, 69, 69) with F_kᵀ F_k = Σ_k⁻¹, and c (K,). ValueError if the file holds no such mixture."""
     means, covariances, weights = (_read(path, name) for name in ("means", "covars", "weights"))
     count, size = len(means), 3 * len(JOINTS)
     for name, array, shape in (
@@ -70,7 +70,8 @@ def load(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[
     except np.linalg.LinAlgError:
         raise ValueError(f"{path}: covars: expected symmetric positive definite matrices") from None
     logarithms = np.log(weights) - np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
-    return means, np.linalg.inv(lower), logarithms.max() - logarithms
+    factors = np.linalg.inv(lower).astype(np.float64)
+    return means, factors, logarithms.max() - logarithms
 
 
 def _read(path: Path, name: str) -> NDArray[np.float64]:

@@ -2,9 +2,9 @@
 
     (Σ β²)² + e^(100 |Δheight|) − 1 + e^|Δmass| − 1     Δheight in m, Δmass in kg
 
-of the body in its zero pose: height is its vertical extent, mass its volume × 985 kg/m³. The constants −1 are ours: they
-move no minimum, and let tolerances relative to the cost mean something. Beyond `CAP` = 10 (10 cm, 10 kg) the exponentials
-go on as straight lines of the same slope, so that a bad start overflows nothing.
+of the body in its zero pose: height is its vertical extent, mass its volume × 985 kg/m³. The constants −1 are ours:
+they move no minimum, and let tolerances relative to the cost mean something. Beyond `CAP` = 10 (10 cm, 10 kg) the
+exponentials go on as straight lines of the same slope, so that a bad start overflows nothing.
 """
 
 from __future__ import annotations

@@ -15,6 +15,8 @@ import torch
 from torch import Tensor
 
 import ipman_rs.torch as ipt
+from ipman_rs import BodyTemplate
+from ipman_rs.body import BodyModel
 
 from .. import switch
 from ..candidate import Candidate
@@ -23,73 +25,60 @@ from .term import Term
 
 
 class Physics(Term):
-    """samples: of the body's surface, those of its template if None; fewer are faster and coarser.
-
-    only_static: leave alone a body that, where the stage begins, is in the air or falling (`fitting.switch`): its cost is
-    0 until the next stage.
+    """preset: a name of `ipman_rs.presets`, `usual` if None.
+    samples: of the body's surface, those of its template if None; fewer are faster and coarser.
+    only_static: leave alone a body that is in the air or falling where the stage begins (`fitting.switch`): until the
+    next stage its cost is 0.
     """
 
     needs_mesh = True
+    usual = "paper-o"
+    quantities: tuple[str, ...]  # of IntuitivePhysicsLoss, summed
 
-    def __init__(self, problem: Problem, preset: str = "paper-o", samples: int | None = None, only_static: bool = False):
+    def __init__(
+        self, problem: Problem, preset: str | None = None, samples: int | None = None, only_static: bool = False
+    ):
         super().__init__(problem)
-        self.loss = _loss(problem.body.template, preset, samples)
+        self.loss = _loss(problem.body.body, preset or self.usual, samples)
+        missing = set(self.quantities) - set(self.loss.terms)
+        if missing:
+            raise ValueError(f"preset: {preset!r} has {', '.join(self.loss.terms)}, but no {', '.join(missing)}")
         self.only_static = only_static
         self.gate: Tensor | None = None
 
     def begin(self, candidate: Candidate) -> None:
         if self.only_static:
-            self.gate = candidate.shared(
-                (switch.static, self.loss.template),
-                lambda: switch.static(candidate.vertices, self.loss.template, self.problem.ground),
-            )
+            template, ground = self.loss.template, self.problem.ground
+            key = (switch.static, template)
+            self.gate = candidate.shared(key, lambda: switch.static(candidate.vertices, template, ground))
 
-    def value(self, candidate: Candidate, *names: str) -> Tensor:
-        """(B,), the sum of the named quantities of bodies that are not left alone."""
+    def cost(self, candidate: Candidate) -> Tensor:
         if self.only_static and self.gate is None:
             self.begin(candidate)
         values = candidate.shared(self.loss, lambda: self.loss(candidate.vertices, self.problem.ground))
-        total = values[names[0]]
-        for name in names[1:]:
-            total = total + values[name]
+        total = torch.stack([values[name] for name in self.quantities], dim=-1).sum(dim=-1)
         return total if self.gate is None else torch.where(self.gate > 0, total, 0)
 
 
 class Stability(Physics):
-    def __init__(self, problem: Problem, preset: str = "paper-o", samples: int | None = None, only_static: bool = False):
-        super().__init__(problem, preset, samples, only_static)
-        if "stability" not in self.loss.terms:
-            raise ValueError(f"stability: preset {preset!r} has a balance cost in its place; use the term balance")
-
-    def cost(self, candidate: Candidate) -> Tensor:
-        return self.value(candidate, "stability")
+    quantities = ("stability",)
 
 
 class Ground(Physics):
-    def cost(self, candidate: Candidate) -> Tensor:
-        return self.value(candidate, "pull", "push")
+    quantities = ("pull", "push")
 
 
 class Balance(Physics):
-    def __init__(self, problem: Problem, preset: str = "balanced", samples: int | None = None, only_static: bool = False):
-        super().__init__(problem, preset, samples, only_static)
-        if "balance" not in self.loss.terms:
-            raise ValueError(f"balance: preset {preset!r} has stability in its place; expected 'balanced'")
-
-    def cost(self, candidate: Candidate) -> Tensor:
-        return self.value(candidate, "balance")
+    usual = "balanced"
+    quantities = ("balance",)
 
 
 @lru_cache(maxsize=16)
-def _loss(template: ipt.BodyTemplate, preset: str, samples: int | None) -> ipt.IntuitivePhysicsLoss:
+def _loss(body: BodyModel, preset: str, samples: int | None) -> ipt.IntuitivePhysicsLoss:
     """One object for all terms of the same constants: by it they find each other's evaluation."""
-    if samples is not None and samples != template.num_samples:
-        template = _resampled(template, samples)
-    return ipt.IntuitivePhysicsLoss(template, preset=preset, reduction="none")
+    return ipt.IntuitivePhysicsLoss(_template(body, samples), preset=preset, reduction="none")
 
 
 @lru_cache(maxsize=16)
-def _resampled(template: ipt.BodyTemplate, samples: int) -> ipt.BodyTemplate:
-    return ipt.BodyTemplate(
-        template.vertices, template.faces, template.face_parts, template.part_names, num_samples=samples
-    )
+def _template(body: BodyModel, samples: int | None) -> BodyTemplate:
+    return body.template if samples is None else body.make_template(samples)

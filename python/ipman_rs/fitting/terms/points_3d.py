@@ -1,7 +1,7 @@
 """3D keypoints or markers: how far the landmarks are from the points measured in the world, metres,
 
-    Σ_k (w_k c_k)² |e_k|²                           without rho
-    Σ_k (w_k c_k)² ρ² |e_k|² / (|e_k|² + ρ²)        with it (Geman-McClure): a mislabelled marker stops pulling
+Σ_k (w_k c_k)² |e_k|²                           without rho
+Σ_k (w_k c_k)² ρ² |e_k|² / (|e_k|² + ρ²)        with it (Geman-McClure): a mislabelled marker stops pulling
 """
 
 from __future__ import annotations

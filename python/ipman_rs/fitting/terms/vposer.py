@@ -1,12 +1,12 @@
-"""VPoser v2 as a pose prior: ‖z‖², z the mean of what its encoder makes of the pose. The checkpoint (V02_05) is read from
-a file: it is not included and has a licence of its own.
+"""VPoser v2 as a pose prior: ‖z‖², z the mean of what its encoder makes of the pose. The checkpoint (V02_05) is read
+from a file: it is not included and has a licence of its own.
 
-What is taken of its layout: an encoder of 21 rotation vectors (63 numbers) under `encoder_net` or `vp_model.encoder_net`,
+What is taken of its layout: an encoder of 21 rotation vectors (63 numbers), `encoder_net` or `vp_model.encoder_net`,
 
     1 batch norm · 2 linear · leaky ReLU (slope 0.01) · 4 batch norm · 6 linear · 7 linear · 8.mu linear
 
-with the batch norms' running figures (ε = 1e-5) and no dropout, as in evaluation. All but the ReLU is affine, so that z =
-A leaky(C θ + d) + b with two matrices multiplied out beforehand in float64.
+with the batch norms' running figures (ε = 1e-5) and no dropout, as in evaluation. All but the ReLU is affine, so that
+z = A leaky(C θ + d) + b with two matrices multiplied out beforehand in float64.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ def load(path: Path) -> tuple[Tensor, Tensor]:
         content = torch.load(path, map_location="cpu", weights_only=True)
     except (pickle.UnpicklingError, RuntimeError, EOFError) as error:
         raise ValueError(
-            f"{path}: not a file of tensors alone, and nothing else is loaded. If it is a VPoser v2 checkpoint with more in "
-            "it, save its `state_dict` by itself where you trust it: torch.save({'state_dict': ...})"
+            f"{path}: cannot be read as a file of tensors, and nothing else is loaded. If it is a VPoser v2 checkpoint "
+            "with more in it, save its `state_dict` by itself where you trust it: torch.save({'state_dict': ...})"
         ) from error
     state = content.get("state_dict", content) if isinstance(content, dict) else {}
     encoder = {
