@@ -74,8 +74,9 @@ def demo(output: Path, preset: str) -> None:
 @click.argument("bodies", nargs=-1, required=True, metavar="BODY...", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), help="Report folder.")
 @click.option(
-    "--body", "model", default="anny", show_default=True, metavar="NAME|PATH",
-    help="Body model that parameters pose: anny, anny-lite, or an SMPL, SMPL+H or SMPL-X file (.pkl, .npz).",
+    "--body", "model", metavar="NAME|PATH",
+    help="Body model that parameters pose: anny, anny-lite, or an SMPL, SMPL+H or SMPL-X file (.pkl, .npz). "
+    "Default: the one that the file names, or anny.",
 )  # fmt: skip
 @click.option(
     "--up", type=UP, metavar="AXIS", default=None,
@@ -94,7 +95,7 @@ def demo(output: Path, preset: str) -> None:
 def analyze(
     bodies: tuple[Path, ...],
     output: Path | None,
-    model: str,
+    model: str | None,
     up: tuple[float, float, float] | None,
     ground: float | None,
     parts: Path | None,

@@ -79,7 +79,7 @@ def study_of(
     ground = ip.Ground(normal, height)
     before = None
     if pictured and f"{_BEFORE}betas" in arrays:
-        before = view.study("Before", posed(body, arrays, _BEFORE), body.template, ground)
+        before = view.study("Before the physics terms", posed(body, arrays, _BEFORE), body.template, ground)
     fitted = view.Fitted(
         camera=camera_of(*(arrays[name][0] for name in ("camera_rotation", "camera_translation", "focal", "center"))),
         size=tuple(arrays["image_size"][0]),
