@@ -80,7 +80,9 @@ def test_a_constant_does_not_fool_the_end(name):
         )[0]
         for constant in (0.0, 8192.0)
     ]  # fmt: skip
-    np.testing.assert_allclose(found[1].point, found[0].point, atol=2e-3)  # 8192 has steps of 2e-12: so has the decrease
+    np.testing.assert_allclose(
+        found[1].point, found[0].point, atol=2e-3
+    )  # 8192 has steps of 2e-12: so has the decrease
     assert found[1].converged
 
 

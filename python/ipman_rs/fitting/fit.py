@@ -12,6 +12,7 @@ import torch
 
 import ipman_rs.torch as ipt
 
+from . import switch
 from .candidate import Candidate
 from .config import Config, Stage
 from .objective import Objective
@@ -74,6 +75,7 @@ def fit(
         for stage in config.stages:
             if stage.find_ground:
                 problem = on_the_ground(problem, variables)
+            problem = judged(problem, variables)
             variables, report = run_stage(problem, variables, stage, config.terms, progress, trace)
             reports.append(report)
     return Fit(problem, variables, reports)
@@ -87,6 +89,15 @@ def on_the_ground(problem: Problem, variables: Variables) -> Problem:
         lowest = Candidate(problem, variables).vertices[..., 1].amin(dim=1)
     up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(len(lowest), 3)
     return replace(problem, ground=ipt.Ground(up, lowest.double()))
+
+
+def judged(problem: Problem, variables: Variables) -> Problem:
+    """The problem with the judgement which bodies are static now; the same where no ground is known."""
+    if problem.ground is None:
+        return problem
+    with torch.no_grad():
+        vertices = Candidate(problem, variables).vertices
+        return replace(problem, static=switch.static(vertices, problem.body.template, problem.ground))
 
 
 @contextmanager
@@ -150,14 +161,13 @@ class _Shrinking:
     def trace(self) -> list[dict[str, np.ndarray]]:
         """The weighted costs of each body's points that were the best so far: what its solver accepted."""
         lengths = [len(best) for best in self.best]
-        if 0 in lengths:  # no finite look at a body: nothing to evaluate it at
-            return [{} for _ in lengths]
+        nowhere = pack(self.whole.variables, self.whole.free).numpy()
         columns = []
         with torch.no_grad():
             for step in range(max(lengths)):
-                rows = torch.from_numpy(np.stack([best[min(step, len(best) - 1)][1] for best in self.best]))
-                columns.append(self.whole.costs(self.whole.candidate(rows)))
-        costs = {name: torch.stack([column[name] for column in columns]).numpy() for name in columns[0]}
+                rows = [best[min(step, len(best) - 1)][1] if best else nowhere[i] for i, best in enumerate(self.best)]
+                columns.append(self.whole.costs(self.whole.candidate(torch.from_numpy(np.stack(rows)))))
+        costs = {name: torch.stack([column[name] for column in columns]).numpy() for name in self.whole.weights if columns}
         return [{name: cost[:length, body] for name, cost in costs.items()} for body, length in enumerate(lengths)]
 
 

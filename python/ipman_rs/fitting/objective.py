@@ -94,22 +94,43 @@ class Objective:
         return total.detach().numpy(), gradient.numpy()
 
     def _jacobian(self, points: np.ndarray, names: Sequence[str]) -> tuple[Tensor, Tensor]:
-        """Weighted residuals (B, R) and their Jacobians (B, P, R): every body once a direction, by forward mode."""
+        """Weighted residuals (B, R) and their Jacobians (B, P, R)."""
         bodies, size = points.shape
-        if not names:
-            return torch.zeros(bodies, 0, dtype=torch.float64), torch.zeros(bodies, size, 0, dtype=torch.float64)
+        values, slopes = (
+            [torch.zeros(bodies, 0, dtype=torch.float64)],
+            [torch.zeros(bodies, size, 0, dtype=torch.float64)],
+        )
+        with torch.no_grad():
+            candidate = self.candidate(torch.from_numpy(points))
+            unknown = []
+            for name in names:
+                term = self.terms[name]
+                closed = term.linearised(candidate, self.free) if isinstance(term, LeastSquares) else None
+                if closed is None:
+                    unknown.append(name)
+                else:
+                    values.append(self.weights[name] ** 0.5 * closed[0])
+                    slopes.append(self.weights[name] ** 0.5 * closed[1])
+            if unknown:
+                value, slope = self._by_forward_mode(points, unknown)
+                values.append(value)
+                slopes.append(slope)
+        return torch.cat(values, dim=1), torch.cat(slopes, dim=2)
+
+    def _by_forward_mode(self, points: np.ndarray, names: Sequence[str]) -> tuple[Tensor, Tensor]:
+        """The same of some terms, with every body once a direction."""
+        bodies, size = points.shape
         if self._repeated is None:
             self._repeated = self.rows(np.repeat(np.arange(bodies), size).tolist())
         rows = torch.from_numpy(points).repeat_interleave(size, dim=0)
         directions = torch.eye(size, dtype=torch.float64).repeat(bodies, 1)
-        with forward_ad.dual_level(), torch.no_grad():
+        with forward_ad.dual_level():
             candidate = self._repeated.candidate(forward_ad.make_dual(rows, directions))
-            residuals = [
-                self.weights[name] ** 0.5 * self._repeated.terms[name].residuals(candidate)  # pyright: ignore[reportAttributeAccessIssue]
-                for name in names
-            ]
-            parts = [forward_ad.unpack_dual(part) for part in residuals]
-            values = torch.cat([part.primal for part in parts], dim=1)[::size]
-            tangents = [torch.zeros_like(part.primal) if part.tangent is None else part.tangent for part in parts]
-            jacobian = torch.cat(tangents, dim=1).reshape(bodies, size, -1)
-        return values, jacobian
+            residuals = []
+            for name in names:
+                term = self._repeated.terms[name]
+                assert isinstance(term, LeastSquares)
+                residuals.append(self.weights[name] ** 0.5 * term.residuals(candidate))
+            value, slope = forward_ad.unpack_dual(torch.cat(residuals, dim=1))
+        slope = torch.zeros_like(value) if slope is None else slope
+        return value[::size], slope.reshape(bodies, size, -1)

@@ -41,7 +41,7 @@ def landmarks(path: str | os.PathLike[str]) -> tuple[Array, Array, tuple[int, in
 
 
 def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
-    """The pixels (height, width, 3) of an image, turned as its EXIF says. ValueError if it cannot be read or is tiny."""
+    """The pixels (height, width, 3) of an image, turned as its EXIF says. ValueError if unreadable or tiny."""
     from PIL import Image, ImageOps
 
     if not Path(path).is_file():

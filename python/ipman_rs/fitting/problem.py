@@ -39,6 +39,7 @@ class Problem:
     height: Tensor | None = None  # (B,) m, of the person
     mass: Tensor | None = None  # (B,) kg
     presented: Presented | None = None
+    static: Tensor | None = None  # (B,) bool, `switch.static` where the stage began; None: not asked for
 
     @property
     def num_bodies(self) -> int:
@@ -55,7 +56,9 @@ def _rows(value: Any, index: Tensor) -> Any:
     if isinstance(value, Camera):
         return Camera(*(getattr(value, field.name)[index] for field in fields(value)))
     if isinstance(value, ipt.Ground):
-        return ipt.Ground.of_unit(value.normal.expand(-1, 3)[index], value.height[index]) if value.height.ndim else value
+        return (
+            ipt.Ground.of_unit(value.normal.expand(-1, 3)[index], value.height[index]) if value.height.ndim else value
+        )
     if isinstance(value, Presented):
         return replace(value, pose=value.pose[index])
     return value

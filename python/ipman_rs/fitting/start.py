@@ -24,7 +24,12 @@ from .variables import Variables
 # Far joints of the trunk, whose lengths change least with the pose, and then those of the legs and arms.
 SPANS = (
     (("left_shoulder", "left_hip"), ("right_shoulder", "right_hip")),
-    (("left_hip", "left_knee"), ("right_hip", "right_knee"), ("left_knee", "left_ankle"), ("right_knee", "right_ankle")),
+    (
+        ("left_hip", "left_knee"),
+        ("right_hip", "right_knee"),
+        ("left_knee", "left_ankle"),
+        ("right_knee", "right_ankle"),
+    ),
     (("left_shoulder", "left_elbow"), ("right_shoulder", "right_elbow")),
 )
 SEEN = 0.1  # confidence from which a point counts as seen
@@ -152,7 +157,9 @@ def _depth(problem: Problem, points: Tensor) -> Tensor:
         first, second = map(list, zip(*pairs, strict=True))
         both = (seen[:, first] & seen[:, second]).double()
         real = ((points[:, first] - points[:, second]).norm(dim=-1) * both).sum(dim=1)
-        image = (((problem.points[:, first] - problem.points[:, second]) / problem.camera.focal[:, None]).norm(dim=-1) * both).sum(dim=1)
+        image = (
+            ((problem.points[:, first] - problem.points[:, second]) / problem.camera.focal[:, None]).norm(dim=-1) * both
+        ).sum(dim=1)
         depth = torch.where(depth.isnan() & (image > 0), real / image.clamp(min=1e-12), depth)
     return depth.nan_to_num(5.0).clamp(min=10 * NEAREST, max=DEEPEST)
 

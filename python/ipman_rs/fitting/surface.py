@@ -109,6 +109,6 @@ class Skin:
         return found
 
 
-def best(among: NDArray[np.bool_], score: NDArray[np.float64]) -> int:
+def best(among: NDArray[np.bool_], score: NDArray[np.floating]) -> int:
     """The vertex with the highest score among some."""
     return int(np.where(among, score, -np.inf).argmax())

@@ -18,7 +18,7 @@ def static(
     reach: float = REACH,
     lean: float = LEAN,
 ) -> Tensor:
-    """1 for a body in static contact, 0 for one in the air or falling: vertices (B, V, 3) -> (B,), without gradient.
+    """Whether each body is in static contact, and not in the air or falling: vertices (B, V, 3) -> bool (B,).
 
     A body that begins inside the ground is judged as if it had been lifted out: depth from one photo is that uncertain.
     A body with a vertex that is not finite counts as not static.
@@ -29,4 +29,4 @@ def static(
     level = ground.height.to(vertices).expand(batch) + lowest.clamp(max=0).nan_to_num()
     lifted = ipt.Ground.of_unit(ground.normal.to(vertices).expand(*batch, 3), level)
     margin = ipt.support_margin(vertices, template, lifted)
-    return ((lowest <= reach) & (margin >= -lean)).to(vertices.dtype)
+    return (lowest <= reach) & (margin >= -lean)

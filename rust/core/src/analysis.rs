@@ -7,11 +7,11 @@ use crate::losses::ground::{GroundLoss, Tanh};
 use crate::losses::stability::distance_on_ground;
 use crate::mass::{Centre, Method};
 use crate::number::vector::{Vec3, sub};
-use crate::number::{Real, Room, Scalar};
+use crate::number::{Real, Scalar};
 use crate::pressure::{CenterOfPressure, Cop, LoadSums, PressureCurve};
 use crate::quantity::Quantity;
-use crate::sampling::{CHUNK, Points, Row};
-use crate::scene::Scene;
+use crate::sampling::{CHUNK, Points};
+use crate::scene::{self, Scene};
 use crate::support::{BaseOfSupport, Contact, ContactRule};
 use crate::template::Template;
 use crate::volume::{MassProperties, PartVolumes, part_moments};
@@ -96,7 +96,7 @@ impl Analysis {
     /// Writes the numbers and gives the polygon of each lane.
     pub fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Vec<Polygon> {
         let heights = scene.heights();
-        out[at::LOWEST] = R::apart::<Lowest, _>((&heights,));
+        out[at::LOWEST] = scene::lowest(&heights);
         let looked = self.look(scene, &heights, &mut out[at::GROUND..at::BALANCE]);
         out[at::PRESSURE_SUM] = looked.pressure_sum;
         out[at::PRESSURE_MAX] = looked.pressure_max;
@@ -142,56 +142,14 @@ impl Analysis {
             place.read(heights, &mut row);
             loads.read(&place, &row);
             sums.read(&place, &row);
-            R::apart::<LowestOfRow, _>((&row, place.len(), &mut lowest));
+            lowest = lowest.at_most(scene::lowest(&row[..place.len()]));
         }
         sums.finish(scene.template, ground);
         Looked {
             pressure_sum: R::narrow(loads.total_pressure()),
             // ρ falls with the height.
-            pressure_max: R::apart::<Density, _>((self.pressure, lowest)),
+            pressure_max: self.pressure.curve.density(lowest, R::zero()),
             cop: loads.finish(scene),
         }
-    }
-}
-
-struct Lowest;
-
-impl<R: Real> Room<(&Vec<R>,)> for Lowest {
-    type Output = R;
-
-    #[inline(always)]
-    fn enter((heights,): (&Vec<R>,)) -> R {
-        let mut lowest = R::of(1e30);
-        for &height in heights {
-            lowest = lowest.at_most(height);
-        }
-        lowest
-    }
-}
-
-/// The lowest of the first `len` numbers, and of those before.
-struct LowestOfRow;
-
-impl<R: Real> Room<(&Row<R>, usize, &mut R)> for LowestOfRow {
-    type Output = ();
-
-    #[inline(always)]
-    fn enter((row, len, lowest): (&Row<R>, usize, &mut R)) {
-        let mut least = *lowest;
-        for &height in &row[..len] {
-            least = least.at_most(height);
-        }
-        *lowest = least;
-    }
-}
-
-struct Density;
-
-impl<R: Real> Room<(CenterOfPressure, R)> for Density {
-    type Output = R;
-
-    #[inline(always)]
-    fn enter((pressure, height): (CenterOfPressure, R)) -> R {
-        pressure.curve.density(height, R::zero())
     }
 }

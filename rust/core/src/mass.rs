@@ -1,8 +1,8 @@
 //! The centre of mass: the paper's pCoM, the alternatives of its supplement, and the exact integral.
 
 use crate::error::Result;
-use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, scale, sub, widen};
-use crate::number::{Real, Room};
+use crate::number::vector::{Vec3, add, add_scaled, add_to, cross, dot, narrow, over, scale, sub, widen};
+use crate::number::{BLOCK, Real, Room};
 use crate::quantity::{Quantity, unknown_choice};
 use crate::scene::Scene;
 use crate::template::Template;
@@ -131,7 +131,7 @@ impl<R: Real> Centre<R> {
 
     #[inline(always)]
     fn plain(moment: Vec3<R::Wide>, total: R::Wide) -> Self {
-        Centre { point: [moment[0] / total, moment[1] / total, moment[2] / total], total, parts: None }
+        Centre { point: over(moment, total), total, parts: None }
     }
 }
 
@@ -155,7 +155,7 @@ fn pcom<R: Real>(scene: &Scene<R>) -> Centre<R> {
 #[inline(always)]
 fn pcom_backward<R: Real>(scene: &Scene<R>, centre: &Centre<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
     let Some(Parts { signed, of_parts }) = &centre.parts else { unreachable!("pcom keeps its parts") };
-    let d_moment = [d_centre[0] / centre.total, d_centre[1] / centre.total, d_centre[2] / centre.total];
+    let d_moment = over(d_centre, centre.total);
     let mut d_volumes = Vec::with_capacity(of_parts.len());
     for (row, &Part { volume, sign, sum }) in scene.template.samples.part_sums.iter().zip(of_parts) {
         let arm = sub(sum, scale(R::Wide::of(row.count as f64), centre.point));
@@ -164,9 +164,6 @@ fn pcom_backward<R: Real>(scene: &Scene<R>, centre: &Centre<R>, d_centre: Vec3<R
     }
     signed.backward(&scene.template.closing, &d_volumes, d_points);
 }
-
-/// Numbers of points that are summed in their own precision before the sum goes on in double precision.
-const BLOCK: usize = 16;
 
 #[inline(always)]
 fn vertex_mean<R: Real>(scene: &Scene<R>) -> Centre<R> {
@@ -177,7 +174,7 @@ fn vertex_mean<R: Real>(scene: &Scene<R>) -> Centre<R> {
         for &vertex in block {
             partial = add(partial, vertex);
         }
-        moment = add(moment, widen(partial));
+        add_to(partial, &mut moment);
     }
     Centre::plain(moment, R::Wide::of(vertices.len() as f64))
 }
@@ -231,7 +228,7 @@ fn face_area<R: Real>(scene: &Scene<R>) -> Centre<R> {
             add_scaled(&mut partial, doubled, tripled);
         }
         area.add_to(&mut total);
-        moment = add(moment, widen(partial));
+        add_to(partial, &mut moment);
     }
     Centre::plain(scale(R::Wide::of(1.0 / 3.0), moment), total)
 }
@@ -244,7 +241,7 @@ fn face_area_backward<R: Real>(
     d_centre: Vec3<R::Wide>,
     d_points: &mut [Vec3<R>],
 ) {
-    let d_moment = narrow::<R>([d_centre[0] / centre.total, d_centre[1] / centre.total, d_centre[2] / centre.total]);
+    let d_moment = narrow::<R>(over(d_centre, centre.total));
     let centre = narrow::<R>(centre.point);
     let third = R::of(1.0 / 3.0);
     for face in &scene.template.mesh.faces {
@@ -268,7 +265,7 @@ fn exact<R: Real>(scene: &Scene<R>) -> Centre<R> {
 
 #[inline(always)]
 fn exact_backward<R: Real>(scene: &Scene<R>, centre: &Centre<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
-    let first = [d_centre[0] / centre.total, d_centre[1] / centre.total, d_centre[2] / centre.total];
+    let first = over(d_centre, centre.total);
     let d_whole = Moments { volume: -dot(first, centre.point), first, ..Moments::zero() };
     let d_parts = vec![d_whole; scene.template.mesh.num_parts];
     part_moments_backward(&scene.template.closing, scene.points, &d_parts, d_points);

@@ -1,10 +1,10 @@
 //! Pressure: from the height above the ground to pressure to the centre of pressure.
 
-use crate::number::vector::{Vec3, add_scaled, dot, narrow, scale, widen};
-use crate::number::{Real, Room};
+use crate::number::vector::{Vec3, add_scaled, add_to, dot, narrow, over, scale, widen};
+use crate::number::{BLOCK, Real, Room};
 use crate::quantity::Quantity;
-use crate::sampling::{CHUNK, Place, Points, Row, SUMS, Walk, sum_row};
-use crate::scene::Scene;
+use crate::sampling::{CHUNK, Place, Points, Row, Walk, sum_row};
+use crate::scene::{self, Scene};
 use crate::template::Template;
 
 /// The paper's heuristic: ρ = 1 − αh below the ground, e^(−γh) from the ground up. No unit.
@@ -124,12 +124,9 @@ pub struct Cop<R: Real> {
     loads: Vec<R>,
 }
 
-/// Numbers of vertices that are summed in the points' own precision before the sum goes on in double precision.
-const BLOCK: usize = 16;
-
 impl<R: Real> LoadSums<R> {
     pub fn new(of: CenterOfPressure, heights: &[R]) -> Self {
-        let shift = if of.epsilon > 0.0 { R::zero() } else { R::apart::<LowestAbove, _>((heights,)) };
+        let shift = if of.epsilon > 0.0 { R::zero() } else { scene::lowest(heights).at_least(R::zero()) };
         LoadSums {
             of,
             shift,
@@ -147,7 +144,7 @@ impl<R: Real> LoadSums<R> {
 
     /// Σ ρ_i, the shift taken back.
     pub fn total_pressure(&self) -> R::Wide {
-        R::apart::<Unshifted, _>((self.of.curve, self.shift, self.total))
+        self.total * (R::Wide::of(-self.of.curve.gamma) * self.shift.widen()).exp()
     }
 
     /// s̄ from the sums. Epsilon pulls towards the world's origin, which lies at −origin here.
@@ -157,29 +154,7 @@ impl<R: Real> LoadSums<R> {
         let mut moment = scale(-epsilon, scene.origin);
         R::apart::<Moment, _>((scene.points, loads.as_slice(), &mut moment));
         let total = total + epsilon;
-        Cop { point: [moment[0] / total, moment[1] / total, moment[2] / total], of, shift, total, loads }
-    }
-}
-
-/// The lowest height, or 0 if that is below the ground.
-struct LowestAbove;
-
-impl<R: Real> Room<(&[R],)> for LowestAbove {
-    type Output = R;
-
-    #[inline(always)]
-    fn enter((heights,): (&[R],)) -> R {
-        let mut lowest = [R::of(1e30); SUMS];
-        let (whole, rest) = heights.as_chunks::<SUMS>();
-        for heights in whole {
-            for k in 0..SUMS {
-                lowest[k] = lowest[k].at_most(heights[k]);
-            }
-        }
-        for &height in lowest[1..].to_owned().iter().chain(rest) {
-            lowest[0] = lowest[0].at_most(height);
-        }
-        lowest[0].at_least(R::zero())
+        Cop { point: over(moment, total), of, shift, total, loads }
     }
 }
 
@@ -200,18 +175,6 @@ impl<R: Real> Room<(PressureCurve, R, &Row<R>, usize, &mut Row<R>, &mut R::Wide)
     }
 }
 
-/// [`LoadSums::total_pressure`]
-struct Unshifted;
-
-impl<R: Real> Room<(PressureCurve, R, R::Wide)> for Unshifted {
-    type Output = R::Wide;
-
-    #[inline(always)]
-    fn enter((curve, shift, total): (PressureCurve, R, R::Wide)) -> R::Wide {
-        total * (R::Wide::of(-curve.gamma) * shift.widen()).exp()
-    }
-}
-
 /// Σ_v q_v v
 struct Moment;
 
@@ -225,9 +188,7 @@ impl<R: Real> Room<(&[Vec3<R>], &[R], &mut Vec3<R::Wide>)> for Moment {
             for (&point, &load) in points.iter().zip(loads) {
                 add_scaled(&mut partial, load, point);
             }
-            for k in 0..3 {
-                partial[k].add_to(&mut moment[k]);
-            }
+            add_to(partial, moment);
         }
     }
 }
@@ -243,7 +204,7 @@ impl<R: Real> Cop<R> {
         mut d_heights: Vec<R>,
         d_points: &mut [Vec3<R>],
     ) {
-        let d_wide = [d_point[0] / self.total, d_point[1] / self.total, d_point[2] / self.total];
+        let d_wide = over(d_point, self.total);
         let (d, lever) = (narrow::<R>(d_wide), R::narrow(dot(d_wide, self.point)));
         let arms = R::apart::<Arms, _>((&scene.points[..heights.len()], d, lever));
         let (mut row, mut arm) = ([R::zero(); CHUNK], [R::zero(); CHUNK]);

@@ -5,8 +5,8 @@
 //! one walk over the rings is the part's volume and its gradient. A ring is walked from its own first neighbour, so the
 //! edges that enter are short and keep single precision.
 
-use crate::number::Real;
 use crate::number::vector::{Vec3, add_cross, sub};
+use crate::number::{BLOCK, Real};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ pub struct Rings {
     blocks: Vec<Block>,
 }
 
-/// Consecutive rings of one size: few enough for single-precision partial sums.
+/// Up to [`BLOCK`] consecutive rings of one size.
 #[derive(Clone, Debug)]
 pub struct Block {
     pub rings: Range<usize>,
@@ -27,9 +27,6 @@ pub struct Block {
     /// Where the rings' neighbours start.
     start: usize,
 }
-
-/// Rings of a block at most.
-pub const BLOCK: usize = 16;
 
 impl Rings {
     pub fn new(faces: &[[u32; 3]]) -> Self {

@@ -6,6 +6,7 @@
 use crate::ground::{Ground, Plane};
 use crate::number::vector::{Vec3, add, add_scaled, narrow};
 use crate::number::{Real, Room, Scalar};
+use crate::sampling::SUMS;
 use crate::template::Template;
 
 pub struct Scene<'a, R: Real> {
@@ -87,6 +88,36 @@ impl<R: Real> Room<(Ground<R>, &[Vec3<R>])> for Heights {
             *height = ground.signed_height(vertex);
         }
         heights
+    }
+}
+
+/// The least of some heights.
+pub fn lowest<R: Real>(heights: &[R]) -> R {
+    R::apart::<Lowest, _>((heights,))
+}
+
+/// [`lowest`]
+struct Lowest;
+
+impl<R: Real> Room<(&[R],)> for Lowest {
+    type Output = R;
+
+    #[inline(always)]
+    fn enter((heights,): (&[R],)) -> R {
+        let mut lowest = [R::of(1e30); SUMS];
+        let (whole, rest) = heights.as_chunks::<SUMS>();
+        for heights in whole {
+            for k in 0..SUMS {
+                lowest[k] = lowest[k].at_most(heights[k]);
+            }
+        }
+        for k in 1..SUMS {
+            lowest[0] = lowest[0].at_most(lowest[k]);
+        }
+        for &height in rest {
+            lowest[0] = lowest[0].at_most(height);
+        }
+        lowest[0]
     }
 }
 

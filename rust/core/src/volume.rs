@@ -7,9 +7,9 @@
 
 use crate::closing::Closing;
 use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, widen, widen_in_line};
-use crate::number::{Real, Room};
+use crate::number::{BLOCK, Real, Room};
 use crate::quantity::Quantity;
-use crate::rings::{BLOCK, Rings};
+use crate::rings::Rings;
 use crate::scene::Scene;
 use crate::template::Template;
 

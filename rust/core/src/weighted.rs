@@ -102,7 +102,10 @@ impl Pool<'_> {
         let counted = |body: usize, term: T, share: f64| if counts[body] { term.value() * share } else { 0.0 };
         let terms = match self.reduction {
             Reduction::None => values.iter().enumerate().map(|(i, &term)| counted(i / size, term, 1.0)).collect(),
-            _ => (0..size).map(|k| rows().enumerate().map(|(body, row)| counted(body, row[k], share)).sum()).collect(),
+            // Rust's sum of nothing is −0.
+            _ => (0..size)
+                .map(|k| 0.0 + rows().enumerate().map(|(body, row)| counted(body, row[k], share)).sum::<f64>())
+                .collect(),
         };
         let shares = counts.iter().map(|&counts| if counts { share } else { 0.0 }).collect();
         (Pooled { terms, shares }, share)

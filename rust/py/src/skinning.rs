@@ -2,7 +2,7 @@
 
 use crate::array::flat;
 use crate::error::detached;
-use ipman::number::Scalar;
+use ipman::number::Data;
 use ipman::posing::{Bodies, Gradients, Posing, Rows, TILE, Upstream};
 use ipman::skinning::{self, Model};
 use numpy::{Element, PyReadonlyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMethods};
@@ -142,7 +142,7 @@ enum Filled<'py> {
 }
 
 impl<'py> Call<'py> {
-    fn run<T: Scalar + Element>(&self, skin: &skinning::Skin<T, TILE>) -> PyResult<()> {
+    fn run<T: Data + Element>(&self, skin: &skinning::Skin<T, TILE>) -> PyResult<()> {
         let (py, batch) = (self.py, self.batch);
         let parameters = Inputs::new(["pose", "betas", "expression", "transl"], &self.parameters)?;
         let parameters = parameters.bodies(batch)?;
@@ -187,7 +187,7 @@ struct Inputs<'py, T: Element> {
     arrays: [Option<PyReadonlyArrayDyn<'py, T>>; 4],
 }
 
-impl<'py, T: Scalar + Element> Inputs<'py, T> {
+impl<'py, T: Data + Element> Inputs<'py, T> {
     fn new(names: Names, given: &Four<'py>) -> PyResult<Self> {
         let (pose, betas, expression, transl) = given;
         let arrays =

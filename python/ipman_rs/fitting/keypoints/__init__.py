@@ -1,4 +1,4 @@
-"""Files of 2D keypoints, one format a file. A new one is one file, with NAMES, `matches` and `images`, and one line here.
+"""Files of 2D keypoints, one format a file. A new one is a file with NAMES, `matches` and `images`, and one line here.
 
 detections = keypoints.read("person.json")       # what format it is, its content says
 """

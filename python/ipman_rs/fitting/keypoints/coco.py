@@ -3,7 +3,7 @@
 {"images": [{"id", "file_name", "width", "height"}, ...], "annotations": [{"image_id", "keypoints": [x, y, v, ...]}]}
 [{"image_id", "keypoints": [x, y, score, ...]}, ...]        {"keypoints": [[x, y], ...], "keypoint_scores": [...]}
 
-Every image becomes a row. People without an image_id are taken to be in the same image.
+Every image with labelled people becomes a row. People without an image_id are taken to be in the same image.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ def by_image(content: Any, source: str, person: Callable[[Any, str], Array]) -> 
     described = {image["id"]: image for image in listed if isinstance(image, dict) and "id" in image}
     found: dict[Any, Image] = {}
     for index, entry in enumerate(entries(content) or []):
+        if entry.get("num_keypoints") == 0:  # COCO lists people without keypoints, too
+            continue
         identity = entry.get("image_id")
         if identity not in found:
             about = described.get(identity, {})
             label = about.get("file_name", identity)
             size = (float(about["width"]), float(about["height"])) if {"width", "height"} <= set(about) else None
             found[identity] = Image(source if label is None else f"{source}: {label}", [], size)
-        if entry.get("num_keypoints") == 0:  # COCO lists people without keypoints, too
-            continue
         found[identity].people.append(person(entry, f"{source}: annotations[{index}]"))
     return list(found.values()) or [Image(source, [])]
 

@@ -2,11 +2,11 @@
 
 {"format": "mediapipe-pose", "image": "photo.png", "image_size": [width, height],
  "landmarks": [[x, y, z, visibility], ...],           x and y relative to the image's width and height
- "world_landmarks": [[x, y, z, visibility], ...]}     metres, the origin between the hips, y down, z away from the camera
+ "world_landmarks": [[x, y, z, visibility], ...]}     metres from between the hips, y down, z away from the camera
 
-Read are also the keys `pose_landmarks`, `poseLandmarks`, `pose_world_landmarks`, `poseWorldLandmarks`, `worldLandmarks`,
-points as {"x", "y", "z", "visibility"}, a bare list of 33 points, and x and y in pixels: they are taken for relative
-where no visible one is beyond ±3. Relative ones need an image size, in the file or given.
+Read are also `pose_landmarks`, `poseLandmarks`, `pose_world_landmarks`, `poseWorldLandmarks` and `worldLandmarks`,
+points as {"x", "y", "z", "visibility"}, a bare list of 33 points, and x and y in pixels: they are taken for relative where no
+visible one is beyond ±3. Relative ones need an image size, in the file or given.
 """
 
 from __future__ import annotations

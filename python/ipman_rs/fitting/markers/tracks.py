@@ -22,7 +22,7 @@ LARGEST = 20.0  # nobody's markers are farther apart, in metres; in millimetres 
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """M markers in T samples, metres, y up. Where a marker was not seen its confidence is 0 and its point the origin."""
+    """M markers in T samples, metres, y up. A marker that was not seen has confidence 0 and lies at 0."""
 
     names: tuple[str, ...]  # M
     points: Array  # (T, M, 3) m

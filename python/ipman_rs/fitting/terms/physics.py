@@ -18,7 +18,6 @@ import ipman_rs.torch as ipt
 from ipman_rs import BodyTemplate
 from ipman_rs.body import BodyModel
 
-from .. import switch
 from ..candidate import Candidate
 from ..problem import Problem
 from .term import Term
@@ -27,8 +26,7 @@ from .term import Term
 class Physics(Term):
     """preset: a name of `ipman_rs.presets`, `usual` if None.
     samples: of the body's surface, those of its template if None; fewer are faster and coarser.
-    only_static: leave alone a body that is in the air or falling where the stage begins (`fitting.switch`): until the
-    next stage its cost is 0.
+    only_static: leave alone a body that was in the air or falling where the stage began (`problem.static`): its cost is 0.
     """
 
     needs_mesh = True
@@ -39,25 +37,18 @@ class Physics(Term):
         self, problem: Problem, preset: str | None = None, samples: int | None = None, only_static: bool = False
     ):
         super().__init__(problem)
+        if problem.ground is None:
+            raise ValueError("ground: expected one for terms of physics; give it, or let a stage find it (find_ground)")
         self.loss = _loss(problem.body.body, preset or self.usual, samples)
         missing = set(self.quantities) - set(self.loss.terms)
         if missing:
             raise ValueError(f"preset: {preset!r} has {', '.join(self.loss.terms)}, but no {', '.join(missing)}")
-        self.only_static = only_static
-        self.gate: Tensor | None = None
-
-    def begin(self, candidate: Candidate) -> None:
-        if self.only_static:
-            template, ground = self.loss.template, self.problem.ground
-            key = (switch.static, template)
-            self.gate = candidate.shared(key, lambda: switch.static(candidate.vertices, template, ground))
+        self.gate = problem.static if only_static else None
 
     def cost(self, candidate: Candidate) -> Tensor:
-        if self.only_static and self.gate is None:
-            self.begin(candidate)
         values = candidate.shared(self.loss, lambda: self.loss(candidate.vertices, self.problem.ground))
         total = torch.stack([values[name] for name in self.quantities], dim=-1).sum(dim=-1)
-        return total if self.gate is None else torch.where(self.gate > 0, total, 0)
+        return total if self.gate is None else torch.where(self.gate, total, 0)
 
 
 class Stability(Physics):

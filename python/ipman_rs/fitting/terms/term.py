@@ -9,15 +9,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any
 
-import torch
 from torch import Tensor
-from torch.autograd import forward_ad
 
 from ..candidate import Candidate
 from ..problem import Problem
-from ..variables import pack, unpack
 
 
 class Term(ABC):
@@ -25,12 +21,8 @@ class Term(ABC):
 
     needs_mesh = False  # whether it looks at `candidate.vertices` or `.posed`
 
-    def __init__(self, problem: Problem, **options: Any):
+    def __init__(self, problem: Problem):
         self.problem = problem
-        self.options = options
-
-    def begin(self, candidate: Candidate) -> None:  # noqa: B027  most terms have nothing to note
-        """Called with the bodies that a stage starts from, before its first evaluation."""
 
     @abstractmethod
     def cost(self, candidate: Candidate) -> Tensor:
@@ -47,18 +39,7 @@ class LeastSquares(Term):
     def cost(self, candidate: Candidate) -> Tensor:
         return self.residuals(candidate).square().sum(dim=-1)
 
-    def linearised(self, candidate: Candidate, free: Sequence[str]) -> tuple[Tensor, Tensor]:
-        """The residuals (B, R) and their Jacobian (B, P, R) by the free blocks: by forward mode, every body once a
-        direction. A term that every fit has does better with its own derivatives."""
-        rows = pack(candidate.variables, free)
-        bodies, size = rows.shape
-        copies = torch.arange(bodies).repeat_interleave(size)
-        repeated = type(self)(self.problem.rows(copies), **self.options)
-        variables = {name: value[copies] for name, value in candidate.variables.items()}
-        directions = torch.eye(size, dtype=rows.dtype).repeat(bodies, 1)
-        with forward_ad.dual_level(), torch.no_grad():
-            dual = forward_ad.make_dual(rows[copies], directions)
-            moved = Candidate(repeated.problem, unpack(dual, free, variables))
-            value, slope = forward_ad.unpack_dual(repeated.residuals(moved))
-            slope = torch.zeros_like(value) if slope is None else slope
-        return value[::size], slope.reshape(bodies, size, -1)
+    def linearised(self, candidate: Candidate, free: Sequence[str]) -> tuple[Tensor, Tensor] | None:
+        """The residuals (B, R) and their Jacobian (B, P, R) by the free blocks, for terms that know it in closed form;
+        of the others the objective finds it by forward mode, every body once a direction."""
+        return None

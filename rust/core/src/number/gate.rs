@@ -30,6 +30,9 @@ pub trait Gates: Sized {
     /// Runs `work` on the number with `width` lanes, one of [`Gates::widths`] of the current level: the CPU has been asked
     /// for its instructions ([`Level::is_here`]).
     fn enter<W: Work<Self>>(level: Level, width: usize, work: W) -> W::Output;
+    /// Runs `work` on the number with the most lanes that the level has in this format, for work on many numbers of one
+    /// body.
+    fn enter_registers<W: Work<Self>>(level: Level, work: W) -> W::Output;
 }
 
 impl Level {
@@ -107,6 +110,10 @@ impl Gates for f32 {
             _ => work.run::<Fused<f32>>(),
         }
     }
+
+    fn enter_registers<W: Work<f32>>(level: Level, work: W) -> W::Output {
+        Self::enter(level, Self::widths(level)[0], work)
+    }
 }
 
 /// Double precision is for exactness: it runs one body at a time.
@@ -119,6 +126,18 @@ impl Gates for f64 {
         match level {
             Level::Scalar => work.run::<f64>(),
             _ => work.run::<Fused<f64>>(),
+        }
+    }
+
+    fn enter_registers<W: Work<f64>>(level: Level, work: W) -> W::Output {
+        match level {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => work.run::<super::simd::F64x16>(),
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => work.run::<super::simd::F64x8>(),
+            #[cfg(target_arch = "aarch64")]
+            Level::Neon => work.run::<super::neon::F64x4>(),
+            _ => work.run::<f64>(),
         }
     }
 }

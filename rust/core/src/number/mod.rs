@@ -28,6 +28,10 @@ pub use fused::Fused;
 use std::mem::MaybeUninit;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+/// So many numbers are summed in their own precision before the sum goes on in [`Real::Wide`]: sums that short lose
+/// next to nothing, and the step to the wider number is paid once for all of them.
+pub const BLOCK: usize = 16;
+
 /// A function that is compiled once for each number, see [`Real::apart`].
 pub trait Room<Arguments> {
     type Output;
@@ -153,6 +157,12 @@ pub trait Scalar: Real<Scalar = Self> {
     fn value(self) -> f64;
     fn read(data: Self::Data) -> Self;
     fn data(self) -> Self::Data;
+}
+
+/// Looks at 1024 numbers before it decides whether to go on: so the look vectorises.
+pub fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
+    let broken = |piece: &[S]| piece.iter().fold(false, |broken, x| broken | !x.value().is_finite());
+    !numbers.chunks(1024).any(broken)
 }
 
 /// A floating-point format of the caller's arrays, itself a number with one lane.

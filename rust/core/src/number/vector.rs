@@ -25,6 +25,11 @@ pub fn scale<R: Real>(factor: R, a: Vec3<R>) -> Vec3<R> {
 }
 
 #[inline(always)]
+pub fn over<R: Real>(a: Vec3<R>, divisor: R) -> Vec3<R> {
+    [a[0] / divisor, a[1] / divisor, a[2] / divisor]
+}
+
+#[inline(always)]
 pub fn add_scaled<R: Real>(sum: &mut Vec3<R>, factor: R, a: Vec3<R>) {
     *sum = [factor.mul_add(a[0], sum[0]), factor.mul_add(a[1], sum[1]), factor.mul_add(a[2], sum[2])];
 }
@@ -50,6 +55,14 @@ pub fn add_cross<R: Real>(sum: Vec3<R>, a: Vec3<R>, b: Vec3<R>) -> Vec3<R> {
 #[inline(always)]
 pub fn widen<R: Real>(a: Vec3<R>) -> Vec3<R::Wide> {
     [a[0].widen(), a[1].widen(), a[2].widen()]
+}
+
+/// [`Real::add_to`] of each.
+#[inline(always)]
+pub fn add_to<R: Real>(a: Vec3<R>, sum: &mut Vec3<R::Wide>) {
+    for k in 0..3 {
+        a[k].add_to(&mut sum[k]);
+    }
 }
 
 /// [`widen`] by [`Real::widen_in_line`].

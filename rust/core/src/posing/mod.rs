@@ -4,20 +4,20 @@
 mod passes;
 
 use crate::error::{Error, Result};
-use crate::number::gate::Level;
-use crate::number::{Dual, Real, Scalar};
+use crate::number::gate::{Level, Work};
+use crate::number::{Data, Dual, Real, Scalar, all_finite};
 use crate::skinning::blend::Tile;
 use crate::skinning::rotation::Form;
 use crate::skinning::{Body, Gradient, Parameters, Skin, Start, Wanted};
 use crate::threads::{self, num_threads};
-use passes::{Backward, Forward, wide};
+use passes::{Backward, Forward, Place, Shape, run};
 use std::mem::take;
 use std::ops::Range;
 
 /// Vertices a tile: one to four vector registers, by the machine.
 pub const TILE: usize = 16;
 /// Bodies that share a pass over the model's tables.
-const GROUP: usize = 8;
+const GROUP: usize = 16;
 
 /// One row of `width` numbers a body, or a single one that all bodies share; of width 0 where nothing is given.
 #[derive(Clone, Copy)]
@@ -58,6 +58,7 @@ pub struct Posing<'a, T> {
     skin: &'a Skin<T, TILE>,
     num_bodies: usize,
     form: Form,
+    level: Level,
     bodies: Bodies<'a, T>,
     /// Betas and expressions that are not zero in every body: those after them cost nothing.
     used: [usize; 2],
@@ -65,7 +66,7 @@ pub struct Posing<'a, T> {
     interrupted: &'a (dyn Fn() -> bool + Sync + 'a),
 }
 
-impl<'a, T: Scalar> Posing<'a, T> {
+impl<'a, T: Data> Posing<'a, T> {
     pub fn new(
         skin: &'a Skin<T, TILE>,
         num_bodies: usize,
@@ -73,43 +74,48 @@ impl<'a, T: Scalar> Posing<'a, T> {
         interrupted: &'a (dyn Fn() -> bool + Sync + 'a),
     ) -> Result<Self> {
         check_rows(skin, num_bodies, &bodies)?;
-        Level::current()?;
+        let level = Level::current()?;
         let form = Form::of_width(bodies.pose.width / skin.num_joints()).expect("checked");
         let used = [bodies.betas, bodies.expression].map(used);
-        Ok(Posing { skin, num_bodies, form, bodies, used, interrupted })
+        Ok(Posing { skin, num_bodies, form, level, bodies, used, interrupted })
     }
 
     /// Vertices (B, V, 3) and joints (B, J, 3).
     pub fn forward(&self, vertices: &mut [T], joints: &mut [T]) -> Result<()> {
-        let shaped = self.shaped();
-        self.write(self.start(&shaped), |body| self.parameters(body), |x| x, vertices, joints)
+        T::enter_registers(self.level, Pose { posing: self, vertices, joints })
     }
 
     /// Their derivatives along a direction.
     pub fn jvp(&self, along: &Bodies<T>, vertices: &mut [T], joints: &mut [T]) -> Result<()> {
         self.check_direction(along)?;
         let slope = |x: Dual| if x.slope.is_finite() { T::of(x.slope) } else { T::zero() };
-        self.write(self.skin.start(), |body| self.dual(body, along), slope, vertices, joints)
+        self.write::<Dual>(self.skin.start(), |body| self.dual(body, along), slope, vertices, joints)
     }
 
     /// The gradient of Σ d_vertices · vertices + Σ d_joints · joints.
     pub fn vjp(&self, upstream: Upstream<T>, gradients: Gradients<T>) -> Result<()> {
-        let shaped = self.shaped();
-        self.pull(self.start(&shaped), |body| self.parameters(body), |x| x, |x| x, upstream, gradients)
+        T::enter_registers(self.level, Pull { posing: self, upstream, gradients })
     }
 
     /// The derivative of that gradient along a direction.
     pub fn vjp_jvp(&self, upstream: Upstream<T>, along: &Bodies<T>, gradients: Gradients<T>) -> Result<()> {
         self.check_direction(along)?;
         let parameters = |body| self.dual(body, along);
-        self.pull(self.skin.start(), parameters, |x| Dual::of(x.value()), |x| T::of(x.slope), upstream, gradients)
+        self.pull::<Dual>(
+            self.skin.start(),
+            parameters,
+            |x| Dual::of(x.value()),
+            |x| T::of(x.slope),
+            upstream,
+            gradients,
+        )
     }
 
-    fn write<R: Scalar>(
+    fn write<V: Real>(
         &self,
         start: Start<T, TILE>,
-        parameters: impl Fn(usize) -> Parameters<R> + Sync,
-        number: impl Fn(R) -> T + Copy + Sync,
+        parameters: impl Fn(usize) -> Parameters<V::Scalar> + Sync,
+        number: impl Fn(V::Scalar) -> T + Copy + Sync,
         mut vertices: &mut [T],
         mut joints: &mut [T],
     ) -> Result<()> {
@@ -121,19 +127,20 @@ impl<'a, T: Scalar> Posing<'a, T> {
             (bodies, front(&mut vertices, n * points), front(&mut joints, n * count))
         });
         self.run(groups, |(bodies, vertices, joints)| {
-            let bodies: Vec<_> = bodies.map(|body| self.skin.place(parameters(body))).collect();
+            let bodies: Vec<_> =
+                bodies.map(|body| V::Scalar::apart::<Place, _>((self.skin, parameters(body)))).collect();
             let places = bodies.iter().flat_map(Body::joints).flatten();
             joints.iter_mut().zip(places).for_each(|(out, x)| *out = number(x));
-            wide(Forward { skin: self.skin, start, bodies: &bodies, vertices, number });
+            run::<V, _>(Forward { skin: self.skin, start, bodies: &bodies, vertices, number });
         })
     }
 
-    fn pull<R: Scalar>(
+    fn pull<V: Real>(
         &self,
         start: Start<T, TILE>,
-        parameters: impl Fn(usize) -> Parameters<R> + Sync,
-        constant: impl Fn(T) -> R + Copy + Sync,
-        number: impl Fn(R) -> T + Copy + Sync,
+        parameters: impl Fn(usize) -> Parameters<V::Scalar> + Sync,
+        constant: impl Fn(T) -> V::Scalar + Copy + Sync,
+        number: impl Fn(V::Scalar) -> T + Copy + Sync,
         upstream: Upstream<T>,
         gradients: Gradients<T>,
     ) -> Result<()> {
@@ -149,21 +156,25 @@ impl<'a, T: Scalar> Posing<'a, T> {
             (bodies, gradients)
         });
         self.run(groups, |(range, mut gradients)| {
-            let bodies: Vec<_> = range.clone().map(|body| self.skin.place(parameters(body))).collect();
-            let mut sums: Vec<_> = bodies.iter().map(|_| self.skin.sums(wanted)).collect();
+            let bodies: Vec<_> =
+                range.clone().map(|body| V::Scalar::apart::<Place, _>((self.skin, parameters(body)))).collect();
             let d_vertices = rows(upstream.vertices, range.clone(), points);
-            if !d_vertices.is_empty() {
-                wide(Backward { skin: self.skin, start, bodies: &bodies, d_vertices, constant, sums: &mut sums });
-            }
-            for ((i, body), sums) in range.zip(&bodies).zip(&sums) {
-                let (d_vertices, d_joints) =
-                    (rows(upstream.vertices, i..i + 1, points), rows(upstream.joints, i..i + 1, count));
-                let constants: Vec<R> = d_joints.iter().map(|&x| constant(x)).collect();
-                let gradient = self.skin.gradient(body, sums, &constants);
-                let outs = fronts(&mut gradients, widths);
-                let finite = || all_finite(d_vertices) && all_finite(d_joints);
-                hand_out(body, &gradient, outs, number, finite);
-            }
+            let d_joints = rows(upstream.joints, range, count);
+            let hand_out = |i: usize, body: &Body<V::Scalar>, gradient: Gradient<V::Scalar>| {
+                let finite =
+                    || all_finite(rows(d_vertices, i..i + 1, points)) && all_finite(rows(d_joints, i..i + 1, count));
+                hand_out(body, &gradient, fronts(&mut gradients, widths), number, finite);
+            };
+            run::<V, _>(Backward {
+                skin: self.skin,
+                start,
+                bodies: &bodies,
+                d_vertices,
+                d_joints,
+                constant,
+                wanted,
+                take: hand_out,
+            });
         })
     }
 
@@ -196,14 +207,14 @@ impl<'a, T: Scalar> Posing<'a, T> {
         Ok(widths)
     }
 
-    fn parameters(&self, body: usize) -> Parameters<T> {
+    fn parameters<R: Scalar<Data = T>>(&self, body: usize) -> Parameters<R> {
         let [betas, expression] = self.used;
         Parameters {
             form: self.form,
-            pose: self.bodies.pose.of(body).to_vec(),
-            betas: self.bodies.betas.of(body)[..betas].to_vec(),
-            expression: self.bodies.expression.of(body)[..expression].to_vec(),
-            transl: triple(self.bodies.transl.of(body)),
+            pose: read(self.bodies.pose.of(body)),
+            betas: read(&self.bodies.betas.of(body)[..betas]),
+            expression: read(&self.bodies.expression.of(body)[..expression]),
+            transl: triple(&read::<R>(self.bodies.transl.of(body))),
         }
     }
 
@@ -224,11 +235,17 @@ impl<'a, T: Scalar> Posing<'a, T> {
     }
 
     /// The resting body of the one shape that several bodies share.
-    fn shaped(&self) -> Option<Vec<Tile<T, TILE>>> {
+    fn shaped<V: Real<Data = T>>(&self) -> Option<Vec<Tile<T, TILE>>> {
         let [betas, expression] = [(self.bodies.betas, self.used[0]), (self.bodies.expression, self.used[1])];
         let alike = |(rows, used): (Rows<T>, usize)| rows.shared || used == 0;
         let pays = self.num_bodies > 1 && betas.1 + expression.1 > 0 && alike(betas) && alike(expression);
-        pays.then(|| self.skin.shaped(&betas.0.of(0)[..betas.1], &expression.0.of(0)[..expression.1]))
+        pays.then(|| {
+            let (betas, expression): (Vec<V::Scalar>, Vec<V::Scalar>) =
+                (read(&betas.0.of(0)[..betas.1]), read(&expression.0.of(0)[..expression.1]));
+            let mut shaped = Vec::new();
+            run::<V, _>(Shape { skin: self.skin, betas: &betas, expression: &expression, shaped: &mut shaped });
+            shaped
+        })
     }
 
     fn start<'s>(&'s self, shaped: &'s Option<Vec<Tile<T, TILE>>>) -> Start<'s, T, TILE> {
@@ -244,6 +261,40 @@ impl<'a, T: Scalar> Posing<'a, T> {
 
     fn run<P: Send>(&self, groups: Vec<P>, work: impl Fn(P) + Sync) -> Result<()> {
         threads::each(groups, true, self.interrupted, &work)
+    }
+}
+
+struct Pose<'a, T> {
+    posing: &'a Posing<'a, T>,
+    vertices: &'a mut [T],
+    joints: &'a mut [T],
+}
+
+impl<T: Data> Work<T> for Pose<'_, T> {
+    type Output = Result<()>;
+
+    fn run<V: Real<Data = T>>(self) -> Result<()> {
+        let Pose { posing, vertices, joints } = self;
+        let shaped = posing.shaped::<V>();
+        let parameters = |body| posing.parameters::<V::Scalar>(body);
+        posing.write::<V>(posing.start(&shaped), parameters, Scalar::data, vertices, joints)
+    }
+}
+
+struct Pull<'a, 'b, T> {
+    posing: &'a Posing<'a, T>,
+    upstream: Upstream<'a, T>,
+    gradients: Gradients<'b, T>,
+}
+
+impl<T: Data> Work<T> for Pull<'_, '_, T> {
+    type Output = Result<()>;
+
+    fn run<V: Real<Data = T>>(self) -> Result<()> {
+        let Pull { posing, upstream, gradients } = self;
+        let shaped = posing.shaped::<V>();
+        let parameters = |body| posing.parameters::<V::Scalar>(body);
+        posing.pull::<V>(posing.start(&shaped), parameters, V::Scalar::read, Scalar::data, upstream, gradients)
     }
 }
 
@@ -265,14 +316,14 @@ fn hand_out<R: Scalar, T: Scalar>(
     }
 }
 
-fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
-    numbers.iter().all(|x| x.value().is_finite())
-}
-
 /// How many leading columns have a number other than zero.
 fn used<T: Scalar>(rows: Rows<T>) -> usize {
     let last = |row: &[T]| row.iter().rposition(|x| x.value() != 0.0).map_or(0, |last| last + 1);
     rows.numbers.chunks_exact(rows.width.max(1)).map(last).max().unwrap_or(0)
+}
+
+fn read<R: Scalar>(numbers: &[R::Data]) -> Vec<R> {
+    numbers.iter().map(|&x| R::read(x)).collect()
 }
 
 fn triple<R: Real>(numbers: &[R]) -> [R; 3] {

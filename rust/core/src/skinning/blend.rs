@@ -1,19 +1,34 @@
 //! Blend shapes: directions in which the resting vertices move, times amounts.
 //!
-//! Vertices come in tiles of W, x, y and z apart, so that a loop over a tile fills vector registers. A tile's sums stay
-//! in registers while its directions stream past once, and the next body finds them in the cache.
+//! Vertices come in tiles of W, x, y and z apart, so that a loop over a tile fills vector registers. The sums of N bodies
+//! stay in registers while a tile's directions stream past once.
 
 use crate::number::{Real, Scalar};
 
+/// A number of W vertices each, from the start of a cache line: a register of them is never read from two lines.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+pub struct Row<C, const W: usize>(pub [C; W]);
+
 /// W vertices: x of each, y of each, z of each.
-pub type Tile<R, const W: usize> = [[R; W]; 3];
+pub type Tile<C, const W: usize> = [Row<C, W>; 3];
+
+/// The same in P registers an axis.
+pub type Registers<V, const P: usize> = [[V; P]; 3];
+
+/// A register of constants: the part-th of a row.
+#[inline(always)]
+pub fn load<V: Real, C: Scalar, const W: usize>(row: &Row<C, W>, part: usize) -> V {
+    let numbers = &row.0[part * V::LANES..][..V::LANES];
+    V::from_lanes(|lane| V::Scalar::of(numbers[lane].value()))
+}
 
 /// Points (V, 3) cut into tiles, the last one filled up with zeros.
 pub fn tiles<C: Scalar, const W: usize>(numbers: &[f64]) -> Vec<Tile<C, W>> {
     let points = numbers.as_chunks::<3>().0;
     let tile = |points: &[[f64; 3]]| {
         // −0 + 0 is 0: adding a direction zero times must change no bit.
-        std::array::from_fn(|axis| std::array::from_fn(|i| C::of(points.get(i).map_or(0.0, |p| p[axis] + 0.0))))
+        std::array::from_fn(|axis| Row(std::array::from_fn(|i| C::of(points.get(i).map_or(0.0, |p| p[axis] + 0.0)))))
     };
     points.chunks(W).map(tile).collect()
 }
@@ -35,7 +50,8 @@ impl<C: Scalar, const W: usize> Blend<C, W> {
         let mut directions = Vec::with_capacity(num_tiles * count);
         for tile in 0..num_tiles {
             for k in 0..count {
-                directions.push(std::array::from_fn(|axis| std::array::from_fn(|i| number(tile * W + i, axis, k))));
+                directions
+                    .push(std::array::from_fn(|axis| Row(std::array::from_fn(|i| number(tile * W + i, axis, k)))));
             }
         }
         Blend { count, directions }
@@ -46,34 +62,95 @@ impl<C: Scalar, const W: usize> Blend<C, W> {
         self.count
     }
 
-    /// total += Σ amounts · directions; amounts left out are zero.
+    /// totals += Σ amounts · directions, for N bodies; amounts left out are zero.
     #[inline(always)]
-    pub fn forward<R: Real>(&self, tile: usize, amounts: &[R], total: &mut Tile<R, W>) {
+    pub fn forward<V: Real, const P: usize, const N: usize>(
+        &self,
+        tile: usize,
+        amounts: &[[V::Scalar; N]],
+        totals: &mut [Registers<V, P>; N],
+    ) {
         let directions = &self.directions[tile * self.count..][..amounts.len()];
-        let mut sum = *total;
-        for (direction, &amount) in directions.iter().zip(amounts) {
-            for axis in 0..3 {
-                for i in 0..W {
-                    sum[axis][i] = sum[axis][i] + amount * R::of(direction[axis][i].value());
+        let mut sums = *totals;
+        for (direction, amounts) in directions.iter().zip(amounts) {
+            // In this order few registers are needed beside those of the sums.
+            for part in 0..P {
+                let mut along = [V::zero(); 3];
+                for axis in 0..3 {
+                    along[axis] = load(&direction[axis], part);
+                }
+                for body in 0..N {
+                    let amount: V = all(amounts[body]);
+                    for axis in 0..3 {
+                        sums[body][axis][part] = along[axis].mul_add(amount, sums[body][axis][part]);
+                    }
                 }
             }
         }
-        *total = sum;
+        *totals = sums;
     }
 
-    /// The gradient by the amounts, as W sums each.
+    /// The gradient by the amounts, as W sums each, from that by the points of a few tiles: so few that their directions
+    /// are still in the cache, and so many that the sums are rarely fetched.
     #[inline(always)]
-    pub fn backward<R: Real>(&self, tile: usize, d_points: &Tile<R, W>, d_amounts: &mut [[R; W]]) {
-        let directions = &self.directions[tile * self.count..][..d_amounts.len()];
-        let d_points = *d_points;
-        for (direction, d_amount) in directions.iter().zip(d_amounts) {
-            let mut sum = *d_amount;
+    pub fn backward<V: Real, const P: usize, const N: usize>(
+        &self,
+        first_tile: usize,
+        d_points: &[[Registers<V, P>; N]],
+        d_amounts: &mut [[[V; P]; N]],
+    ) {
+        let (blocks, rest) = d_amounts.as_chunks_mut::<TOGETHER>();
+        let past = blocks.len() * TOGETHER;
+        for (block, d_amounts) in blocks.iter_mut().enumerate() {
+            self.backward_block(first_tile, block * TOGETHER, d_points, d_amounts);
+        }
+        for (k, d_amount) in rest.iter_mut().enumerate() {
+            self.backward_block(first_tile, past + k, d_points, std::array::from_mut(d_amount));
+        }
+    }
+
+    /// [`Blend::backward`] for K directions from the first on.
+    #[inline(always)]
+    fn backward_block<V: Real, const P: usize, const N: usize, const K: usize>(
+        &self,
+        first_tile: usize,
+        first: usize,
+        d_points: &[[Registers<V, P>; N]],
+        d_amounts: &mut [[[V; P]; N]; K],
+    ) {
+        let mut sums = [[[V::zero(); P]; N]; K];
+        for (tile, d_points) in d_points.iter().enumerate() {
+            let start = (first_tile + tile) * self.count + first;
+            let directions: &[Tile<C, W>; K] = self.directions[start..].first_chunk().expect("as many as counted");
             for axis in 0..3 {
-                for i in 0..W {
-                    sum[i] = sum[i] + R::of(direction[axis][i].value()) * d_points[axis][i];
+                for part in 0..P {
+                    let mut along = [V::zero(); K];
+                    for k in 0..K {
+                        along[k] = load(&directions[k][axis], part);
+                    }
+                    for body in 0..N {
+                        for k in 0..K {
+                            sums[k][body][part] = along[k].mul_add(d_points[body][axis][part], sums[k][body][part]);
+                        }
+                    }
                 }
             }
-            *d_amount = sum;
+        }
+        for k in 0..K {
+            for body in 0..N {
+                for part in 0..P {
+                    d_amounts[k][body][part] = d_amounts[k][body][part] + sums[k][body][part];
+                }
+            }
         }
     }
 }
+
+/// One number in all lanes.
+#[inline(always)]
+pub fn all<V: Real>(number: V::Scalar) -> V {
+    V::from_lanes(|_| number)
+}
+
+/// Directions whose sums stay in registers together.
+const TOGETHER: usize = 3;

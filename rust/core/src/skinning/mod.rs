@@ -15,7 +15,7 @@ pub mod weights;
 use crate::error::Result;
 use crate::number::vector::{Vec3, add, add_scaled, narrow, of, sub, widen};
 use crate::number::{Real, Scalar};
-use blend::{Blend, Tile, tiles};
+use blend::{Blend, Registers, Tile, all, load, tiles};
 use chain::{Chain, Skeleton, add_outer, apply, apply_transposed};
 pub use model::Model;
 use rotation::Form;
@@ -79,13 +79,43 @@ pub struct Wanted {
     pub expression: usize,
 }
 
-/// The gradient of one body, gathered tile by tile; W sums each.
-pub struct Sums<R: Real, const W: usize> {
-    transforms: Vec<Transform<[R; W]>>,
-    betas: Vec<[R; W]>,
-    expression: Vec<[R; W]>,
-    features: Vec<[R; W]>,
-    transl: Tile<R::Wide, W>,
+/// N bodies that move their vertices together, so that the directions are read once for all of them.
+pub struct Block<'a, R: Real, const N: usize> {
+    pub bodies: &'a [Body<R>; N],
+    betas: Vec<[R; N]>,
+    expression: Vec<[R; N]>,
+    features: Vec<[R; N]>,
+}
+
+/// The gradient of N bodies, gathered tile by tile; as many sums each as a tile has vertices.
+pub struct Sums<V: Real, const P: usize, const N: usize> {
+    betas: Vec<[[V; P]; N]>,
+    expression: Vec<[[V; P]; N]>,
+    features: Vec<[[V; P]; N]>,
+    rigid: Vec<Rigid<V, P>>,
+}
+
+/// The gradient of one body by its joints' transforms and its translation.
+struct Rigid<V: Real, const P: usize> {
+    transforms: Vec<Transform<[V; P]>>,
+    transl: Vec3<Wide<V>>,
+}
+
+/// The sums of one body.
+pub struct Totals<R: Real> {
+    transforms: Vec<Transform<R::Wide>>,
+    betas: Vec<R::Wide>,
+    expression: Vec<R::Wide>,
+    features: Vec<R::Wide>,
+    transl: Vec3<R::Wide>,
+}
+
+/// One lane of a register in double precision.
+type Wide<V> = <<V as Real>::Scalar as Real>::Wide;
+
+/// Tells the gradient by a body's vertices in a tile.
+pub trait Pulls<V, const P: usize> {
+    fn of(&self, body: usize, tile: usize) -> Registers<V, P>;
 }
 
 /// The gradient of one body by its parameters.
@@ -139,9 +169,24 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
     }
 
     /// The resting tiles of one shape, for bodies that all have it.
-    pub fn shaped(&self, betas: &[C], expression: &[C]) -> Vec<Tile<C, W>> {
-        let shaped = |(tile, &points)| plus(points, self.shape(tile, betas, expression));
-        self.template.iter().enumerate().map(shaped).collect()
+    #[inline(always)]
+    pub fn shaped<V: Real<Data = C>, const P: usize>(
+        &self,
+        betas: &[V::Scalar],
+        expression: &[V::Scalar],
+    ) -> Vec<Tile<C, W>> {
+        let (betas, expression) = (betas.as_chunks::<1>().0, expression.as_chunks::<1>().0);
+        let mut shaped = self.template.clone();
+        for (tile, points) in shaped.iter_mut().enumerate() {
+            let [displacement]: [Registers<V, P>; 1] = self.shape(tile, betas, expression);
+            let rest = plus(constants(points), displacement);
+            for axis in 0..3 {
+                for i in 0..W {
+                    points[axis].0[i] = rest[axis][i / V::LANES].lane(i % V::LANES).data();
+                }
+            }
+        }
+        shaped
     }
 
     /// Puts the joints of one body in their places.
@@ -183,88 +228,157 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
 
     /// The resting vertices of one tile.
     #[inline(always)]
-    fn rest<R: Real>(&self, start: Start<C, W>, tile: usize, body: &Body<R>) -> Tile<R, W> {
+    fn rest<V: Real, const P: usize, const N: usize>(
+        &self,
+        start: Start<C, W>,
+        tile: usize,
+        block: &Block<V::Scalar, N>,
+    ) -> [Registers<V, P>; N] {
         // Displacements are summed by themselves: beside the template's metres each addition would round.
-        let mut rest = constants(&start.tiles[tile]);
+        let mut rest = [constants(&start.tiles[tile]); N];
         if !start.shaped {
-            let Parameters { betas, expression, .. } = &body.parameters;
-            rest = plus(rest, self.shape(tile, betas, expression));
+            let displacements = self.shape(tile, &block.betas, &block.expression);
+            for body in 0..N {
+                rest[body] = plus(rest[body], displacements[body]);
+            }
         }
-        if !body.features.is_empty() {
-            let mut displacement = [[R::zero(); W]; 3];
-            self.pose.forward(tile, &body.features, &mut displacement);
-            rest = plus(rest, displacement);
+        if !block.features.is_empty() {
+            let mut displacements = [[[V::zero(); P]; 3]; N];
+            self.pose.forward(tile, &block.features, &mut displacements);
+            for body in 0..N {
+                rest[body] = plus(rest[body], displacements[body]);
+            }
         }
         rest
     }
 
     /// The displacements of one tile by the shape.
     #[inline(always)]
-    fn shape<R: Real>(&self, tile: usize, betas: &[R], expression: &[R]) -> Tile<R, W> {
-        let mut displacement = [[R::zero(); W]; 3];
-        self.betas.surface.forward(tile, betas, &mut displacement);
-        self.expression.surface.forward(tile, expression, &mut displacement);
-        displacement
+    fn shape<V: Real, const P: usize, const N: usize>(
+        &self,
+        tile: usize,
+        betas: &[[V::Scalar; N]],
+        expression: &[[V::Scalar; N]],
+    ) -> [Registers<V, P>; N] {
+        let mut displacements = [[[V::zero(); P]; 3]; N];
+        self.betas.surface.forward(tile, betas, &mut displacements);
+        self.expression.surface.forward(tile, expression, &mut displacements);
+        displacements
     }
 
     /// The posed vertices of one tile.
     #[inline(always)]
-    pub fn forward<R: Real>(&self, start: Start<C, W>, tile: usize, body: &Body<R>) -> Tile<R, W> {
-        let rest = self.rest(start, tile, body);
-        let mut posed = self.weights.forward(tile, &body.transforms, &rest);
-        for axis in 0..3 {
-            for i in 0..W {
-                posed[axis][i] = posed[axis][i] + body.shift[axis];
-            }
-        }
-        posed
-    }
-
-    /// Empty sums for the gradient of one body.
-    pub fn sums<R: Real>(&self, wanted: Wanted) -> Sums<R, W> {
-        let none = [R::zero(); W];
-        Sums {
-            transforms: vec![[[none; 4]; 3]; self.num_joints()],
-            betas: vec![none; wanted.betas],
-            expression: vec![none; wanted.expression],
-            features: vec![none; if wanted.pose { self.pose.count() } else { 0 }],
-            transl: [[R::Wide::zero(); W]; 3],
-        }
-    }
-
-    /// Adds the share of one tile, whose vertices have the gradient `d`.
-    #[inline(always)]
-    pub fn backward<R: Real>(
+    pub fn forward<V: Real, const P: usize, const N: usize>(
         &self,
         start: Start<C, W>,
         tile: usize,
-        body: &Body<R>,
-        d: &Tile<R, W>,
-        sums: &mut Sums<R, W>,
-    ) {
-        let rest = self.rest(start, tile, body);
-        self.weights.backward(tile, &rest, d, &mut sums.transforms);
-        for axis in 0..3 {
-            for i in 0..W {
-                d[axis][i].add_to(&mut sums.transl[axis][i]);
+        block: &Block<V::Scalar, N>,
+    ) -> [Registers<V, P>; N] {
+        let mut tiles = self.rest(start, tile, block);
+        for i in 0..N {
+            let body = &block.bodies[i];
+            tiles[i] = self.weights.forward(tile, &body.transforms, &tiles[i]);
+            for axis in 0..3 {
+                for part in 0..P {
+                    tiles[i][axis][part] = tiles[i][axis][part] + all(body.shift[axis]);
+                }
             }
         }
-        if sums.betas.len() + sums.expression.len() + sums.features.len() > 0 {
-            let d_rest = self.weights.backward_rest(tile, &body.transforms, d);
-            self.betas.surface.backward(tile, &d_rest, &mut sums.betas);
-            self.expression.surface.backward(tile, &d_rest, &mut sums.expression);
-            self.pose.backward(tile, &d_rest, &mut sums.features);
+        tiles
+    }
+
+    /// Empty sums for the gradient of N bodies.
+    pub fn sums<V: Real, const P: usize, const N: usize>(&self, wanted: Wanted) -> Sums<V, P, N> {
+        let none = [V::zero(); P];
+        let rigid = || Rigid { transforms: vec![[[none; 4]; 3]; self.num_joints()], transl: [Wide::<V>::zero(); 3] };
+        Sums {
+            betas: vec![[none; N]; wanted.betas],
+            expression: vec![[none; N]; wanted.expression],
+            features: vec![[none; N]; if wanted.pose { self.pose.count() } else { 0 }],
+            rigid: (0..N).map(|_| rigid()).collect(),
         }
     }
 
-    /// From the sums over all tiles, and the gradient `d_joints` (J, 3) by the posed joints, to the parameters.
+    /// Adds the share of the tiles from the first on, up to T; `upstream` tells the gradient by a body's vertices in a
+    /// tile.
     #[inline(always)]
-    pub fn gradient<R: Real>(&self, body: &Body<R>, sums: &Sums<R, W>, d_joints: &[R]) -> Gradient<R> {
-        let mut transl = sums.transl.map(total::<R::Wide, W>);
+    pub fn backward<V: Real, const P: usize, const N: usize, const T: usize>(
+        &self,
+        start: Start<C, W>,
+        first: usize,
+        block: &Block<V::Scalar, N>,
+        upstream: &impl Pulls<V, P>,
+        sums: &mut Sums<V, P, N>,
+    ) {
+        let blends = sums.betas.len() + sums.expression.len() + sums.features.len() > 0;
+        let count = T.min(self.num_tiles() - first);
+        let mut d_rest = [[[[V::zero(); P]; 3]; N]; T];
+        let mut d_transl = [[[V::zero(); P]; 3]; N];
+        for (tile, d_rest) in d_rest[..count].iter_mut().enumerate() {
+            let tile = first + tile;
+            let rest: [Registers<V, P>; N] = self.rest(start, tile, block);
+            for i in 0..N {
+                let (d, rigid, transforms) = (upstream.of(i, tile), &mut sums.rigid[i], &block.bodies[i].transforms);
+                self.weights.backward(tile, &rest[i], &d, &mut rigid.transforms);
+                d_transl[i] = plus(d_transl[i], d);
+                if blends {
+                    d_rest[i] = self.weights.backward_rest(tile, transforms, &d);
+                }
+            }
+        }
+        for (rigid, d_transl) in sums.rigid.iter_mut().zip(&d_transl) {
+            for axis in 0..3 {
+                rigid.transl[axis] = rigid.transl[axis] + fold::<_, W>(spread(&d_transl[axis]));
+            }
+        }
+        self.betas.surface.backward(first, &d_rest[..count], &mut sums.betas);
+        self.expression.surface.backward(first, &d_rest[..count], &mut sums.expression);
+        self.pose.backward(first, &d_rest[..count], &mut sums.features);
+    }
+
+    /// The sums over all tiles of one of the bodies.
+    #[inline(always)]
+    pub fn totals<V: Real, const P: usize, const N: usize>(
+        &self,
+        sums: &Sums<V, P, N>,
+        body: usize,
+    ) -> Totals<V::Scalar> {
+        let Rigid { transforms, transl } = &sums.rigid[body];
+        let mut totals = Totals {
+            transforms: Vec::with_capacity(transforms.len()),
+            betas: Vec::with_capacity(sums.betas.len()),
+            expression: Vec::with_capacity(sums.expression.len()),
+            features: Vec::with_capacity(sums.features.len()),
+            transl: *transl,
+        };
+        for transform in transforms {
+            let mut total = [[Wide::<V>::zero(); 4]; 3];
+            for row in 0..3 {
+                for column in 0..4 {
+                    total[row][column] = fold::<_, W>(spread(&transform[row][column]));
+                }
+            }
+            totals.transforms.push(total);
+        }
+        for (totals, sums) in [
+            (&mut totals.betas, &sums.betas),
+            (&mut totals.expression, &sums.expression),
+            (&mut totals.features, &sums.features),
+        ] {
+            for sums in sums {
+                totals.push(fold::<_, W>(spread(&sums[body])));
+            }
+        }
+        totals
+    }
+
+    /// From the totals, and the gradient `d_joints` (J, 3) by the posed joints, to the parameters.
+    #[inline(always)]
+    pub fn gradient<R: Real>(&self, body: &Body<R>, totals: &Totals<R>, d_joints: &[R]) -> Gradient<R> {
+        let mut transl = totals.transl;
         let mut d_turned = Vec::with_capacity(self.num_joints());
         let mut d_offsets = Vec::with_capacity(self.num_joints());
-        for transform in &sums.transforms {
-            let rows = transform.map(|row| row.map(total));
+        for rows in &totals.transforms {
             d_turned.push(rows.map(|[x, y, z, _]| [x, y, z]));
             d_offsets.push(rows.map(|row| row[3]));
         }
@@ -283,9 +397,9 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
             let pulled = apply_transposed(&body.chain.turned[j], d_offset);
             d_chain.rest_joints[j] = sub(d_chain.rest_joints[j], pulled);
         }
-        for (feature, sum) in sums.features.iter().enumerate() {
+        for (feature, &total) in totals.features.iter().enumerate() {
             let entry = &mut d_chain.local[1 + feature / 9][feature % 9 / 3][feature % 3];
-            *entry = *entry + total(*sum);
+            *entry = *entry + total;
         }
 
         let form = body.parameters.form;
@@ -296,9 +410,24 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
         }
         Gradient {
             pose: d_pose.into_iter().map(R::narrow).collect(),
-            betas: self.betas.gradient(&sums.betas, &d_chain.rest_joints),
-            expression: self.expression.gradient(&sums.expression, &d_chain.rest_joints),
+            betas: self.betas.gradient(&totals.betas, &d_chain.rest_joints),
+            expression: self.expression.gradient(&totals.expression, &d_chain.rest_joints),
             transl: narrow(transl),
+        }
+    }
+}
+
+impl<'a, R: Real, const N: usize> Block<'a, R, N> {
+    pub fn new(bodies: &'a [Body<R>; N]) -> Self {
+        let together = |of: fn(&Body<R>) -> &[R]| {
+            let numbers = bodies.each_ref().map(of);
+            (0..numbers[0].len()).map(|k| numbers.map(|numbers| numbers[k])).collect()
+        };
+        Block {
+            bodies,
+            betas: together(|body| &body.parameters.betas),
+            expression: together(|body| &body.parameters.expression),
+            features: together(|body| &body.features),
         }
     }
 }
@@ -322,10 +451,10 @@ impl<C: Scalar, const W: usize> Directions<C, W> {
     }
 
     #[inline(always)]
-    fn gradient<R: Real>(&self, sums: &[[R; W]], d_joints: &[Vec3<R::Wide>]) -> Vec<R> {
-        let mut d_amounts = Vec::with_capacity(sums.len());
-        for (k, &sum) in sums.iter().enumerate() {
-            let mut d = total(sum);
+    fn gradient<R: Real>(&self, totals: &[R::Wide], d_joints: &[Vec3<R::Wide>]) -> Vec<R> {
+        let mut d_amounts = Vec::with_capacity(totals.len());
+        for (k, &total) in totals.iter().enumerate() {
+            let mut d = total;
             for (j, d_joint) in d_joints.iter().enumerate() {
                 let direction = self.joint::<R::Wide>(j, k);
                 for axis in 0..3 {
@@ -359,31 +488,45 @@ fn features<R: Real>(local: &[Mat3<R::Wide>]) -> Vec<R> {
 }
 
 #[inline(always)]
-fn constants<R: Real, C: Scalar, const W: usize>(tile: &Tile<C, W>) -> Tile<R, W> {
-    let mut numbers = [[R::zero(); W]; 3];
+fn constants<V: Real, C: Scalar, const W: usize, const P: usize>(tile: &Tile<C, W>) -> Registers<V, P> {
+    let mut numbers = [[V::zero(); P]; 3];
     for axis in 0..3 {
-        for i in 0..W {
-            numbers[axis][i] = R::of(tile[axis][i].value());
+        for part in 0..P {
+            numbers[axis][part] = load(&tile[axis], part);
         }
     }
     numbers
 }
 
 #[inline(always)]
-fn plus<R: Real, const W: usize>(mut a: Tile<R, W>, b: Tile<R, W>) -> Tile<R, W> {
+fn plus<V: Real, const P: usize>(mut a: Registers<V, P>, b: Registers<V, P>) -> Registers<V, P> {
     for axis in 0..3 {
-        for i in 0..W {
-            a[axis][i] = a[axis][i] + b[axis][i];
+        for part in 0..P {
+            a[axis][part] = a[axis][part] + b[axis][part];
         }
     }
     a
 }
 
+/// The lanes of P registers in double precision.
 #[inline(always)]
-fn total<R: Real, const W: usize>(sums: [R; W]) -> R::Wide {
-    let mut sum = R::Wide::zero();
-    for part in sums {
-        part.add_to(&mut sum);
+fn spread<V: Real, const P: usize, const W: usize>(registers: &[V; P]) -> [Wide<V>; W] {
+    let mut numbers = [Wide::<V>::zero(); W];
+    for (number, i) in numbers.iter_mut().zip(0..) {
+        *number = registers[i / V::LANES].lane(i % V::LANES).widen();
     }
-    sum
+    numbers
+}
+
+/// Their sum, in the same order for registers of any size.
+#[inline(always)]
+fn fold<R: Real, const W: usize>(mut numbers: [R; W]) -> R {
+    let mut half = W / 2;
+    while half > 0 {
+        for i in 0..half {
+            numbers[i] = numbers[i] + numbers[i + half];
+        }
+        half /= 2;
+    }
+    numbers[0]
 }

@@ -1,6 +1,6 @@
 //! Skinning weights: each vertex follows a few joints, and neighbours mostly follow the same ones.
 
-use super::blend::Tile;
+use super::blend::{Registers, Row, all, load};
 use crate::number::{Real, Scalar};
 
 /// A joint's rigid motion: rows (rotation, offset) of a 3 × 4 matrix.
@@ -10,7 +10,7 @@ pub type Transform<R> = [[R; 4]; 3];
 pub struct Weights<C, const W: usize> {
     starts: Vec<usize>,
     joints: Vec<usize>,
-    weights: Vec<[C; W]>,
+    weights: Vec<Row<C, W>>,
 }
 
 impl<C: Scalar, const W: usize> Weights<C, W> {
@@ -23,7 +23,7 @@ impl<C: Scalar, const W: usize> Weights<C, W> {
                     std::array::from_fn(|i| rows.get(i * num_joints + joint).copied().unwrap_or_default());
                 if column.iter().any(|&weight| weight != 0.0) {
                     table.joints.push(joint);
-                    table.weights.push(column.map(C::of));
+                    table.weights.push(Row(column.map(C::of)));
                 }
             }
             table.starts.push(table.joints.len());
@@ -32,50 +32,65 @@ impl<C: Scalar, const W: usize> Weights<C, W> {
     }
 
     #[inline(always)]
-    fn of_tile(&self, tile: usize) -> impl Iterator<Item = (usize, &[C; W])> {
+    fn of_tile(&self, tile: usize) -> impl Iterator<Item = (usize, &Row<C, W>)> {
         let range = self.starts[tile]..self.starts[tile + 1];
         self.joints[range.clone()].iter().copied().zip(&self.weights[range])
     }
 
     /// Σ weights · transforms, applied to each vertex.
     #[inline(always)]
-    pub fn forward<R: Real>(&self, tile: usize, transforms: &[Transform<R>], rest: &Tile<R, W>) -> Tile<R, W> {
-        let mut posed = [[R::zero(); W]; 3];
+    pub fn forward<V: Real, const P: usize>(
+        &self,
+        tile: usize,
+        transforms: &[Transform<V::Scalar>],
+        rest: &Registers<V, P>,
+    ) -> Registers<V, P> {
+        let mut posed = [[V::zero(); P]; 3];
         for row in 0..3 {
-            let blended = |column: usize| self.blended(tile, transforms, row, column);
-            let [x, y, z, offset] = [blended(0), blended(1), blended(2), blended(3)];
-            for i in 0..W {
-                posed[row][i] = x[i] * rest[0][i] + y[i] * rest[1][i] + z[i] * rest[2][i] + offset[i];
+            let [x, y, z, offset]: [[V; P]; 4] = self.blended(tile, transforms, row);
+            for i in 0..P {
+                let turned = z[i].mul_add(rest[2][i], y[i].mul_add(rest[1][i], x[i] * rest[0][i]));
+                posed[row][i] = turned + offset[i];
             }
         }
         posed
     }
 
-    /// One number of each vertex's blended transform.
+    /// One row of each vertex's blended transform, or its first numbers.
     #[inline(always)]
-    fn blended<R: Real>(&self, tile: usize, transforms: &[Transform<R>], row: usize, column: usize) -> [R; W] {
-        let mut sum = [R::zero(); W];
+    fn blended<V: Real, const P: usize, const COLUMNS: usize>(
+        &self,
+        tile: usize,
+        transforms: &[Transform<V::Scalar>],
+        row: usize,
+    ) -> [[V; P]; COLUMNS] {
+        let mut sums = [[V::zero(); P]; COLUMNS];
         for (joint, weights) in self.of_tile(tile) {
-            let number = transforms[joint][row][column];
-            for i in 0..W {
-                sum[i] = sum[i] + R::of(weights[i].value()) * number;
+            let numbers = &transforms[joint][row];
+            for part in 0..P {
+                let weight: V = load(weights, part);
+                for column in 0..COLUMNS {
+                    sums[column][part] = weight.mul_add(all(numbers[column]), sums[column][part]);
+                }
             }
         }
-        sum
+        sums
     }
 
     /// The gradient by the resting vertices.
     #[inline(always)]
-    pub fn backward_rest<R: Real>(&self, tile: usize, transforms: &[Transform<R>], d: &Tile<R, W>) -> Tile<R, W> {
-        let mut d_rest = [[R::zero(); W]; 3];
-        for (joint, weights) in self.of_tile(tile) {
-            let transform = &transforms[joint];
+    pub fn backward_rest<V: Real, const P: usize>(
+        &self,
+        tile: usize,
+        transforms: &[Transform<V::Scalar>],
+        d: &Registers<V, P>,
+    ) -> Registers<V, P> {
+        let mut d_rest = [[V::zero(); P]; 3];
+        for row in 0..3 {
+            let blended: [[V; P]; 3] = self.blended(tile, transforms, row);
             for column in 0..3 {
-                for i in 0..W {
-                    let pulled = transform[0][column] * d[0][i]
-                        + transform[1][column] * d[1][i]
-                        + transform[2][column] * d[2][i];
-                    d_rest[column][i] = d_rest[column][i] + R::of(weights[i].value()) * pulled;
+                for i in 0..P {
+                    d_rest[column][i] = blended[column][i].mul_add(d[row][i], d_rest[column][i]);
                 }
             }
         }
@@ -84,25 +99,22 @@ impl<C: Scalar, const W: usize> Weights<C, W> {
 
     /// The gradient by the transforms, as W sums each.
     #[inline(always)]
-    pub fn backward<R: Real>(
+    pub fn backward<V: Real, const P: usize>(
         &self,
         tile: usize,
-        rest: &Tile<R, W>,
-        d: &Tile<R, W>,
-        d_transforms: &mut [Transform<[R; W]>],
+        rest: &Registers<V, P>,
+        d: &Registers<V, P>,
+        d_transforms: &mut [Transform<[V; P]>],
     ) {
         for (joint, weights) in self.of_tile(tile) {
             for row in 0..3 {
-                let mut pull = [R::zero(); W];
-                for i in 0..W {
-                    pull[i] = R::of(weights[i].value()) * d[row][i];
-                }
                 let [x, y, z, offset] = &mut d_transforms[joint][row];
-                for i in 0..W {
-                    x[i] = x[i] + pull[i] * rest[0][i];
-                    y[i] = y[i] + pull[i] * rest[1][i];
-                    z[i] = z[i] + pull[i] * rest[2][i];
-                    offset[i] = offset[i] + pull[i];
+                for i in 0..P {
+                    let pull = load::<V, C, W>(weights, i) * d[row][i];
+                    x[i] = pull.mul_add(rest[0][i], x[i]);
+                    y[i] = pull.mul_add(rest[1][i], y[i]);
+                    z[i] = pull.mul_add(rest[2][i], z[i]);
+                    offset[i] = offset[i] + pull;
                 }
             }
         }

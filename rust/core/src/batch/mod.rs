@@ -3,21 +3,26 @@
 //! Every body is computed from start to end in one lane by one thread, and all numbers of a CPU level round alike, so its
 //! bits depend neither on the number of threads nor on its neighbours nor on its place.
 
+mod findings;
+mod lanes;
+
 use crate::analysis::{Analysis, Polygon};
 use crate::error::{Error, Result, status};
 use crate::ground::Ground;
 use crate::losses::terms::Terms;
 use crate::mass::Method;
-use crate::number::gate::{Level, Work};
-use crate::number::vector::{Vec3, sub};
-use crate::number::{Data, Dual, Real, Scalar};
+use crate::number::gate::Level;
+use crate::number::vector::Vec3;
+use crate::number::{Data, Dual, Real, Scalar, all_finite};
 use crate::quantity::Quantity;
 use crate::scene::{self, Scene};
 use crate::support::{BaseOfSupport, Contact};
 use crate::template::Template;
 use crate::threads::{self, num_threads};
-use crate::volume::SignedVolumes;
-use std::mem::MaybeUninit;
+#[cfg(feature = "lp")]
+use findings::SupportedLp;
+use findings::{Find, Finding, Status, Support};
+use lanes::{Figures, Forward, ForwardAndBackward, ForwardAndJacobian, OnLanes, ReadBodies, zero_if_undefined};
 
 /// `num_bodies` poses of one template, each over its ground.
 pub struct Batch<'a, T> {
@@ -149,7 +154,7 @@ impl<'a, T: Data> Batch<'a, T> {
                 for (out, d) in out.iter_mut().zip(d_points.as_flattened()) {
                     *out = T::of(d.slope);
                 }
-                zero_if_undefined(out, d_out.iter().all(|d| d.value.is_finite()));
+                zero_if_undefined(out, all_finite(&d_out));
             });
         })
     }
@@ -254,9 +259,7 @@ impl<'a, T: Data> Batch<'a, T> {
     /// The body's local origin, if all its vertices are finite.
     fn origin(&self, body: usize) -> Option<Vec3<f64>> {
         let vertices = self.vertices_of(body);
-        let broken = |piece: &[T]| piece.iter().fold(false, |broken, x| broken | !x.value().is_finite());
-        let finite = !vertices.chunks(1024).any(broken);
-        finite.then(|| scene::origin(std::array::from_fn(|k| vertices[k].value())))
+        all_finite(vertices).then(|| scene::origin(std::array::from_fn(|k| vertices[k].value())))
     }
 
     fn vertices_of(&self, body: usize) -> &[T] {
@@ -355,206 +358,6 @@ impl Group {
     /// The body of each lane; lanes that are left over repeat the last body.
     fn lanes(&self) -> impl Iterator<Item = usize> {
         (0..self.width).map(|lane| lane.min(self.bodies.len() - 1))
-    }
-}
-
-/// What is done with bodies on lanes.
-trait OnLanes<T> {
-    fn run<R: Real<Data = T>>(self, scene: &Scene<R>);
-}
-
-/// Turns the bodies of a group into lanes.
-struct ReadBodies<'a, T, W> {
-    batch: &'a Batch<'a, T>,
-    group: &'a Group,
-    work: W,
-}
-
-impl<T: Data, W: OnLanes<T>> Work<T> for ReadBodies<'_, T, W> {
-    type Output = ();
-
-    fn run<R: Real<Data = T>>(self) {
-        let ReadBodies { batch, group, work } = self;
-        let template = batch.template;
-        let (mut rows, mut local, mut grounds, mut origins) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for lane in group.lanes() {
-            let origin = group.origins[lane];
-            rows.push(batch.vertices_of(group.bodies[lane]));
-            local.push(origin.map(T::of));
-            grounds.push(batch.grounds[group.bodies[lane]]);
-            origins.push(origin);
-        }
-        let mut points: Vec<Vec3<R>> = Vec::with_capacity(template.closing.num_points());
-        let count = template.mesh.num_vertices;
-        // SAFETY: as many points as are written, each three numbers in a row, and `read_rows` writes all that it is given.
-        unsafe {
-            let numbers = points.as_mut_ptr().cast::<MaybeUninit<R>>();
-            R::read_rows(&rows, &local, std::slice::from_raw_parts_mut(numbers, 3 * count));
-            points.set_len(count);
-        }
-        template.closing.forward(&mut points);
-        work.run(&Scene::new(template, &points, &grounds, &origins));
-    }
-}
-
-struct Forward<'a, T, Q> {
-    quantity: &'a Q,
-    size: usize,
-    out: Vec<&'a mut [T]>,
-}
-
-impl<T: Data, Q: Quantity> OnLanes<T> for Forward<'_, T, Q> {
-    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
-        let mut out = vec![R::zero(); self.size];
-        self.quantity.forward(scene, &mut out);
-        R::write_rows(&out, &mut self.out);
-    }
-}
-
-struct Figures<'a, T> {
-    analysis: &'a Analysis,
-    size: usize,
-    out: Vec<&'a mut [T]>,
-    polygons: Vec<&'a mut Polygon>,
-}
-
-impl<T: Data> OnLanes<T> for Figures<'_, T> {
-    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
-        let mut out = vec![R::zero(); self.size];
-        let polygons = self.analysis.forward(scene, &mut out);
-        self.polygons.into_iter().zip(polygons).for_each(|(own, polygon)| *own = polygon);
-        R::write_rows(&out, &mut self.out);
-    }
-}
-
-struct ForwardAndBackward<'a, T, Q> {
-    template: &'a Template,
-    quantity: &'a Q,
-    size: usize,
-    d_out: Vec<&'a [T]>,
-    out: Vec<&'a mut [T]>,
-    d_vertices: Vec<&'a mut [T]>,
-}
-
-impl<T: Data, Q: Quantity> OnLanes<T> for ForwardAndBackward<'_, T, Q> {
-    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
-        let last = self.d_out.len() - 1;
-        let mut d_out = Vec::with_capacity(self.size);
-        for k in 0..self.size {
-            d_out.push(R::from_lanes(|lane| R::Scalar::read(self.d_out[lane.min(last)][k])));
-        }
-        let mut out = vec![R::zero(); self.size];
-        let mut d_points = vec![[R::zero(); 3]; scene.points.len()];
-        self.quantity.forward_and_backward(scene, &d_out, &mut out, &mut d_points);
-        self.template.closing.backward(&mut d_points);
-        R::write_rows(&out, &mut self.out);
-        let d_vertices = &d_points[..self.template.mesh.num_vertices];
-        R::write_rows(d_vertices.as_flattened(), &mut self.d_vertices);
-        for (row, d_out) in self.d_vertices.iter_mut().zip(&self.d_out) {
-            zero_if_undefined(row, d_out.iter().all(|d| d.value().is_finite()));
-        }
-    }
-}
-
-struct ForwardAndJacobian<'a, T, Q> {
-    template: &'a Template,
-    quantity: &'a Q,
-    size: usize,
-    out: Vec<&'a mut [T]>,
-    jacobian: Vec<&'a mut [T]>,
-}
-
-impl<T: Data, Q: Terms> OnLanes<T> for ForwardAndJacobian<'_, T, Q> {
-    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
-        let count = self.template.mesh.num_vertices;
-        let mut out = vec![R::zero(); self.size];
-        let mut d_first = vec![[R::zero(); 3]; scene.points.len()];
-        let (mut d_pull, mut d_push) = (vec![R::zero(); count], vec![R::zero(); count]);
-        self.quantity.forward_and_jacobian(scene, &mut out, &mut d_first, [&mut d_pull, &mut d_push]);
-        self.template.closing.backward(&mut d_first);
-        R::write_rows(&out, &mut self.out);
-        let mut start = 0;
-        for numbers in [d_first[..count].as_flattened(), &d_pull, &d_push] {
-            let rows = self.jacobian.iter_mut().map(|row| &mut row[start..start + numbers.len()]);
-            R::write_rows(numbers, &mut rows.collect::<Vec<_>>());
-            start += numbers.len();
-        }
-        self.jacobian.into_iter().for_each(|row| zero_if_undefined(row, true));
-    }
-}
-
-/// What is found of a body besides quantities.
-trait Finding: Sync {
-    type Of: Clone + Send;
-    /// That of each lane.
-    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<Self::Of>;
-}
-
-struct Find<'a, F: Finding> {
-    finding: &'a F,
-    out: Vec<&'a mut F::Of>,
-}
-
-impl<T: Data, F: Finding> OnLanes<T> for Find<'_, F> {
-    fn run<R: Real<Data = T>>(self, scene: &Scene<R>) {
-        self.out.into_iter().zip(self.finding.find(scene)).for_each(|(out, found)| *out = found);
-    }
-}
-
-struct Support<'a> {
-    contact: &'a Contact,
-    method: Method,
-}
-
-impl Finding for Support<'_> {
-    type Of = BaseOfSupport;
-    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<BaseOfSupport> {
-        BaseOfSupport::new(scene, self.contact, &self.method.forward(scene))
-    }
-}
-
-#[cfg(feature = "lp")]
-struct SupportedLp<'a> {
-    contact: &'a Contact,
-    method: Method,
-}
-
-#[cfg(feature = "lp")]
-impl Finding for SupportedLp<'_> {
-    type Of = bool;
-    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<bool> {
-        crate::support::is_supported_lp(scene, self.contact, self.method)
-    }
-}
-
-struct Status<'a> {
-    contact: &'a Contact,
-}
-
-impl Finding for Status<'_> {
-    type Of = u32;
-    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<u32> {
-        let contacts = self.contact.find(scene);
-        (0..R::LANES).map(|lane| status_of(scene, lane, contacts.count(lane))).collect()
-    }
-}
-
-/// The bits of one lane. Whether a volume is nothing or less is decided in double precision.
-fn status_of<R: Real>(scene: &Scene<R>, lane: usize, num_contacts: usize) -> u32 {
-    let vertices = &scene.points[..scene.template.mesh.num_vertices];
-    let mut points: Vec<Vec3<f64>> = vertices.iter().map(|v| v.map(|x| x.lane(lane).value())).collect();
-    let [low, high] = scene.bounds().map(|corner| corner.map(|x| x.lane(lane).value()));
-    scene.template.closing.forward(&mut points);
-    let volumes = SignedVolumes::forward(&scene.template.closing, &points).of_parts;
-    status::bits(&volumes, sub(high, low), num_contacts > 0)
-}
-
-/// A gradient that is not finite, though the upstream gradient is, belongs to a body on which the quantity is undefined
-/// (no volume, coordinates out of range): it becomes zero.
-fn zero_if_undefined<T: Scalar>(gradient: &mut [T], upstream_is_finite: bool) {
-    let broken = |piece: &[T]| piece.iter().fold(false, |broken, x| broken | !x.value().is_finite());
-    if upstream_is_finite && gradient.chunks(1024).any(broken) {
-        gradient.fill(T::zero());
     }
 }
 

@@ -1,0 +1,76 @@
+//! What is found of bodies besides quantities: their bases of support and their status.
+
+use super::lanes::OnLanes;
+use crate::error::status;
+use crate::mass::Method;
+use crate::number::vector::{Vec3, sub};
+use crate::number::{Data, Real, Scalar};
+use crate::scene::Scene;
+use crate::support::{BaseOfSupport, Contact};
+use crate::volume::SignedVolumes;
+
+/// What is found of a body besides quantities.
+pub(super) trait Finding: Sync {
+    type Of: Clone + Send;
+    /// That of each lane.
+    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<Self::Of>;
+}
+
+pub(super) struct Find<'a, F: Finding> {
+    pub finding: &'a F,
+    pub out: Vec<&'a mut F::Of>,
+}
+
+impl<T: Data, F: Finding> OnLanes<T> for Find<'_, F> {
+    fn run<R: Real<Data = T>>(self, scene: &Scene<R>) {
+        self.out.into_iter().zip(self.finding.find(scene)).for_each(|(out, found)| *out = found);
+    }
+}
+
+pub(super) struct Support<'a> {
+    pub contact: &'a Contact,
+    pub method: Method,
+}
+
+impl Finding for Support<'_> {
+    type Of = BaseOfSupport;
+    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<BaseOfSupport> {
+        BaseOfSupport::new(scene, self.contact, &self.method.forward(scene))
+    }
+}
+
+#[cfg(feature = "lp")]
+pub(super) struct SupportedLp<'a> {
+    pub contact: &'a Contact,
+    pub method: Method,
+}
+
+#[cfg(feature = "lp")]
+impl Finding for SupportedLp<'_> {
+    type Of = bool;
+    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<bool> {
+        crate::support::is_supported_lp(scene, self.contact, self.method)
+    }
+}
+
+pub(super) struct Status<'a> {
+    pub contact: &'a Contact,
+}
+
+impl Finding for Status<'_> {
+    type Of = u32;
+    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<u32> {
+        let contacts = self.contact.find(scene);
+        (0..R::LANES).map(|lane| status_of(scene, lane, contacts.count(lane))).collect()
+    }
+}
+
+/// The bits of one lane. Whether a volume is nothing or less is decided in double precision.
+fn status_of<R: Real>(scene: &Scene<R>, lane: usize, num_contacts: usize) -> u32 {
+    let vertices = &scene.points[..scene.template.mesh.num_vertices];
+    let mut points: Vec<Vec3<f64>> = vertices.iter().map(|v| v.map(|x| x.lane(lane).value())).collect();
+    let [low, high] = scene.bounds().map(|corner| corner.map(|x| x.lane(lane).value()));
+    scene.template.closing.forward(&mut points);
+    let volumes = SignedVolumes::forward(&scene.template.closing, &points).of_parts;
+    status::bits(&volumes, sub(high, low), num_contacts > 0)
+}

@@ -1,0 +1,263 @@
+//! Sampling: N_U points on the surface that move with it, and the passes over them.
+//!
+//! Triangle point picking, area-weighted on the template: the points are fixed barycentric weights on fixed faces, so a
+//! posed body's samples are W V with a sparse W of three weights a row, and gradients return by Wᵀ. Rooms need little
+//! more of a sample than a number or two, such as its height: these are interpolated from the vertices' numbers
+//! ([`Walk`]), and what a room finds for each sample is added to the vertices by the same weights.
+
+mod points;
+mod walk;
+
+pub use points::{Place, Points};
+pub use walk::{CHUNK, Chunk, Row, SUMS, Walk, fold, sum_row};
+
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use crate::number::vector::{Vec3, add_scaled, add_to, cross, dot, narrow, sub, widen};
+use crate::number::{BLOCK, Data, Real, Room, Scalar, WideScalar};
+use crate::quantity::Quantity;
+use crate::scene::Scene;
+use crate::template::Template;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+const MAX_SAMPLES: usize = 10_000_000;
+
+#[derive(Clone, Debug)]
+pub struct Samples {
+    /// The face of each sample, ascending.
+    pub faces: Vec<u32>,
+    /// The vertices of that face.
+    pub corners: Vec<[u32; 3]>,
+    pub barycentric: Vec<[f64; 3]>,
+    /// The part of each sample: its face's.
+    pub parts: Vec<u32>,
+    /// Σ of the samples of each part as a sparse row over the vertices.
+    pub part_sums: Vec<PartSum>,
+    pub walk: Walk,
+}
+
+/// Constants that are kept in both precisions, so that no loop has to convert them.
+#[derive(Clone, Debug, Default)]
+pub struct Weights {
+    single: Vec<f32>,
+    double: Vec<f64>,
+}
+
+impl Weights {
+    pub fn new(double: Vec<f64>) -> Self {
+        Weights { single: double.iter().map(|&weight| weight as f32).collect(), double }
+    }
+
+    #[inline(always)]
+    pub fn get<R: Real>(&self, index: usize) -> R {
+        R::splat(R::Data::pick(&self.single, &self.double)[index])
+    }
+}
+
+/// Σ_{i in part} (W V)_i = Σ weight · vertex.
+#[derive(Clone, Debug, Default)]
+pub struct PartSum {
+    pub count: usize,
+    pub vertices: Vec<u32>,
+    weights: Weights,
+}
+
+impl Samples {
+    pub fn new(mesh: &Mesh, vertices: &[Vec3<f64>], num_samples: usize, seed: u64) -> Result<Self> {
+        if num_samples == 0 || num_samples > MAX_SAMPLES {
+            return Err(Error::SampleCount { got: num_samples, limit: MAX_SAMPLES });
+        }
+        let picks = pick(&areas(mesh, vertices), num_samples, seed);
+        let faces: Vec<u32> = picks.iter().map(|pick| pick.0).collect();
+        let barycentric: Vec<_> = picks.iter().map(|pick| pick.1).collect();
+        let corners: Vec<_> = faces.iter().map(|&face| mesh.faces[face as usize]).collect();
+        let parts: Vec<_> = faces.iter().map(|&face| mesh.face_parts[face as usize]).collect();
+        let part_sums = part_sums(mesh, &parts, &corners, &barycentric);
+        let walk = Walk::new(&faces, &corners, &barycentric);
+        Ok(Samples { faces, corners, barycentric, parts, part_sums, walk })
+    }
+
+    pub fn len(&self) -> usize {
+        self.faces.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.faces.is_empty()
+    }
+
+    /// (W V)_i
+    #[inline(always)]
+    pub fn point<R: Real>(&self, sample: usize, vertices: &[Vec3<R>]) -> Vec3<R> {
+        blend(self.corners[sample].map(|corner| vertices[corner as usize]), self.barycentric[sample])
+    }
+
+    /// (W V)_i in double precision, for decisions and for inner solvers.
+    #[inline(always)]
+    pub fn wide_point<R: Real>(&self, sample: usize, vertices: &[Vec3<R>]) -> Vec3<R::Wide> {
+        let [a, b, c] = self.corners[sample];
+        let corner = |index: u32| widen(vertices[index as usize]);
+        blend([corner(a), corner(b), corner(c)], self.barycentric[sample])
+    }
+
+    /// One lane's (W V)_i in double precision.
+    #[inline(always)]
+    pub fn point_of_lane<R: Real>(&self, sample: usize, vertices: &[Vec3<R>], lane: usize) -> Vec3<WideScalar<R>> {
+        let [a, b, c] = self.corners[sample];
+        let corner = |index: u32| {
+            let vertex = &vertices[index as usize];
+            [
+                WideScalar::<R>::of(vertex[0].lane(lane).value()),
+                WideScalar::<R>::of(vertex[1].lane(lane).value()),
+                WideScalar::<R>::of(vertex[2].lane(lane).value()),
+            ]
+        };
+        blend([corner(a), corner(b), corner(c)], self.barycentric[sample])
+    }
+
+    /// Adds the sample's gradient to its face's vertices: a row of Wᵀ.
+    #[inline(always)]
+    pub fn point_backward<R: Real>(&self, sample: usize, d_point: Vec3<R>, d_vertices: &mut [Vec3<R>]) {
+        for (&corner, &weight) in self.corners[sample].iter().zip(&self.barycentric[sample]) {
+            add_scaled(&mut d_vertices[corner as usize], R::of(weight), d_point);
+        }
+    }
+}
+
+/// The weighted corners, from the first along the edges: the weights' rounding then scales with the face, not the body.
+#[inline(always)]
+fn blend<R: Real>([a, b, c]: [Vec3<R>; 3], [_, v, w]: [f64; 3]) -> Vec3<R> {
+    let (v, w) = (R::of(v), R::of(w));
+    let along = |k: usize| w.mul_add(c[k] - a[k], v.mul_add(b[k] - a[k], a[k]));
+    [along(0), along(1), along(2)]
+}
+
+fn areas(mesh: &Mesh, vertices: &[Vec3<f64>]) -> Vec<f64> {
+    let area = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|index| vertices[index as usize]);
+        let normal = cross(sub(b, a), sub(c, a));
+        dot(normal, normal).sqrt() / 2.0
+    };
+    mesh.faces.iter().map(area).collect()
+}
+
+/// A uniform number in [0, 1) from the generator's 53 highest bits, the same on every machine.
+fn uniform(random: &mut ChaCha8Rng) -> f64 {
+    (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// Faces by cumulated area, then a uniform point in the triangle: (1−√r, √r(1−s), √r s).
+fn pick(areas: &[f64], num_samples: usize, seed: u64) -> Vec<(u32, [f64; 3])> {
+    let mut cumulated = Vec::with_capacity(areas.len());
+    let mut total = 0.0;
+    for area in areas {
+        total += area;
+        cumulated.push(total);
+    }
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut picks: Vec<(u32, [f64; 3])> = (0..num_samples)
+        .map(|_| {
+            let target = uniform(&mut random) * total;
+            let face = cumulated.partition_point(|&sum| sum <= target).min(areas.len() - 1);
+            let (root, s) = (uniform(&mut random).sqrt(), uniform(&mut random));
+            (face as u32, [1.0 - root, root * (1.0 - s), root * s])
+        })
+        .collect();
+    // By face, so that a pass walks the vertices in order. The sort is stable: the order is part of the seed's meaning.
+    picks.sort_by_key(|pick| pick.0);
+    picks
+}
+
+fn part_sums(mesh: &Mesh, parts: &[u32], corners: &[[u32; 3]], barycentric: &[[f64; 3]]) -> Vec<PartSum> {
+    let mut members = vec![Vec::new(); mesh.num_parts];
+    for (sample, &part) in parts.iter().enumerate() {
+        members[part as usize].push(sample);
+    }
+    let mut sums = vec![PartSum::default(); mesh.num_parts];
+    let mut weight_of = vec![0.0; mesh.num_vertices];
+    for (sum, members) in sums.iter_mut().zip(members) {
+        let mut touched = Vec::new();
+        sum.count = members.len();
+        for sample in members {
+            for (&corner, &weight) in corners[sample].iter().zip(&barycentric[sample]) {
+                touched.push(corner);
+                weight_of[corner as usize] += weight;
+            }
+        }
+        touched.sort_unstable();
+        touched.dedup();
+        sum.weights =
+            Weights::new(touched.iter().map(|&vertex| std::mem::take(&mut weight_of[vertex as usize])).collect());
+        sum.vertices = touched;
+    }
+    sums
+}
+
+/// The samples' positions in the world, metres: W V.
+pub struct SampleSurface;
+
+impl Quantity for SampleSurface {
+    type Saved<R: Real> = ();
+
+    fn len(&self, template: &Template) -> usize {
+        3 * template.samples.len()
+    }
+
+    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) {
+        R::apart::<SurfaceForward, _>((scene, out));
+    }
+
+    fn backward<R: Real>(&self, scene: &Scene<R>, _: &(), d_out: &[R], d_points: &mut [Vec3<R>]) {
+        R::apart::<SurfaceBackward, _>((&scene.template.samples, d_out, d_points));
+    }
+}
+
+struct SurfaceForward;
+
+impl<R: Real> Room<(&Scene<'_, R>, &mut [R])> for SurfaceForward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((scene, out): (&Scene<'_, R>, &mut [R])) {
+        for (sample, out) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            scene.put(widen(scene.template.samples.point(sample, scene.points)), out);
+        }
+    }
+}
+
+struct SurfaceBackward;
+
+impl<R: Real> Room<(&Samples, &[R], &mut [Vec3<R>])> for SurfaceBackward {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((samples, d_out, d_points): (&Samples, &[R], &mut [Vec3<R>])) {
+        for (sample, &d_point) in d_out.as_chunks::<3>().0.iter().enumerate() {
+            samples.point_backward(sample, d_point, d_points);
+        }
+    }
+}
+
+impl PartSum {
+    /// The sum of the part's sample positions.
+    #[inline(always)]
+    pub fn forward<R: Real>(&self, vertices: &[Vec3<R>]) -> Vec3<R::Wide> {
+        let mut sum = [R::Wide::zero(); 3];
+        for (block, indices) in self.vertices.chunks(BLOCK).enumerate() {
+            let mut partial = [R::zero(); 3];
+            for (i, &vertex) in indices.iter().enumerate() {
+                add_scaled(&mut partial, self.weights.get(block * BLOCK + i), vertices[vertex as usize]);
+            }
+            add_to(partial, &mut sum);
+        }
+        sum
+    }
+
+    #[inline(always)]
+    pub fn backward<R: Real>(&self, d_sum: Vec3<R::Wide>, d_vertices: &mut [Vec3<R>]) {
+        let d_sum = narrow::<R>(d_sum);
+        for (i, &vertex) in self.vertices.iter().enumerate() {
+            add_scaled(&mut d_vertices[vertex as usize], self.weights.get(i), d_sum);
+        }
+    }
+}

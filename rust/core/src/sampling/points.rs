@@ -1,0 +1,86 @@
+//! The points that a loss looks at, samples or vertices, a row of them at a time.
+
+use super::walk::{CHUNK, Chunk, Row, Walk};
+use crate::error::Result;
+use crate::number::Real;
+use crate::quantity::unknown_choice;
+use crate::template::Template;
+use std::ops::Range;
+
+/// The points that a loss looks at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Points {
+    Samples,
+    Vertices,
+}
+
+/// Up to [`CHUNK`] points that are looked at together.
+pub enum Place<'a> {
+    Samples(&'a Walk, &'a Chunk),
+    Vertices(Range<usize>),
+}
+
+impl Points {
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "samples" => Ok(Points::Samples),
+            "vertices" => Ok(Points::Vertices),
+            _ => Err(unknown_choice("points", "\"samples\", \"vertices\"", name)),
+        }
+    }
+
+    pub fn count(self, template: &Template) -> usize {
+        match self {
+            Points::Samples => template.samples.len(),
+            Points::Vertices => template.mesh.num_vertices,
+        }
+    }
+
+    /// All points, in the order of the sums over them.
+    pub fn places(self, template: &Template) -> Vec<Place<'_>> {
+        let walk = &template.samples.walk;
+        let count = template.mesh.num_vertices;
+        match self {
+            Points::Samples => walk.chunks.iter().map(|chunk| Place::Samples(walk, chunk)).collect(),
+            Points::Vertices => {
+                (0..count).step_by(CHUNK).map(|start| Place::Vertices(start..count.min(start + CHUNK))).collect()
+            }
+        }
+    }
+}
+
+impl Place<'_> {
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        match self {
+            Place::Samples(_, chunk) => chunk.len(),
+            Place::Vertices(range) => range.len(),
+        }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The vertices' numbers at these points.
+    #[inline(always)]
+    pub fn read<R: Real>(&self, vertices: &[R], row: &mut Row<R>) {
+        match self {
+            Place::Samples(walk, chunk) => walk.interpolate(chunk, vertices, row),
+            Place::Vertices(range) => row[..range.len()].copy_from_slice(&vertices[range.clone()]),
+        }
+    }
+
+    /// Adds the points' numbers to the vertices', by the transposed weights.
+    #[inline(always)]
+    pub fn hand_back<R: Real>(&self, row: &Row<R>, vertices: &mut [R]) {
+        match self {
+            Place::Samples(walk, chunk) => walk.scatter(chunk, row, vertices),
+            Place::Vertices(range) => {
+                for (vertex, &number) in vertices[range.clone()].iter_mut().zip(row) {
+                    *vertex = *vertex + number;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! The walk: the order in which passes visit the samples, and how numbers go from vertices to samples and back.
+
+use super::Weights;
+use crate::number::{Data, Real, Room};
+use std::ops::Range;
+
+/// The order in which passes visit the samples: faces with equally many samples one after the other, so that the loops
+/// over a face's samples have lengths that the compiler knows.
+#[derive(Clone, Debug, Default)]
+pub struct Walk {
+    /// Each sample's place in the public order.
+    pub order: Vec<u32>,
+    pub chunks: Vec<Chunk>,
+    /// The vertices of each group of samples that share a face.
+    corners: Vec<[u32; 3]>,
+    /// Three a sample.
+    weights: Weights,
+}
+
+/// Consecutive samples of the walk, whole groups of one size.
+#[derive(Clone, Debug)]
+pub struct Chunk {
+    pub samples: Range<usize>,
+    groups: Range<usize>,
+}
+
+/// Samples that a pass handles at once: short enough for single-precision partial sums.
+pub const CHUNK: usize = 64;
+
+/// A number for each sample of a chunk. What lies behind the chunk's end is finite and must not be summed.
+pub type Row<R> = [R; CHUNK];
+
+/// Samples of a face that are visited together; a face with more has several groups.
+const GROUP: usize = 8;
+
+impl Walk {
+    pub(super) fn new(faces: &[u32], corners: &[[u32; 3]], barycentric: &[[f64; 3]]) -> Self {
+        let samples: Vec<u32> = (0..faces.len() as u32).collect();
+        let same_face = |a: &u32, b: &u32| faces[*a as usize] == faces[*b as usize];
+        let mut groups: Vec<&[u32]> = samples.chunk_by(same_face).flat_map(|face| face.chunks(GROUP)).collect();
+        groups.sort_by_key(|group| group.len());
+        let mut walk = Walk::default();
+        for run in groups.chunk_by(|a, b| a.len() == b.len()) {
+            for chunk in run.chunks(CHUNK / run[0].len()) {
+                let (first_sample, first_group) = (walk.order.len(), walk.corners.len());
+                for group in chunk {
+                    walk.order.extend_from_slice(group);
+                    walk.corners.push(corners[group[0] as usize]);
+                }
+                let (samples, groups) = (first_sample..walk.order.len(), first_group..walk.corners.len());
+                walk.chunks.push(Chunk { samples, groups });
+            }
+        }
+        walk.weights = Weights::new(walk.order.iter().flat_map(|&sample| barycentric[sample as usize]).collect());
+        walk
+    }
+
+    /// (W x)_i for the samples of a chunk: the vertices' numbers x interpolated.
+    pub fn interpolate<R: Real>(&self, chunk: &Chunk, vertices: &[R], row: &mut Row<R>) {
+        match chunk.group_size() {
+            1 => R::apart::<Interpolate<1>, _>((self, chunk, vertices, row)),
+            2 => R::apart::<Interpolate<2>, _>((self, chunk, vertices, row)),
+            3 => R::apart::<Interpolate<3>, _>((self, chunk, vertices, row)),
+            4 => R::apart::<Interpolate<4>, _>((self, chunk, vertices, row)),
+            5 => R::apart::<Interpolate<5>, _>((self, chunk, vertices, row)),
+            6 => R::apart::<Interpolate<6>, _>((self, chunk, vertices, row)),
+            7 => R::apart::<Interpolate<7>, _>((self, chunk, vertices, row)),
+            _ => R::apart::<Interpolate<8>, _>((self, chunk, vertices, row)),
+        }
+    }
+
+    /// The vertices of each of a chunk's groups, and how many samples a group has.
+    #[inline(always)]
+    pub fn groups(&self, chunk: &Chunk) -> (&[[u32; 3]], usize) {
+        (&self.corners[chunk.groups.clone()], chunk.group_size())
+    }
+
+    /// The weights of the sample at a place of the walk.
+    #[inline(always)]
+    pub fn weights<R: Real>(&self, place: usize) -> [R; 3] {
+        [self.weights.get(3 * place), self.weights.get(3 * place + 1), self.weights.get(3 * place + 2)]
+    }
+
+    /// Adds (Wᵀ y)_v of a chunk's samples to the vertices' numbers.
+    pub fn scatter<R: Real>(&self, chunk: &Chunk, row: &Row<R>, vertices: &mut [R]) {
+        match chunk.group_size() {
+            1 => R::apart::<Scatter<1>, _>((self, chunk, row, vertices)),
+            2 => R::apart::<Scatter<2>, _>((self, chunk, row, vertices)),
+            3 => R::apart::<Scatter<3>, _>((self, chunk, row, vertices)),
+            4 => R::apart::<Scatter<4>, _>((self, chunk, row, vertices)),
+            5 => R::apart::<Scatter<5>, _>((self, chunk, row, vertices)),
+            6 => R::apart::<Scatter<6>, _>((self, chunk, row, vertices)),
+            7 => R::apart::<Scatter<7>, _>((self, chunk, row, vertices)),
+            _ => R::apart::<Scatter<8>, _>((self, chunk, row, vertices)),
+        }
+    }
+}
+
+/// [`Walk::interpolate`] for groups of N samples.
+struct Interpolate<const N: usize>;
+
+impl<R: Real, const N: usize> Room<(&Walk, &Chunk, &[R], &mut Row<R>)> for Interpolate<N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((walk, chunk, vertices, row): (&Walk, &Chunk, &[R], &mut Row<R>)) {
+        let weights = walk.weights.of_samples::<R, N>(chunk);
+        let rows = row.as_chunks_mut::<N>().0;
+        for ((&[a, b, c], weights), row) in walk.corners[chunk.groups.clone()].iter().zip(weights).zip(rows) {
+            let start = vertices[a as usize];
+            let (to_b, to_c) = (vertices[b as usize] - start, vertices[c as usize] - start);
+            for (number, &[_, v, w]) in row.iter_mut().zip(weights) {
+                *number = R::splat(w).mul_add(to_c, R::splat(v).mul_add(to_b, start));
+            }
+        }
+    }
+}
+
+/// [`Walk::scatter`] for groups of N samples.
+struct Scatter<const N: usize>;
+
+impl<R: Real, const N: usize> Room<(&Walk, &Chunk, &Row<R>, &mut [R])> for Scatter<N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn enter((walk, chunk, row, vertices): (&Walk, &Chunk, &Row<R>, &mut [R])) {
+        let weights = walk.weights.of_samples::<R, N>(chunk);
+        let rows = row.as_chunks::<N>().0;
+        for ((&[a, b, c], weights), row) in walk.corners[chunk.groups.clone()].iter().zip(weights).zip(rows) {
+            let mut shares = [R::zero(); 3];
+            for (&number, weights) in row.iter().zip(weights) {
+                for corner in 0..3 {
+                    shares[corner] = R::splat(weights[corner]).mul_add(number, shares[corner]);
+                }
+            }
+            vertices[a as usize] = vertices[a as usize] + shares[0];
+            vertices[b as usize] = vertices[b as usize] + shares[1];
+            vertices[c as usize] = vertices[c as usize] + shares[2];
+        }
+    }
+}
+
+impl Chunk {
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.samples.is_empty()
+    }
+
+    #[inline(always)]
+    fn group_size(&self) -> usize {
+        self.samples.len() / self.groups.len()
+    }
+}
+
+impl Weights {
+    /// The weights of a chunk's samples, by group.
+    #[inline(always)]
+    fn of_samples<R: Real, const N: usize>(&self, chunk: &Chunk) -> &[[[R::Data; 3]; N]] {
+        let weights = &R::Data::pick(&self.single, &self.double)[3 * chunk.samples.start..3 * chunk.samples.end];
+        weights.as_chunks::<3>().0.as_chunks::<N>().0
+    }
+}
+
+/// Running sums over a row: one body alone sums in the same order as in a lane, and yet its sums vectorise.
+pub const SUMS: usize = 8;
+
+/// Σ of a row's first `len` numbers.
+#[inline(always)]
+pub fn sum_row<R: Real>(row: &Row<R>, len: usize) -> R {
+    let mut sums = [R::zero(); SUMS];
+    let (whole, rest) = row[..len].as_chunks::<SUMS>();
+    for numbers in whole {
+        for k in 0..SUMS {
+            sums[k] = sums[k] + numbers[k];
+        }
+    }
+    for (k, &number) in rest.iter().enumerate() {
+        sums[k] = sums[k] + number;
+    }
+    fold(sums)
+}
+
+/// The sum of the running sums.
+#[inline(always)]
+pub fn fold<R: Real>(sums: [R; SUMS]) -> R {
+    ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
+}
