@@ -122,8 +122,18 @@ def test_bad_items_leave_the_others_as_they_are(fit, tmp_path, standing):
     said = fit(folder)
     assert said.code == 1
     assert (said.folder / "good" / "good.npz").read_bytes() == expected
-    failures = {name.rsplit("/", 1)[1]: what for name, what in ((f["file"], f["error"]) for f in said.report["failures"])}
-    assert sorted(failures) == ["corrupt.json", "few.json", "nan.json", "nobody.json", "other.json", "pixel.png", "zero.json"]
+    failures = {
+        name.rsplit("/", 1)[1]: what for name, what in ((f["file"], f["error"]) for f in said.report["failures"])
+    }
+    assert sorted(failures) == [
+        "corrupt.json",
+        "few.json",
+        "nan.json",
+        "nobody.json",
+        "other.json",
+        "pixel.png",
+        "zero.json",
+    ]
     assert "expected finite numbers" in failures["nan.json"]
     assert "confidence above 0" in failures["zero.json"]
     assert "expected a person" in failures["nobody.json"]

@@ -43,11 +43,15 @@ if TYPE_CHECKING:
 @click.option("--pose", metavar="NAME", help="The pose that was imitated: a named pose of `ipman demo`, such as tree.")
 @click.option("--image", type=click.Path(path_type=Path), metavar="PHOTO", help="Photo to draw under a keypoint file.")
 @click.option("--image-size", type=SIZE, metavar="WxH", help="Pixels of the image, where a keypoint file does not say.")
-@click.option("--person", type=int, metavar="N", help="Which person of a file, from 0. Default: the largest, surest one.")
+@click.option("--person", type=int, metavar="N", help="Which person of a file, from 0. Default: the most visible.")
 @click.option("--obj", is_flag=True, help="Write meshes as .obj, too, not only as .glb.")
-@click.option("--pictures", type=click.IntRange(0), default=24, show_default=True, help="Draw the first N items.")
+@click.option(
+    "--pictures", type=click.IntRange(0), default=8, show_default=True, help="Draw the first N items (seconds each)."
+)
 @click.option("--resume", is_flag=True, help="Skip items that were finished with the same input and options.")
-def fit(inputs: tuple[Path, ...], output: Path, image: Path | None, pictures: int, resume: bool, **options: Any) -> None:
+def fit(
+    inputs: tuple[Path, ...], output: Path, image: Path | None, pictures: int, resume: bool, **options: Any
+) -> None:
     """Fit a body to each photo or set of keypoints, with intuitive physics.
 
     INPUT is a photo (.png .jpg; needs the extra photo), a keypoint file (.json of OpenPose, COCO, COCO-WholeBody or

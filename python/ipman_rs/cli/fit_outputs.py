@@ -1,4 +1,4 @@
-"""What `ipman fit` leaves of each item, in a folder of its own: parameters, mesh, how the fit went; and back to a study.
+"""What `ipman fit` leaves of each item in its folder, parameters, mesh, how the fit went; and back to a study.
 
 `fit.json` is written last and says what the fit depended on: where it is and fits, the item is complete.
 """
@@ -68,7 +68,12 @@ def posed(body: BodyModel, arrays: dict[str, np.ndarray], prefix: str = "") -> n
 
 
 def study_of(
-    item: Item, body: BodyModel, folder: Path, record: dict[str, Any], pictured: bool, pixels: Callable[[Path], np.ndarray]
+    item: Item,
+    body: BodyModel,
+    folder: Path,
+    record: dict[str, Any],
+    pictured: bool,
+    pixels: Callable[[Path], np.ndarray],
 ) -> view.Study:
     """The analysed body of a finished item; `pixels` reads a photo."""
     path = folder / f"{item.name}.npz"

@@ -8,20 +8,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import ipman_rs as ip
 import ipman_rs.torch as ipt
 
 from ..fitting import detected, start
-from ..fitting.candidate import Candidate
 from ..fitting.config import Config, presents
 from ..fitting.detections import join
 from ..fitting.fit import fit, on_the_ground
 from ..fitting.problem import Presented, Problem
 from ..fitting.result import Result, results
 from . import console
-from .errors import FileError, one_line
+from .errors import FileError
 from .fit_inputs import Item, identity, look
 from .fit_outputs import complete, write_item
 

@@ -65,7 +65,7 @@ class _Npz:
 
 
 def read_npz(path: Path, model: str | None) -> Recording:
-    """The bodies of an .npz file; without a `model`, of the body that the file names, or else anny. Raises FileError."""
+    """The bodies of an .npz file; `model` None: of the body that the file names, or anny. Raises FileError."""
     try:
         stored = _Npz(path)
         model = model or stored.model()

@@ -19,7 +19,16 @@ from .problem import Problem
 from .start import SEEN, level_camera
 
 FEWEST = 6  # points seen, below which a body is a guess
-FEET = ("left_ankle", "right_ankle", "left_heel", "right_heel", "left_big_toe", "right_big_toe", "left_foot", "right_foot")
+FEET = (
+    "left_ankle",
+    "right_ankle",
+    "left_heel",
+    "right_heel",
+    "left_big_toe",
+    "right_big_toe",
+    "left_foot",
+    "right_foot",
+)
 
 
 def problem(
@@ -101,11 +110,11 @@ def oddities(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, s
     flags = []
     hips, shoulders = _pair(where, "hip"), _pair(where, "shoulder")
     if hips and shoulders:
-        up = sum(hips) / 2 - sum(shoulders) / 2
-        if up[1] < -abs(up[0]):
+        down = (hips[0] + hips[1] - shoulders[0] - shoulders[1]) / 2
+        if down[1] < -abs(down[0]):
             flags.append("upside-down: the shoulders are below the hips")
         turns = [np.sign(left[0] - right[0]) for left, right in (hips, shoulders)]
-        crossed = min(abs(left[0] - right[0]) for left, right in (hips, shoulders)) > 0.1 * np.linalg.norm(up)
+        crossed = min(abs(left[0] - right[0]) for left, right in (hips, shoulders)) > 0.1 * np.linalg.norm(down)
         if crossed and turns[0] != turns[1]:
             flags.append("left and right may be swapped: hips and shoulders face opposite ways")
     if len(where) <= len(names) / 2:

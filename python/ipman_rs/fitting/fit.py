@@ -20,6 +20,7 @@ from .problem import Problem
 from .solvers import SOLVERS, Look, Options, Outcome, minimise
 from .variables import Variables, pack, unpack
 
+CONVERGED = ("gradient", "decrease")  # reasons
 CHUNK = 64  # bodies side by side: beyond, nothing gets faster and the Jacobian of the landmarks gets large
 
 
@@ -51,7 +52,7 @@ class Fit:
     def converged(self) -> np.ndarray:
         """(B,) bool: whether every stage converged."""
         reasons = np.array([stage.reasons for stage in self.stages])
-        return np.isin(reasons, ("gradient", "decrease")).all(axis=0)
+        return np.asarray(np.isin(reasons, CONVERGED).all(axis=0))
 
     @property
     def candidate(self) -> Candidate:
@@ -66,7 +67,7 @@ def fit(
     progress: Callable[[str, int], None] | None = None,
     trace: bool = False,
 ) -> Fit:
-    """Fit B bodies from `variables` on by the stages of `config`; `progress` hears a stage's name and bodies that ended.
+    """Fit B bodies from `variables` on by the stages of `config`; `progress` hears a stage's name and how many ended.
 
     `trace`: report the terms by iteration, for one more evaluation each.
     """
@@ -167,7 +168,8 @@ class _Shrinking:
             for step in range(max(lengths)):
                 rows = [best[min(step, len(best) - 1)][1] if best else nowhere[i] for i, best in enumerate(self.best)]
                 columns.append(self.whole.costs(self.whole.candidate(torch.from_numpy(np.stack(rows)))))
-        costs = {name: torch.stack([column[name] for column in columns]).numpy() for name in self.whole.weights if columns}
+        names = self.whole.weights if columns else ()
+        costs = {name: torch.stack([column[name] for column in columns]).numpy() for name in names}
         return [{name: cost[:length, body] for name, cost in costs.items()} for body, length in enumerate(lengths)]
 
 

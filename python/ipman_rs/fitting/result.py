@@ -16,8 +16,8 @@ from ipman_rs.plain import plain
 
 from .candidate import Candidate
 from .config import Config
-from .detected import SEEN
-from .fit import Fit, StageReport
+from .fit import CONVERGED, Fit, StageReport
+from .start import SEEN
 from .variables import BLOCKS, Variables
 
 Arrays = dict[str, NDArray[Any]]
@@ -40,8 +40,9 @@ _PIECES = {
 
 @dataclass(frozen=True)
 class Result:
-    """One fitted body (a candidate of one row), its variables before the physics terms (None: no stage has any), and how
-    each stage went, as plain values."""
+    """One fitted body, a candidate of one row; its variables before the physics terms (None: no stage has any); and how
+    each stage went, as plain values.
+    """
 
     candidate: Candidate
     before: Variables | None
@@ -55,8 +56,8 @@ class Result:
     def arrays(self) -> Arrays:
         """What a parameter file holds, each with a leading axis of 1, but for names:
 
-        global_orient (1, 3), body_pose (1, 3n), betas (1, b), transl (1, 3) and, where the body has them, hands, jaw and
-        eyes; camera_rotation (1, 3, 3), camera_translation (1, 3), focal (1, 2), center (1, 2), image_size (1, 2);
+        global_orient (1, 3), body_pose (1, 3n), betas (1, b), transl (1, 3) and hands, jaw and eyes where the body has
+        them; camera_rotation (1, 3, 3), camera_translation (1, 3), focal (1, 2), center (1, 2), image_size (1, 2);
         ground_normal (1, 3), ground_height (1,); keypoints (1, K, 3), projected (1, K, 2), keypoint_names (K,);
         model (). Parameters before the physics terms are named before_global_orient and so on.
         """
@@ -83,10 +84,11 @@ class Result:
         return found
 
     def record(self) -> dict[str, Any]:
-        """How the fit went: plain values for JSON."""
+        """How the fit went: plain values for JSON. The reason is that of the last stage which did not converge, if any."""
+        late = [stage for stage in self.stages if stage["reason"] not in CONVERGED] or self.stages
         return {
             "converged": self.converged,
-            "reason": self.stages[-1]["reason"],
+            "reason": late[-1]["reason"],
             "iterations": sum(stage["iterations"] for stage in self.stages),
             "reprojection": plain(self.reprojection()),
             "stages": self.stages,

@@ -86,7 +86,9 @@ def draw_overlay(study: Study, path: Path) -> None:
     page_width = max(width, _NARROWEST)
     figure, page = new_page(page_width, height + _STRIP)
     left = (page_width - width) / 2
-    axes = figure.add_axes((left / page_width, _STRIP / (height + _STRIP), width / page_width, height / (height + _STRIP)))
+    axes = figure.add_axes(
+        (left / page_width, _STRIP / (height + _STRIP), width / page_width, height / (height + _STRIP))
+    )
     axes.set(xticks=[], yticks=[])
     for side in axes.spines.values():
         side.set_color(colors.GRID)

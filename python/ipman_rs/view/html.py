@@ -42,7 +42,7 @@ def page(
     folder = files("ipman_rs.view") / "page"
     environment = Environment(autoescape=select_autoescape(default=True, default_for_string=True))
     data = {
-        "bodies": [_body(study, folder) for study, folder in zip(studies, folders or [None] * len(studies), strict=True)],
+        "bodies": [_body(study, folder) for study, folder in zip(studies, folders or [None] * len(studies))],
         "heat": _base64(np.round(colors.heat_table() * 255).astype(np.uint8)),
         "series": [{"key": key, "title": title, "unit": unit, "factor": factor, "color": color}
                    for key, title, unit, factor, color in SERIES],
