@@ -177,7 +177,10 @@ def with_nan():
         ({"people": [{}]}, r"people\[0\]: expected pose_keypoints_2d, got none"),
         ({"people": [{"pose_keypoints_2d": flat(18)}]}, r"people\[0\]: pose_keypoints_2d: expected 25 points of 3"),
         ({"people": [{"pose_keypoints_2d": ["a"] * 75}]}, "expected 75 numbers, got something else"),
-        ({"people": [{"pose_keypoints_2d": [0] * 75}]}, "person 0: expected a point with confidence above 0, all have 0"),
+        (
+            {"people": [{"pose_keypoints_2d": [0] * 75}]},
+            "person 0: expected a point with confidence above 0, all have 0",
+        ),
         ({"people": [{"pose_keypoints_2d": [50] * 75}]}, "expected confidences of 0 to 1, got 0 to 50"),
         (with_nan(), r"some.json: people\[1\]: pose_keypoints_2d: point 2: expected finite numbers, got nan"),
         ({"keypoints": [1, 2, 3]}, r"annotations\[0\]: keypoints: expected 17 points of 3"),

@@ -1,10 +1,9 @@
 """Terms that look at the whole mesh: contact, height and mass, physics, and the switch that leaves a jump alone."""
 
-from __future__ from dataclasses import replace
-
-import annotations
+from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import fit_terms_cases as cases
 import numpy as np

@@ -101,7 +101,7 @@ def _fitted(batch: list[Item], settings: Settings, body: ipt.BodyModel) -> Itera
         if not result.finite:
             item.failure = "the fit found no finite body; check focal length, image size and points"
             continue
-        item.flags += result.doubts(settings.ground is not None)
+        item.flags += result.doubts()
         yield item, result
 
 

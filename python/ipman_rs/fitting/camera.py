@@ -12,7 +12,7 @@ NEAREST = 0.05  # m: points nearer, or behind the camera, are seen as if they we
 
 @dataclass(frozen=True)
 class Camera:
-    """Cameras of B images: `focal` (B, 2) and `center` (B, 2) in pixels, `rotation` (B, 3, 3), `translation` (B, 3) m."""
+    """Cameras of B images: focal (B, 2) and center (B, 2) in pixels, rotation (B, 3, 3), translation (B, 3) m."""
 
     focal: Tensor
     center: Tensor

@@ -67,7 +67,7 @@ def fit(
     progress: Callable[[str, int], None] | None = None,
     trace: bool = False,
 ) -> Fit:
-    """Fit B bodies from `variables` on by the stages of `config`; `progress` hears a stage's name and how many ended.
+    """Fit B bodies from `variables` on by the stages of `config`; `progress` hears a stage and how many ended.
 
     `trace`: report the terms by iteration, for one more evaluation each.
     """

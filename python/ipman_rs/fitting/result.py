@@ -24,7 +24,7 @@ Arrays = dict[str, NDArray[Any]]
 
 PHYSICS = ("stability", "balance", "ground")
 POOR = 5.0  # % of the person's height: a median error above it is flagged
-OFF = 0.05  # m: a body whose lowest point is further from a floor that was given is flagged
+OFF = 0.05  # m: a body whose lowest point is further from the floor is flagged
 FAR = 99.0  # m from the camera: where the start gives up
 _LEFT = tuple(name for name in joints.SMPLH if name.startswith("left_") and name not in joints.BODY)
 _RIGHT = tuple(name for name in joints.SMPLH if name.startswith("right_") and name not in joints.BODY)
@@ -84,7 +84,7 @@ class Result:
         return found
 
     def record(self) -> dict[str, Any]:
-        """How the fit went: plain values for JSON. The reason is that of the last stage which did not converge, if any."""
+        """How the fit went: plain values for JSON. The reason is the last stage's that did not converge, if any."""
         late = [stage for stage in self.stages if stage["reason"] not in CONVERGED] or self.stages
         return {
             "converged": self.converged,
@@ -107,7 +107,7 @@ class Result:
         median = float(errors.median()) if len(errors) else float("nan")
         return {"median_px": median, "median_percent": 100 * median / tall, "height_px": tall}
 
-    def doubts(self, ground_given: bool) -> list[str]:
+    def doubts(self) -> list[str]:
         """Why this body should be looked at before it is used."""
         flags = []
         errors = self.reprojection()
@@ -119,11 +119,11 @@ class Result:
         if depth > FAR:
             flags.append(f"{depth:.0f} m from the camera: check the focal length")
         ground = self.candidate.problem.ground
-        if ground_given and ground is not None:
+        if ground is not None:
             height = float(ground.signed_height(vertices).min())
             if abs(height) > OFF:
                 side = "above" if height > 0 else "below"
-                flags.append(f"its lowest point is {abs(height):.2f} m {side} the floor that was given")
+                flags.append(f"its lowest point is {abs(height):.2f} m {side} the floor")
         return flags
 
 

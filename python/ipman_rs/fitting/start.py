@@ -1,5 +1,5 @@
-"""Where a fit starts: the mean body before the camera, at the depth that its size in the image tells, and turned the way
-that explains the points best.
+"""Where a fit starts: the mean body before the camera, as far away as its size in the image tells, turned the way that
+explains the points best.
 
 SMPLify-X estimates the depth by similar triangles and tries a turn by 180°; SMPLify-XMC searches over yaws. Here both:
 every yaw is fitted for a few iterations, and the lowest cost wins.
@@ -47,7 +47,7 @@ def level_camera(pitch: float | Tensor = 0.0) -> Tensor:
 
 
 def neutral(problem: Problem) -> dict[str, Tensor]:
-    """The mean body in the presented pose, or standing with its arms down, at the world's origin; the camera as given."""
+    """The mean body in the presented pose, or standing, arms down, at the world's origin; the camera as given."""
     bodies, model = problem.num_bodies, problem.body.body
 
     def zeros(*shape: int) -> Tensor:

@@ -39,10 +39,11 @@ def page(
 
     import ipman_rs as ip
 
-    folder = files("ipman_rs.view") / "page"
+    folders = folders or [None] * len(studies)
+    here = files("ipman_rs.view") / "page"
     environment = Environment(autoescape=select_autoescape(default=True, default_for_string=True))
     data = {
-        "bodies": [_body(study, folder) for study, folder in zip(studies, folders or [None] * len(studies))],
+        "bodies": [_body(study, folder) for study, folder in zip(studies, folders, strict=True)],
         "heat": _base64(np.round(colors.heat_table() * 255).astype(np.uint8)),
         "series": [{"key": key, "title": title, "unit": unit, "factor": factor, "color": color}
                    for key, title, unit, factor, color in SERIES],
@@ -50,15 +51,15 @@ def page(
         "partColors": list(colors.PART_COLORS),
     }  # fmt: skip
     stops = colors.heat_table(9)
-    return environment.from_string((folder / "page.html").read_text(encoding="utf-8")).render(
+    return environment.from_string((here / "page.html").read_text(encoding="utf-8")).render(
         title=studies[0].name if len(studies) == 1 else f"{len(studies)} bodies",
         version=ip.__version__,
         studies=studies,
         failures=failures,
         data=Markup(script_json(data)),
-        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
-        scene=Markup((folder / "scene.js").read_text(encoding="utf-8")),
-        script=Markup((folder / "page.js").read_text(encoding="utf-8")),
+        style=Markup((here / "page.css").read_text(encoding="utf-8")),
+        scene=Markup((here / "scene.js").read_text(encoding="utf-8")),
+        script=Markup((here / "page.js").read_text(encoding="utf-8")),
         gradient=", ".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in stops * 255),
         colors=data["colors"],
     )

@@ -28,9 +28,10 @@ def write_report(
     """Write the report of one or more studies into ``directory`` and return the path of its page.
 
     `report.html` and `report.json` cover all studies. `report.npz` and the pictures of a single study lie beside them,
-    those of several studies, or ``own_folders``, in a folder each, named after the study.
-    ``failures`` are (file, error) pairs to be told in the report. Of a recording of more than 10,000 frames the page and `report.json` list evenly spaced ones and those
-    with pictures, and only these keep the outline of their base of support; `report.npz` has the figures of all.
+    those of several studies, or with ``own_folders``, in a folder each, named after the study. ``failures`` are (file,
+    error) pairs to be told in the report. Of a recording of more than 10,000 frames the page and `report.json` list
+    evenly spaced ones and those with pictures, and only these keep the outline of their base of support; `report.npz`
+    has the figures of all.
     ``progress`` is called with the name of each file written. Raises OSError where nothing can be written.
     """
     directory = Path(directory)

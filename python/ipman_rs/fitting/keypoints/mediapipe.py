@@ -5,8 +5,8 @@
  "world_landmarks": [[x, y, z, visibility], ...]}     metres from between the hips, y down, z away from the camera
 
 Read are also `pose_landmarks`, `poseLandmarks`, `pose_world_landmarks`, `poseWorldLandmarks` and `worldLandmarks`,
-points as {"x", "y", "z", "visibility"}, a bare list of 33 points, and x and y in pixels: they are taken for relative where no
-visible one is beyond ±3. Relative ones need an image size, in the file or given.
+points as {"x", "y", "z", "visibility"}, a bare list of 33 points, and x and y in pixels: they are taken for relative
+where no visible one is beyond ±3. Relative ones need an image size, in the file or given.
 """
 
 from __future__ import annotations

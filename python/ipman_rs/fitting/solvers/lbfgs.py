@@ -1,5 +1,7 @@
-"""L-BFGS with a line search for the strong Wolfe conditions (Nocedal & Wright, Numerical Optimization, 2nd ed., algorithms
-7.4, 7.5, 3.5 and 3.6): what SMPLify-X and -XMC solve with."""
+"""L-BFGS with a line search for the strong Wolfe conditions: what SMPLify-X and -XMC solve with.
+
+Nocedal & Wright, Numerical Optimization, 2nd ed., algorithms 7.4, 7.5, 3.5 and 3.6.
+"""
 
 from __future__ import annotations
 

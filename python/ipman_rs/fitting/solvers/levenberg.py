@@ -1,5 +1,7 @@
-"""Levenberg-Marquardt with Nielsen's damping (Madsen, Nielsen & Tingleff, Methods for Non-Linear Least Squares Problems,
-2004, algorithm 3.16): some twenty evaluations where L-BFGS takes hundreds."""
+"""Levenberg-Marquardt with Nielsen's damping: some twenty evaluations where L-BFGS takes hundreds.
+
+Madsen, Nielsen & Tingleff, Methods for Non-Linear Least Squares Problems, 2004, algorithm 3.16.
+"""
 
 from __future__ import annotations
 

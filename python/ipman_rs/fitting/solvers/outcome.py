@@ -21,7 +21,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Look:
-    """The objective at a point: its value, its gradient (P,), and a model of its Hessian (P, P) for solvers that ask."""
+    """The objective at a point: value, gradient (P,), and a model of the Hessian (P, P) for solvers that ask."""
 
     value: float
     gradient: Vector

@@ -26,7 +26,7 @@ from .term import Term
 class Physics(Term):
     """preset: a name of `ipman_rs.presets`, `usual` if None.
     samples: of the body's surface, those of its template if None; fewer are faster and coarser.
-    only_static: leave alone a body that was in the air or falling where the stage began (`problem.static`): its cost is 0.
+    only_static: leave alone a body that was in the air or falling where the stage began (`problem.static`).
     """
 
     needs_mesh = True
