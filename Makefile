@@ -35,10 +35,9 @@ BINARY := python/ipman_rs/_core.abi3.so
 .PHONY: help demo demo-poses demo-fit test test-rust test-python test-levels lint format wheel bench clean FORCE
 
 help:
-	@echo 'make demo     demo-poses and demo-fit'
-	@echo 'make demo-poses  the named poses of the embedded body, analysed: table, pictures and report in $(OUT)'
-	@echo 'make demo-fit    a body fitted to the keypoints of a photo, in $(FIT_OUT) (IMAGE=photo.png draws it under them;'
-	@echo '              installs torch: some minutes the first time, then about ten seconds)'
+	@echo 'make demo     demo-poses: the named poses of the embedded body, analysed, report in $(OUT); and'
+	@echo '              demo-fit: a body fitted to the keypoints of a photo, report in $(FIT_OUT) (IMAGE=photo.png draws it'
+	@echo '              under them; installs torch, some minutes the first time, and takes ten seconds afterwards)'
 	@echo 'make test     every test, Rust and Python (installs torch and the test tools)'
 	@echo 'make lint     formats and lints checked, nothing changed'
 	@echo 'make format   sources formatted'

@@ -61,7 +61,7 @@ def test_a_standing_body(fit, tmp_path, standing):
     assert frame["inside"]
     assert abs(frame["lowest"]) < 0.02
     page = (said.folder / "report.html").read_text()
-    assert page.count("data:image/jpeg;base64,") == 4
+    assert page.count("data:image/jpeg;base64,") == 3
 
 
 def test_terms_by_iteration_end_with_the_terms(fit, tmp_path, standing):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,6 +69,7 @@ def fit(
     Exit code: 0 when every item has a body, 1 when one has none (the others have), 2 for wrong usage.
     """
     _needs("torch", "roma", "yaml")
+    warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
     from . import console
     from .fit_inputs import Reading
 

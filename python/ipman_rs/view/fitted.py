@@ -43,14 +43,14 @@ class Fitted:
     record: dict[str, Any] = field(default_factory=dict)
 
     def pictures(self) -> tuple[tuple[str, str], ...]:
-        """File names of the pictures and their titles."""
+        """File names of the pictures that the page shows, and their titles. The side view is half of the pair."""
         if not self.pictured:
             return ()
         over = "Over the photo" if self.photo is not None else "Over the keypoints"
-        names = [("overlay.png", over), ("side.png", "From the side")]
+        side = ("side.png", "From the side")
         if self.before is not None:
-            names.append(("before_after.png", "Before and after the physics terms, from the side"))
-        return (*names, ("floor.png", "The floor from above"))
+            side = ("before_after.png", "Before and after the physics terms, from the side")
+        return ("overlay.png", over), side, ("floor.png", "The floor from above")
 
 
 def camera_of(rotation: np.ndarray, translation: np.ndarray, focal: np.ndarray, center: np.ndarray) -> Camera:
@@ -70,10 +70,11 @@ def draw_fitted(study: Study, folder: Path) -> Iterator[str]:
     bodies = [study.vertices[0]] if fitted.before is None else [fitted.before.vertices[0], study.vertices[0]]
     bodies = [np.asarray(body, dtype=np.float64) for body in bodies]
     camera = camera_on(bodies, study, turn=90.0, tilt=4.0)
-    draw_picture(study, 0, folder / "side.png", camera)
+    after = study if fitted.before is None else replace(study, name="After the physics terms")
+    draw_picture(after, 0, folder / "side.png", camera)
     yield "side.png"
     if fitted.before is not None:
-        draw_pair(fitted.before, replace(study, name="After the physics terms"), camera, folder / "before_after.png")
+        write_beside(fitted.before, folder / "side.png", camera, folder / "before_after.png")
         yield "before_after.png"
 
 
@@ -138,14 +139,11 @@ def _write_strip(page: Axes, fitted: Fitted, top: int, width: int) -> None:
         page.text(width - 24, y, text, size=13, color=colors.MUTED, va="center", ha="right")
 
 
-def draw_pair(before: Study, after: Study, camera: Camera, path: Path) -> None:
-    """Two bodies side by side, seen by the same camera."""
+def write_beside(before: Study, after: Path, camera: Camera, path: Path) -> None:
+    """The picture `after` with another body, seen by the same camera, on its left."""
     from matplotlib.image import imread, imsave
 
-    pages = []
-    for study in (before, after):
-        stream = BytesIO()
-        draw_picture(study, 0, stream, camera)
-        stream.seek(0)
-        pages.append(imread(stream))
-    imsave(path, np.hstack(pages))
+    stream = BytesIO()
+    draw_picture(before, 0, stream, camera)
+    stream.seek(0)
+    imsave(path, np.hstack([imread(stream), imread(after)]))

@@ -59,7 +59,7 @@ def count_files(studies: Sequence[Study]) -> int:
 
 def _count_files(study: Study) -> int:
     if study.fitted is not None:
-        return 1 + len(study.fitted.pictures())
+        return 1 + len(study.fitted.pictures()) + (study.fitted.pictured and study.fitted.before is not None)
     return 1 + 2 * len(study.pictured()) + _has_timeline(study)
 
 
