@@ -97,6 +97,9 @@ class Skin:
     ) -> None:
         """Fills vertices and joints with their derivatives along a direction of the parameters."""
 
+    def jacobian(self, batch: int, parameters: _Parameters, jacobian: NDArray[np.floating]) -> None:
+        """Fills the derivatives (batch, P, V + J, 3) of vertices and joints by pose and betas, P of them."""
+
     def vjp_jvp(
         self,
         batch: int,

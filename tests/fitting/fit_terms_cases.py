@@ -134,3 +134,24 @@ def save_vposer(path: Path, prefix: str = "vp_model.") -> tuple[torch.nn.Sequent
 
 def presented(batch: int = 1, dtype: torch.dtype = torch.float64, contact: Tensor | None = None) -> Presented:
     return Presented(variables(batch, dtype, seed=9)["pose"], contact)
+
+
+def observed(batch: int, seed: int = 5) -> tuple[Problem, dict[str, Tensor]]:
+    """Bodies before a camera, somewhat away from the points that were seen of them, with all of a body's landmarks."""
+    from ipman_rs.fitting.landmarks import Landmarks
+
+    generator = torch.Generator().manual_seed(seed)
+
+    def noise(*shape: int) -> Tensor:
+        return torch.randn(batch, *shape, generator=generator, dtype=torch.float64)
+
+    given = variables(batch, seed=seed, scale=0.3)
+    given["camera_transl"][:, 2] += 4
+    landmarks = Landmarks(body_model())
+    size = torch.full((batch, 2), 640.0, dtype=torch.float64)
+    camera = Camera(800 + 50 * noise(2), size / 2, torch.eye(3, dtype=torch.float64).expand(batch, 3, 3), noise(3))
+    known = Problem(body_model(), landmarks, camera, ipt.Ground.y_up(), image_size=size)
+    seen = Candidate(known, given)
+    confidence = 0.6 + 0.1 * noise(len(landmarks.names)).clamp(-2, 2)
+    points, points_3d = seen.projected + 30 * noise(1, 2), seen.landmarks + 0.1 * noise(len(landmarks.names), 3)
+    return replace(known, points=points, confidence=confidence, points_3d=points_3d, confidence_3d=confidence), given

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -108,3 +110,34 @@ def test_an_unknown_name(body):
     with pytest.raises(ValueError, match=r"names: the body 'anny.*no landmark 'tail'; it has pelvis, "):
         Landmarks(body, ["nose", "tail"])
     assert "nose" in known(body.body)
+
+
+def test_pose_blend_shapes_and_finger_joints(body):
+    # As in an SMPL+H file: pose blend shapes, and joints of the fingers, here one of them at the index finger's tip.
+    given = body.body
+    tip = given.v_template[skin_points(given)["left_index_tip"]]
+    joints = given.num_joints
+    weights = np.concatenate([given.weights, np.zeros((given.num_vertices, 1))], axis=1)
+    near = np.linalg.norm(given.v_template - tip, axis=1) < 0.03
+    weights[near] = np.eye(joints + 1)[joints]
+    smplh = dataclasses.replace(
+        given,
+        name="with fingers",
+        posedirs=1e-3 * np.random.default_rng(5).normal(size=(given.num_vertices, 3, 9 * joints)),
+        J_template=np.vstack([given.J_template, tip - [0.02, 0, 0]]),
+        J_shapedirs=np.concatenate([given.J_shapedirs, given.J_shapedirs[:1]]),
+        J_expressiondirs=np.zeros((joints + 1, 3, 0)),
+        rest_rotation=np.concatenate([given.rest_rotation, given.rest_rotation[22:23]]),
+        weights=weights,
+        parents=np.append(given.parents, given.joint_names.index("left_hand")),
+        joint_names=(*given.joint_names, "left_index3"),
+    )
+    torch_body = ipt.BodyModel(smplh, torch.float64)
+    landmarks = Landmarks(torch_body, ["left_index_tip", "left_index3", "nose"])
+    posed = torch_body(*people(torch_body, 2))
+    vertices = skin_points(smplh)
+    assert near[vertices["left_index_tip"]]
+    expected = [posed.vertices[:, vertices[name]] for name in ("left_index_tip", "nose")]
+    found = landmarks(*people(torch_body, 2))
+    torch.testing.assert_close(found[:, [0, 2]], torch.stack(expected, 1), rtol=0, atol=1e-14)
+    torch.testing.assert_close(found[:, 1], posed.joints[:, -1], rtol=0, atol=1e-14)

@@ -30,6 +30,12 @@ class Camera:
         seen = [rows[..., i, 0] * x + rows[..., i, 1] * y + rows[..., i, 2] * z for i in range(3)]
         return torch.stack(seen, dim=-1) + self.translation[:, None]
 
+    def turn(self, vectors: Tensor) -> Tensor:
+        """Directions (B, P, N, 3) of the world in the camera's axes."""
+        x, y, z = vectors.unbind(-1)
+        rows = self.rotation[:, None, None]
+        return torch.stack([rows[..., i, 0] * x + rows[..., i, 1] * y + rows[..., i, 2] * z for i in range(3)], dim=-1)
+
     def image(self, seen: Tensor) -> Tensor:
         """Points (B, N, 3) in the camera's frame -> pixels (B, N, 2)."""
         depth = seen[..., 2:].clamp(min=NEAREST)

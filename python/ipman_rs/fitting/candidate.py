@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -46,6 +46,17 @@ class Candidate:
     def landmarks(self) -> Tensor:
         """(B, K, 3) m, in the world."""
         return self.problem.landmarks(self.full_pose, self.variables["betas"], self.variables["transl"])
+
+    def landmark_slopes(self, free: Sequence[str]) -> Tensor:
+        """The landmarks' derivatives (B, P, K, 3) by the free blocks; 0 by those of the camera."""
+        variables, points = self.variables, self.landmarks
+        zero = points.new_zeros(())
+        by_body = self.problem.landmarks.jacobian(self.full_pose, variables["betas"])
+        by_pose, by_betas = by_body.split([self.full_pose[0].numel(), variables["betas"].shape[1]], dim=1)
+        by_transl = torch.eye(3, dtype=points.dtype)[:, None].expand(len(points), 3, points.shape[1], 3)
+        known = {"orient": by_pose[:, :3], "pose": by_pose[:, 3:], "betas": by_betas, "transl": by_transl}
+        still = {name: zero.expand(len(points), variables[name][0].numel(), *points.shape[1:]) for name in free}
+        return torch.cat([known.get(name, still[name]) for name in free], dim=1)
 
     @cached_property
     def camera(self) -> Camera:

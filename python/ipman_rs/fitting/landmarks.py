@@ -66,6 +66,17 @@ class Landmarks:
         points = torch.cat([posed.vertices, posed.joints], dim=-2)
         return 0.5 * (points.index_select(-2, self.ends[0]) + points.index_select(-2, self.ends[1]))
 
+    def jacobian(self, full_pose: Tensor, betas: Tensor) -> Tensor:
+        """The points' derivatives (B, P, K, 3) by the rotation vectors (3 J) and the betas; no gradient. That by the
+        translation is the identity."""
+        body = self.points.body
+        bodies, size = len(full_pose), full_pose[0].numel() + betas.shape[1]
+        jacobian = full_pose.new_empty(bodies, size, body.num_vertices + body.num_joints, 3)
+        skin = body._skin(np.float32 if full_pose.dtype == torch.float32 else np.float64)
+        pose, betas = full_pose.detach().contiguous(), betas.detach().contiguous()
+        skin.jacobian(bodies, (pose.numpy(), betas.numpy(), None, None), jacobian.numpy())
+        return 0.5 * (jacobian.index_select(-2, self.ends[0]) + jacobian.index_select(-2, self.ends[1]))
+
 
 def known(body: BodyModel, sites: Iterable[str] = ()) -> tuple[str, ...]:
     """All names that a body has."""

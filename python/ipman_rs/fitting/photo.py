@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,22 +23,17 @@ def detect(paths: Sequence[str | os.PathLike[str]]) -> Detections:
     MediaPipe finds one person an image. ImportError without the extra; ValueError, naming the file, for a missing or
     unreadable image, one under 32 pixels, and one without a person.
     """
-    return join([_detections(path, *landmarks(path)) for path in paths])
+    with _model() as model:
+        return join([_detections(path, *_landmarks(model, path)) for path in paths])
 
 
 def landmarks(path: str | os.PathLike[str]) -> tuple[Array, Array, tuple[int, int]]:
     """MediaPipe's landmarks (33, 4) relative to the image, world landmarks (33, 4), and the image's width and height.
 
-    Raises as `detect`.
+    What `keypoints.mediapipe.write` takes. Raises as `detect`.
     """
-    pose = _mediapipe()
-    pixels = read(path)
-    with pose.Pose(static_image_mode=True, model_complexity=1) as model:
-        result = model.process(pixels)
-    if result.pose_landmarks is None:
-        raise ValueError(f"{path}: expected a person, found none")
-    height, width = pixels.shape[:2]
-    return _four(result.pose_landmarks), _four(result.pose_world_landmarks), (width, height)
+    with _model() as model:
+        return _landmarks(model, path)
 
 
 def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
@@ -59,12 +55,24 @@ def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     return pixels
 
 
-def _mediapipe() -> Any:
+def _model() -> Any:
+    """The model whose weights are in MediaPipe's wheel; each image by itself, as none follows another."""
     try:
         from mediapipe.python.solutions import pose
     except ImportError as error:
         raise ImportError(f'photos need MediaPipe: pip install "ipman_rs[photo]" ({error})') from error
-    return pose
+    return pose.Pose(static_image_mode=True, model_complexity=1)
+
+
+def _landmarks(model: Any, path: str | os.PathLike[str]) -> tuple[Array, Array, tuple[int, int]]:
+    pixels = read(path)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "SymbolDatabase.GetPrototype", UserWarning)  # between MediaPipe and protobuf
+        result = model.process(pixels)
+    if result.pose_landmarks is None:
+        raise ValueError(f"{path}: expected a person, found none")
+    height, width = pixels.shape[:2]
+    return _four(result.pose_landmarks), _four(result.pose_world_landmarks), (width, height)
 
 
 def _four(found: Any) -> Array:

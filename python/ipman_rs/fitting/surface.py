@@ -98,7 +98,7 @@ class Skin:
         found = {}
         for finger, (out, forwards) in FINGERTIPS.items():
             last = f"{side}_{finger}3"
-            if last in self.joints:
+            if self.of(last).any():
                 away = np.linalg.norm(self.vertices - self.joints[last], axis=1)
                 found[f"{finger}_tip"] = best(self.of(last), away)
             else:

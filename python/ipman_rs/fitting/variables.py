@@ -31,3 +31,11 @@ def unpack(rows: Tensor, free: Sequence[str], rest: Variables) -> dict[str, Tens
     sizes = [math.prod(rest[name].shape[1:]) for name in free]
     parts = zip(free, rows.split(sizes, dim=1), strict=True)
     return {**rest, **{name: part.reshape(-1, *rest[name].shape[1:]) for name, part in parts}}
+
+
+def diagonal(weights: Tensor, block: str, variables: Variables, free: Sequence[str]) -> Tensor:
+    """The Jacobian (B, P, R) by the free blocks of residuals that are weights (B, R) times the numbers of one block."""
+    rows = torch.diag_embed(weights)
+    sizes = {name: math.prod(variables[name].shape[1:]) for name in free}
+    parts = [rows if name == block else rows.new_zeros(len(rows), size, rows.shape[2]) for name, size in sizes.items()]
+    return torch.cat(parts, dim=1)

@@ -19,9 +19,11 @@ body models are not anatomical ones. From there on soft(e) = e² / (e + 5°), sm
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import torch
 from torch import Tensor
+from torch.autograd import forward_ad
 
 from ipman_rs.body import joints
 from ipman_rs.checks import not_negative
@@ -85,9 +87,33 @@ class JointLimits(LeastSquares):
         self.reach = ((ranges[..., 1] - ranges[..., 0]) / 2 + margin).deg2rad()
 
     def residuals(self, candidate: Candidate) -> Tensor:
-        angles = swing_twist(candidate.variables["pose"][:, self.joints], self.bones)
-        excess = ((angles - self.middle).abs() - self.reach).clamp(min=0)
-        return (excess.square() / (excess + SOFTNESS)).flatten(1)
+        return self._of(candidate.variables["pose"][:, self.joints]).flatten(1)
+
+    def _of(self, pose: Tensor) -> Tensor:
+        """Three of each joint, (B, J, 3), for its rotation alone."""
+        excess = ((swing_twist(pose, self.bones) - self.middle).abs() - self.reach).clamp(min=0)
+        return excess.square() / (excess + SOFTNESS)
+
+    def linearised(self, candidate: Candidate, free: Sequence[str]) -> tuple[Tensor, Tensor]:
+        """No joint knows of another: three directions, of all joints at once, find the whole Jacobian."""
+        pose = candidate.variables["pose"][:, self.joints]
+        bodies, count = pose.shape[:2]
+        directions = torch.eye(3, dtype=pose.dtype)[:, None, None].expand(3, bodies, count, 3).flatten(0, 1)
+        with forward_ad.dual_level():
+            dual = forward_ad.make_dual(pose.repeat(3, 1, 1), directions.contiguous())
+            values, slopes = forward_ad.unpack_dual(self._of(dual))
+        slopes = torch.zeros_like(values) if slopes is None else slopes
+        blocks = slopes.reshape(3, bodies, count, 3).permute(1, 2, 0, 3)  # body, joint, by which number, which residual
+        jacobian = pose.new_zeros(bodies, candidate.variables["pose"].shape[1], 3, count, 3)
+        for place, joint in enumerate(self.joints):
+            jacobian[:, joint, :, place] = blocks[:, place]
+        whole = [
+            jacobian.reshape(bodies, -1, 3 * count)
+            if name == "pose"
+            else pose.new_zeros(bodies, candidate.variables[name][0].numel(), 3 * count)
+            for name in free
+        ]
+        return values[:bodies].flatten(1), torch.cat(whole, dim=1)
 
 
 def swing_twist(pose: Tensor, bones: Tensor) -> Tensor:

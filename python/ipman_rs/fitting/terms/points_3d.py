@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import torch
 from torch import Tensor
@@ -32,6 +32,17 @@ class Points3D(LeastSquares):
         if problem.confidence_3d is not None:
             weight = weight * problem.confidence_3d
         self.weight = weight[..., None]
+
+    def linearised(self, candidate: Candidate, free: Sequence[str]) -> tuple[Tensor, Tensor]:
+        """e's derivative is the landmarks'; that of ρ e / √(|e|² + ρ²) has another share along e."""
+        slopes = candidate.landmark_slopes(free)
+        if self.rho is None:
+            return self.residuals(candidate), (self.weight[:, None] * slopes).flatten(2)
+        error = candidate.landmarks - self.points
+        soft = torch.rsqrt(error.square().sum(dim=-1, keepdim=True) + self.rho**2)
+        along = (slopes * error[:, None]).sum(dim=-1, keepdim=True)
+        slopes = slopes - along * (error * soft**2)[:, None]
+        return self.residuals(candidate), ((self.weight * self.rho * soft)[:, None] * slopes).flatten(2)
 
     def residuals(self, candidate: Candidate) -> Tensor:
         error = candidate.landmarks - self.points

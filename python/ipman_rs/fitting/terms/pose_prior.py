@@ -7,6 +7,9 @@ Its weight is that of a negative log likelihood times 2: a weight of 1 is right 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import torch
 from torch import Tensor
 
 from ipman_rs.body import joints
@@ -14,6 +17,7 @@ from ipman_rs.checks import positive
 
 from ..candidate import Candidate
 from ..problem import Problem
+from ..variables import diagonal
 from .joint_limits import range_of
 from .term import LeastSquares
 
@@ -39,6 +43,14 @@ class PosePrior(LeastSquares):
 
     def residuals(self, candidate: Candidate) -> Tensor:
         return ((candidate.variables["pose"][:, self.joints] - self.mean) / self.deviation).flatten(1)
+
+    def linearised(self, candidate: Candidate, free: Sequence[str]) -> tuple[Tensor, Tensor]:
+        pose, residuals = candidate.variables["pose"], self.residuals(candidate)
+        weights = torch.zeros_like(pose)
+        weights[:, self.joints] = (1 / self.deviation).to(pose)
+        everywhere = diagonal(weights.flatten(1), "pose", candidate.variables, free)
+        numbers = [3 * joint + axis for joint in self.joints for axis in range(3)]
+        return residuals, everywhere[..., numbers]
 
 
 def mean_of(name: str) -> tuple[float, float, float]:
