@@ -64,7 +64,7 @@ def fit(
     ipman fit photo.jpg -o out
     ipman fit keypoints/ -o out --image-size 1920x1080 --resume
     ipman fit person.json --image photo.png -o out --focal 1100 --camera-pitch 8
-    ipman fit yoga.json -o out --preset balanced --pose tree
+    ipman fit yoga.json -o out --preset balanced --pose tree --height 1.7
 
     Exit code: 0 when every item has a body, 1 when one has none (the others have), 2 for wrong usage.
     """

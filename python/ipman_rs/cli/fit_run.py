@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import torch
 
 import ipman_rs as ip
 import ipman_rs.torch as ipt
 
 from ..fitting import detected, start
-from ..fitting.config import Config, presents
+from ..fitting.config import Config, weighs
 from ..fitting.detections import join
 from ..fitting.fit import fit, on_the_ground
 from ..fitting.problem import Presented, Problem
@@ -48,6 +50,7 @@ def run(items: list[Item], settings: Settings, output: Path, resume: bool) -> di
 
     Items that fail say so in `failure`. Raises ValueError for options that fit no item.
     """
+    _check(settings)
     body = ipt.BodyModel(settings.model)
     options = settings.identity()
     records: dict[str, dict[str, Any]] = {}
@@ -63,6 +66,14 @@ def run(items: list[Item], settings: Settings, output: Path, resume: bool) -> di
             write_item(item, result, body.body, output / item.name, told, settings.obj)
             records[item.name] = {"name": item.name, "source": item.source, **told}
     return records
+
+
+def _check(settings: Settings) -> None:
+    config = settings.config
+    if settings.pose is None and weighs(config, "presented_pose", "presented_contact"):
+        raise ValueError(f"preset {config.name} imitates a pose: name it with --pose")
+    if settings.height is None and settings.mass is None and weighs(config, "measured_shape"):
+        raise ValueError(f"preset {config.name} knows the person's size: give --height or --mass, or both")
 
 
 def _batches(items: Iterable[Item]) -> Iterator[list[Item]]:
@@ -120,14 +131,8 @@ def _refused(item: Item, body: ipt.BodyModel) -> bool:
 
 def _presented(problem: Problem, settings: Settings) -> Problem:
     """The problem with the pose that `--pose` names, if it names one."""
-    import torch
-
     if settings.pose is None:
-        if presents(settings.config):
-            raise ValueError(f"preset {settings.config.name} imitates a pose: name it with --pose")
         return problem
-    from dataclasses import replace
-
     pose = torch.as_tensor(ip.body.poses.pose_of(problem.body.body, settings.pose), dtype=torch.float64)
     return replace(problem, presented=Presented(pose[1:].expand(problem.num_bodies, -1, -1).clone()))
 

@@ -12,7 +12,6 @@ from .terms import TERMS
 from .variables import BLOCKS
 
 FOLDER = Path(__file__).parent / "presets"
-PRESENTED = ("presented_pose", "presented_contact")  # terms that need a presented pose
 PRESETS = tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
 
 
@@ -38,9 +37,9 @@ class Config:
     start: Mapping[str, Any]
 
 
-def presents(config: Config) -> bool:
-    """Whether a stage needs the pose that the person was shown."""
-    return any(stage.weights.get(name, 0) > 0 for stage in config.stages for name in PRESENTED)
+def weighs(config: Config, *terms: str) -> bool:
+    """Whether any stage has a weight for any of these terms."""
+    return any(stage.weights.get(name, 0) > 0 for stage in config.stages for name in terms)
 
 
 def load(name: str | Path) -> Config:
