@@ -20,6 +20,7 @@ import ipman_rs as ip
 from .. import view
 from ..body import BodyModel, safe_npz
 from ..view.fitted import camera_of
+from . import mesh_files
 from .fit_inputs import Item
 
 if TYPE_CHECKING:
@@ -31,15 +32,13 @@ _BEFORE = "before_"
 
 def write_item(item: Item, result: Result, body: BodyModel, folder: Path, told: dict[str, Any], obj: bool) -> None:
     """Write one fitted body. Raises OSError."""
-    import trimesh
-
     folder.mkdir(parents=True, exist_ok=True)
     (folder / RECORD).unlink(missing_ok=True)  # incomplete from here on
     arrays = result.arrays()
-    mesh = trimesh.Trimesh(posed(body, arrays), body.faces, process=False)
-    files = {f"{item.name}.npz": _npz(arrays), f"{item.name}.glb": mesh.export(file_type="glb")}
+    vertices = posed(body, arrays)
+    files = {f"{item.name}.npz": _npz(arrays), f"{item.name}.glb": mesh_files.glb(vertices, body.faces)}
     if obj:
-        files[f"{item.name}.obj"] = str(mesh.export(file_type="obj")).encode()
+        files[f"{item.name}.obj"] = mesh_files.obj(vertices, body.faces)
     for name, content in files.items():
         _replace(folder / name, content)
     record = {"name": item.name, "source": item.source, **told, "files": sorted(files)}
