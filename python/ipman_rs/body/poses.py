@@ -184,17 +184,22 @@ def pose(name: str) -> NDArray[np.float64]:
     return Rotation.from_matrix(local).as_rotvec()
 
 
-def posed(body: BodyModel, name: str, betas: ArrayLike | None = None) -> NDArray[np.floating]:
-    """Vertices (..., V, 3) of `body` in the pose `name`, its lowest vertex on the floor y = 0.
-
-    `betas` (..., B) as in `BodyModel.forward`. Bodies with other joints than SMPL's 24 take the joints they share.
-    """
+def pose_of(body: BodyModel, name: str) -> NDArray[np.float64]:
+    """The pose `name` (J, 3) of a body, whose joints beyond SMPL's 24 stay as they are at zero."""
     table = pose(name)
     full = np.zeros((body.num_joints, 3))
     for index, joint in enumerate(joints.SMPL):
         if joint in body.joint_names:
             full[body.joint_names.index(joint)] = table[index]
-    vertices = body(full, betas).vertices
+    return full
+
+
+def posed(body: BodyModel, name: str, betas: ArrayLike | None = None) -> NDArray[np.floating]:
+    """Vertices (..., V, 3) of `body` in the pose `name`, its lowest vertex on the floor y = 0.
+
+    `betas` (..., B) as in `BodyModel.forward`. Bodies with other joints than SMPL's 24 take the joints they share.
+    """
+    vertices = body(pose_of(body, name), betas).vertices
     vertices[..., 1] -= vertices[..., 1].min(-1, keepdims=True)
     return vertices
 

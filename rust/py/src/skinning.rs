@@ -102,6 +102,11 @@ impl Skin {
         self.answer(Call { py, batch, parameters, along: Some(along), filled: Filled::Bodies { vertices, joints } })
     }
 
+    /// Fills the derivatives (batch, P, V + J, 3) of vertices and joints by pose (rotation vectors) and betas, P of them.
+    fn jacobian(&self, py: Python<'_>, batch: usize, parameters: Four<'_>, jacobian: Bound<'_, PyAny>) -> PyResult<()> {
+        self.answer(Call { py, batch, parameters, along: None, filled: Filled::Jacobian(jacobian) })
+    }
+
     /// Fills the gradients' derivatives along a direction of the parameters.
     fn vjp_jvp(
         &self,
@@ -139,6 +144,7 @@ struct Call<'py> {
 enum Filled<'py> {
     Bodies { vertices: Bound<'py, PyAny>, joints: Bound<'py, PyAny> },
     Gradients { d_vertices: Given<'py>, d_joints: Given<'py>, gradients: Four<'py> },
+    Jacobian(Bound<'py, PyAny>),
 }
 
 impl<'py> Call<'py> {
@@ -160,6 +166,11 @@ impl<'py> Call<'py> {
                         Some(along) => posing.jvp(along, vertices, joints),
                     }
                 })
+            }
+            Filled::Jacobian(jacobian) => {
+                let mut jacobian = output(jacobian, "jacobian")?;
+                let jacobian = slice(&mut jacobian, "jacobian")?;
+                detached(py, |interrupted| Posing::new(skin, batch, parameters, interrupted)?.jacobian(jacobian))
             }
             Filled::Gradients { d_vertices, d_joints, gradients } => {
                 let (d_vertices, d_joints) = (input(d_vertices, "d_vertices")?, input(d_joints, "d_joints")?);

@@ -111,6 +111,36 @@ impl<'a, T: Data> Posing<'a, T> {
         )
     }
 
+    /// Numbers of [`Posing::jacobian`] a body.
+    pub fn jacobian_width(&self) -> usize {
+        let parameters = 3 * self.skin.num_joints() + self.bodies.betas.width;
+        parameters * (self.skin.num_vertices + self.skin.num_joints()) * 3
+    }
+
+    /// The derivatives of vertices and joints by pose (rotation vectors) and betas: (B, P, V + J, 3). For bodies of few
+    /// vertices.
+    pub fn jacobian(&self, out: &mut [T]) -> Result<()> {
+        if self.form != Form::AxisAngle {
+            let (expected, got) = ("rotation vectors".into(), "another form".into());
+            return Err(Error::Argument { name: "pose", expected, got });
+        }
+        check("jacobian", out.len(), self.num_bodies * self.jacobian_width())?;
+        let numbers = |rows: Rows<T>, body: usize| rows.of(body).iter().map(|x| x.value()).collect::<Vec<f64>>();
+        let rows: Vec<_> = out.chunks_exact_mut(self.jacobian_width().max(1)).enumerate().collect();
+        threads::each(rows, true, self.interrupted, &|(body, row)| {
+            let placed = self.skin.place(Parameters {
+                form: self.form,
+                pose: numbers(self.bodies.pose, body),
+                betas: numbers(self.bodies.betas, body),
+                expression: numbers(self.bodies.expression, body),
+                transl: [0.0; 3],
+            });
+            for (out, &number) in row.iter_mut().zip(self.skin.jacobian(&placed).as_flattened()) {
+                *out = T::of(number);
+            }
+        })
+    }
+
     fn write<V: Real>(
         &self,
         start: Start<T, TILE>,

@@ -62,6 +62,12 @@ impl<C: Scalar, const W: usize> Blend<C, W> {
         self.count
     }
 
+    /// One direction of one point.
+    pub fn direction(&self, vertex: usize, k: usize) -> [f64; 3] {
+        let tile = &self.directions[vertex / W * self.count + k];
+        std::array::from_fn(|axis| tile[axis].0[vertex % W].value())
+    }
+
     /// totals += Σ amounts · directions, for N bodies; amounts left out are zero.
     #[inline(always)]
     pub fn forward<V: Real, const P: usize, const N: usize>(

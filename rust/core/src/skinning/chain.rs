@@ -15,7 +15,7 @@ pub struct Skeleton {
 
 /// The posed chain.
 pub struct Chain<R> {
-    world: Vec<Mat3<R>>,
+    pub world: Vec<Mat3<R>>,
     /// Takes a resting bone to the world: world · rest_rotation.
     pub turned: Vec<Mat3<R>>,
     pub joints: Vec<Vec3<R>>,
@@ -43,6 +43,19 @@ impl Skeleton {
 
     pub fn num_joints(&self) -> usize {
         self.parents.len()
+    }
+
+    pub fn parent(&self, joint: usize) -> Option<usize> {
+        self.parents[joint]
+    }
+
+    /// Whether `other` is the joint or hangs on it.
+    pub fn carries(&self, joint: usize, other: usize) -> bool {
+        let mut carrier = Some(other);
+        while carrier.is_some_and(|carrier| carrier > joint) {
+            carrier = carrier.and_then(|carrier| self.parents[carrier]);
+        }
+        carrier == Some(joint)
     }
 
     #[inline(always)]

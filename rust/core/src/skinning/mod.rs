@@ -8,6 +8,7 @@
 
 pub mod blend;
 pub mod chain;
+mod jacobian;
 mod model;
 pub mod rotation;
 pub mod weights;

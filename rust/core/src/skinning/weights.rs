@@ -31,6 +31,12 @@ impl<C: Scalar, const W: usize> Weights<C, W> {
         table
     }
 
+    /// The joints that move one vertex, and by how much.
+    pub fn of_vertex(&self, vertex: usize) -> impl Iterator<Item = (usize, f64)> {
+        let weights = self.of_tile(vertex / W).map(move |(joint, row)| (joint, row.0[vertex % W].value()));
+        weights.filter(|(_, weight)| *weight != 0.0)
+    }
+
     #[inline(always)]
     fn of_tile(&self, tile: usize) -> impl Iterator<Item = (usize, &Row<C, W>)> {
         let range = self.starts[tile]..self.starts[tile + 1];

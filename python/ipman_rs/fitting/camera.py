@@ -1,0 +1,42 @@
+"""Perspective cameras: x right, y down, z forward; R, t lead from the world to the camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+NEAREST = 0.05  # m: points nearer, or behind the camera, are seen as if they were there
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Cameras of B images: focal (B, 2) and center (B, 2) in pixels, rotation (B, 3, 3), translation (B, 3) m."""
+
+    focal: Tensor
+    center: Tensor
+    rotation: Tensor
+    translation: Tensor
+
+    def project(self, points: Tensor) -> Tensor:
+        """World points (B, N, 3) -> pixels (B, N, 2)."""
+        return self.image(self.see(points))
+
+    def see(self, points: Tensor) -> Tensor:
+        """World points (B, N, 3) in the camera's frame. Summed by hand, so that no batch size changes a bit."""
+        x, y, z = points.unbind(-1)
+        rows = self.rotation[:, None]
+        seen = [rows[..., i, 0] * x + rows[..., i, 1] * y + rows[..., i, 2] * z for i in range(3)]
+        return torch.stack(seen, dim=-1) + self.translation[:, None]
+
+    def turn(self, vectors: Tensor) -> Tensor:
+        """Directions (B, P, N, 3) of the world in the camera's axes."""
+        x, y, z = vectors.unbind(-1)
+        rows = self.rotation[:, None, None]
+        return torch.stack([rows[..., i, 0] * x + rows[..., i, 1] * y + rows[..., i, 2] * z for i in range(3)], dim=-1)
+
+    def image(self, seen: Tensor) -> Tensor:
+        """Points (B, N, 3) in the camera's frame -> pixels (B, N, 2)."""
+        depth = seen[..., 2:].clamp(min=NEAREST)
+        return self.focal[:, None] * seen[..., :2] / depth + self.center[:, None]

@@ -1,0 +1,80 @@
+"""Bodies as a fit proposes them: computed when a term first looks at them, and then kept for the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from functools import cached_property
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ipman_rs.torch.body import BodyOutput
+
+from .camera import Camera
+from .problem import Problem
+from .rotations import matrix
+from .variables import Variables
+
+
+class Candidate:
+    """B proposed bodies and cameras."""
+
+    def __init__(self, problem: Problem, variables: Variables):
+        self.problem = problem
+        self.variables = variables
+        self._shared: dict[Hashable, Any] = {}
+
+    @cached_property
+    def full_pose(self) -> Tensor:
+        """(B, J, 3), the root first."""
+        return torch.cat([self.variables["orient"][:, None], self.variables["pose"]], dim=1)
+
+    @cached_property
+    def posed(self) -> BodyOutput:
+        """The whole mesh, in the body's own precision: dearer than `landmarks`, which look at a few points of it."""
+        dtype = self.problem.body.dtype
+        given = (self.full_pose, self.variables["betas"], self.variables["transl"])
+        return self.problem.body(*(value.to(dtype) for value in given))
+
+    @property
+    def vertices(self) -> Tensor:
+        """(B, V, 3) m, in the world."""
+        return self.posed.vertices
+
+    @cached_property
+    def landmarks(self) -> Tensor:
+        """(B, K, 3) m, in the world."""
+        return self.problem.landmarks(self.full_pose, self.variables["betas"], self.variables["transl"])
+
+    def landmark_slopes(self, free: Sequence[str]) -> Tensor:
+        """The landmarks' derivatives (B, P, K, 3) by the free blocks; 0 by those of the camera."""
+        variables, points = self.variables, self.landmarks
+        zero = points.new_zeros(())
+        by_body = self.problem.landmarks.jacobian(self.full_pose, variables["betas"])
+        by_pose, by_betas = by_body.split([self.full_pose[0].numel(), variables["betas"].shape[1]], dim=1)
+        by_transl = torch.eye(3, dtype=points.dtype)[:, None].expand(len(points), 3, points.shape[1], 3)
+        known = {"orient": by_pose[:, :3], "pose": by_pose[:, 3:], "betas": by_betas, "transl": by_transl}
+        still = {name: zero.expand(len(points), variables[name][0].numel(), *points.shape[1:]) for name in free}
+        return torch.cat([known.get(name, still[name]) for name in free], dim=1)
+
+    @cached_property
+    def camera(self) -> Camera:
+        start, variables = self.problem.camera, self.variables
+        return Camera(
+            start.focal * variables["log_focal"].exp(),
+            start.center,
+            matrix(variables["camera_orient"]),
+            variables["camera_transl"],
+        )
+
+    @cached_property
+    def projected(self) -> Tensor:
+        """The landmarks (B, K, 2), pixels."""
+        return self.camera.project(self.landmarks)
+
+    def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """What `make` returns, made once: for terms that look at the same quantity."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        return self._shared[key]

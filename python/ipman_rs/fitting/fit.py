@@ -1,0 +1,176 @@
+"""Fitting: the stages of a preset one after the other, each by its solver, for a batch of bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import torch
+
+import ipman_rs.torch as ipt
+
+from . import switch
+from .candidate import Candidate
+from .config import Config, Stage
+from .objective import Objective
+from .problem import Problem
+from .solvers import SOLVERS, Look, Options, Outcome, minimise
+from .variables import Variables, pack, unpack
+
+CONVERGED = ("gradient", "decrease")  # reasons
+CHUNK = 64  # bodies side by side: beyond, nothing gets faster and the Jacobian of the landmarks gets large
+
+
+@dataclass(frozen=True)
+class StageReport:
+    """How a stage went, an entry a body: reason (`solvers.Outcome`), iterations, and the terms' weighted costs.
+
+    `variables` are those that it ended with. `trace` has the costs of each body's successive best points, start and end
+    included, if they were asked for.
+    """
+
+    name: str
+    reasons: list[str]
+    iterations: list[int]
+    terms: dict[str, np.ndarray]  # (B,) each
+    variables: Variables
+    trace: list[dict[str, np.ndarray]] | None = None  # B times (n,) each
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Fitted bodies: their variables (rows a body) and how each stage went."""
+
+    problem: Problem
+    variables: Variables
+    stages: list[StageReport] = field(default_factory=list)
+
+    @property
+    def converged(self) -> np.ndarray:
+        """(B,) bool: whether every stage converged."""
+        reasons = np.array([stage.reasons for stage in self.stages])
+        return np.asarray(np.isin(reasons, CONVERGED).all(axis=0))
+
+    @property
+    def candidate(self) -> Candidate:
+        """The fitted bodies and cameras."""
+        return Candidate(self.problem, self.variables)
+
+
+def fit(
+    problem: Problem,
+    variables: Variables,
+    config: Config,
+    progress: Callable[[str, int], None] | None = None,
+    trace: bool = False,
+) -> Fit:
+    """Fit B bodies from `variables` on by the stages of `config`; `progress` hears a stage and how many ended.
+
+    `trace`: report the terms by iteration, for one more evaluation each.
+    """
+    reports = []
+    with one_thread():
+        for stage in config.stages:
+            if stage.find_ground:
+                problem = on_the_ground(problem, variables)
+            problem = judged(problem, variables)
+            variables, report = run_stage(problem, variables, stage, config.terms, progress, trace)
+            reports.append(report)
+    return Fit(problem, variables, reports)
+
+
+def on_the_ground(problem: Problem, variables: Variables) -> Problem:
+    """The problem with a level ground under the lowest vertex of each body, unless its ground is known."""
+    if problem.ground is not None:
+        return problem
+    with torch.no_grad():
+        lowest = Candidate(problem, variables).vertices[..., 1].amin(dim=1)
+    up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(len(lowest), 3)
+    return replace(problem, ground=ipt.Ground(up, lowest.double()))
+
+
+def judged(problem: Problem, variables: Variables) -> Problem:
+    """The problem with the judgement which bodies are static now; the same where no ground is known."""
+    if problem.ground is None:
+        return problem
+    with torch.no_grad():
+        vertices = Candidate(problem, variables).vertices
+        return replace(problem, static=switch.static(vertices, problem.body.template, problem.ground))
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Torch on one thread: a body's matrices are too small for more, and their bits must not depend on it."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def run_stage(
+    problem: Problem,
+    variables: Variables,
+    stage: Stage,
+    terms: Mapping[str, Mapping[str, Any]],
+    progress: Callable[[str, int], None] | None = None,
+    trace: bool = False,
+) -> tuple[dict[str, torch.Tensor], StageReport]:
+    objective = Objective(problem, variables, stage.free, stage.weights, terms)
+    starts = pack(variables, stage.free).numpy()
+    outcomes: list[Outcome] = []
+    traces: list[dict[str, np.ndarray]] = []
+    for first in range(0, len(starts), CHUNK):
+        part = _Shrinking(objective.rows(range(first, min(first + CHUNK, len(starts)))), stage.solver == "levenberg")
+        told = None if progress is None else (lambda ended, first=first: progress(stage.name, first + ended))
+        outcomes += minimise(SOLVERS[stage.solver], starts[first : first + CHUNK], part, stage.options, told)
+        traces += part.trace() if trace else []
+    rows = torch.from_numpy(np.stack([outcome.point for outcome in outcomes]))
+    variables = unpack(rows, stage.free, variables)
+    with torch.no_grad():
+        costs = objective.costs(objective.candidate(rows))
+    reasons, iterations = [outcome.reason for outcome in outcomes], [outcome.iterations for outcome in outcomes]
+    ended = {name: cost.numpy() for name, cost in costs.items()}
+    return variables, StageReport(stage.name, reasons, iterations, ended, variables, traces if trace else None)
+
+
+class _Shrinking:
+    """An objective's evaluation for the bodies that still run, made anew when half of them have ended."""
+
+    def __init__(self, objective: Objective, wants_models: bool):
+        self.whole, self.wants_models = objective, wants_models
+        self.bodies: Sequence[int] = range(objective.problem.num_bodies)
+        self.objective = objective
+        self.best: list[list[tuple[float, np.ndarray]]] = [[] for _ in self.bodies]
+
+    def __call__(self, bodies: Sequence[int], points: np.ndarray) -> list[Look]:
+        if 2 * len(bodies) <= len(self.bodies):
+            self.bodies, self.objective = bodies, self.whole.rows(bodies)
+        place = [self.bodies.index(body) for body in bodies]
+        everywhere = np.repeat(points[:1], len(self.bodies), axis=0)
+        everywhere[place] = points
+        looks = self.objective.models(everywhere) if self.wants_models else self.objective.looks(everywhere)
+        for body, point, i in zip(bodies, points, place, strict=True):
+            if looks[i].finite and (not self.best[body] or looks[i].value < self.best[body][-1][0]):
+                self.best[body].append((looks[i].value, point))
+        return [looks[i] for i in place]
+
+    def trace(self) -> list[dict[str, np.ndarray]]:
+        """The weighted costs of each body's points that were the best so far: what its solver accepted."""
+        lengths = [len(best) for best in self.best]
+        nowhere = pack(self.whole.variables, self.whole.free).numpy()
+        columns = []
+        with torch.no_grad():
+            for step in range(max(lengths)):
+                rows = [best[min(step, len(best) - 1)][1] if best else nowhere[i] for i, best in enumerate(self.best)]
+                columns.append(self.whole.costs(self.whole.candidate(torch.from_numpy(np.stack(rows)))))
+        names = self.whole.weights if columns else ()
+        costs = {name: torch.stack([column[name] for column in columns]).numpy() for name in names}
+        return [{name: cost[:length, body] for name, cost in costs.items()} for body, length in enumerate(lengths)]
+
+
+__all__ = ["Fit", "Options", "StageReport", "fit", "run_stage"]

@@ -1,0 +1,105 @@
+"""Named points of a body: its joints, points of its skin, and midpoints.
+
+Posing them costs microseconds: a body model is cut down to the few vertices that are asked for.
+
+Joints have the names of the body model (`left_knee`, `head`, `left_index1`, ...), points of the skin those of `surface`
+and, optionally, of `sites` that the caller brings (markers). `mid_hip` and `mid_shoulder` are midpoints of joints;
+keypoint sets call the latter "neck", which here is the joint of that name.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import torch
+from torch import Tensor
+
+import ipman_rs.torch as ipt
+from ipman_rs.body import BodyModel
+
+from .surface import skin_points
+
+MIDPOINTS = {"mid_hip": ("left_hip", "right_hip"), "mid_shoulder": ("left_shoulder", "right_shoulder")}
+
+
+@dataclasses.dataclass(frozen=True)
+class Site:
+    """A point at a vertex of the skin, moved by `shift`, m in the frame of the resting mesh (`body.v_template`)."""
+
+    vertex: int
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class Landmarks:
+    """The points `names` of bodies of one model, all of `known(body)` if None.
+
+    `sites`: further points by name, or other names for points. ValueError for a name that the body does not have.
+    """
+
+    def __init__(
+        self,
+        body: ipt.BodyModel,
+        names: Iterable[str] | None = None,
+        sites: Mapping[str, Site | str] | None = None,
+    ):
+        full, sites = body.body, sites or {}
+        self.names = known(full, sites) if names is None else tuple(names)
+        skin = {name: Site(vertex) for name, vertex in skin_points(full).items() if name not in full.joint_names}
+        skin |= {name: site for name, site in sites.items() if isinstance(site, Site)}
+        ends = [_ends(name, sites) for name in self.names]
+        used = list(dict.fromkeys(name for pair in ends for name in pair if name in skin))
+        rows = {name: row for row, name in enumerate(used)}
+        rows |= {name: max(len(used), 1) + j for j, name in enumerate(full.joint_names) if name not in rows}
+        unknown = [name for pair in ends for name in pair if name not in rows]
+        if unknown:
+            listed = ", ".join(known(full, sites))
+            raise ValueError(f"names: the body {full.name!r} has no landmark {unknown[0]!r}; it has {listed}")
+        device = body.v_template.device
+        self.points = ipt.BodyModel(_cut(full, [skin[name] for name in used] or [Site(0)]), body.dtype).to(device)
+        self.ends = [torch.tensor([rows[pair[end]] for pair in ends], device=device) for end in (0, 1)]
+
+    def __call__(self, full_pose: Tensor, betas: Tensor | None = None, transl: Tensor | None = None) -> Tensor:
+        """The points (B, K, 3) m of bodies with `full_pose` (B, J, 3), `betas` (B, b), `transl` (B, 3)."""
+        posed = self.points(full_pose, betas, transl)
+        points = torch.cat([posed.vertices, posed.joints], dim=-2)
+        return 0.5 * (points.index_select(-2, self.ends[0]) + points.index_select(-2, self.ends[1]))
+
+    def jacobian(self, full_pose: Tensor, betas: Tensor) -> Tensor:
+        """The points' derivatives (B, P, K, 3) by the rotation vectors (3 J) and the betas; no gradient. That by the
+        translation is the identity."""
+        body = self.points.body
+        bodies, size = len(full_pose), full_pose[0].numel() + betas.shape[1]
+        jacobian = full_pose.new_empty(bodies, size, body.num_vertices + body.num_joints, 3)
+        skin = body._skin(np.float32 if full_pose.dtype == torch.float32 else np.float64)
+        pose, betas = full_pose.detach().contiguous(), betas.detach().contiguous()
+        skin.jacobian(bodies, (pose.numpy(), betas.numpy(), None, None), jacobian.numpy())
+        return 0.5 * (jacobian.index_select(-2, self.ends[0]) + jacobian.index_select(-2, self.ends[1]))
+
+
+def known(body: BodyModel, sites: Iterable[str] = ()) -> tuple[str, ...]:
+    """All names that a body has."""
+    return tuple(dict.fromkeys([*body.joint_names, *MIDPOINTS, *skin_points(body), *sites]))
+
+
+def _ends(name: str, sites: Mapping[str, Site | str]) -> tuple[str, str]:
+    """The two points whose midpoint a landmark is, twice the same for most."""
+    site = sites.get(name)
+    name = site if isinstance(site, str) else name
+    return (name, name) if isinstance(site, Site) else MIDPOINTS.get(name, (name, name))
+
+
+def _cut(body: BodyModel, sites: list[Site]) -> BodyModel:
+    """The body with these points for vertices, and no faces."""
+    rows = np.array([site.vertex for site in sites])
+    return dataclasses.replace(
+        body,
+        name=f"{body.name}, {len(rows)} points",
+        v_template=body.v_template[rows] + np.array([site.shift for site in sites]),
+        shapedirs=body.shapedirs[rows],
+        expressiondirs=body.expressiondirs[rows],
+        posedirs=None if body.posedirs is None else body.posedirs[rows],
+        weights=body.weights[rows],
+        faces=np.zeros((0, 3), np.int64),
+    )

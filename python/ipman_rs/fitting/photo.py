@@ -1,0 +1,93 @@
+"""People in photos, found by MediaPipe Pose. Needs the extra `photo`: pip install "ipman_rs[photo]"."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .detections import Array, Detections, join
+from .keypoints import mediapipe
+
+SMALLEST = 32  # pixels: nobody is found in less
+
+
+def detect(paths: Sequence[str | os.PathLike[str]]) -> Detections:
+    """The person in each image, a row each: MediaPipe's landmarks in pixels, and its world landmarks.
+
+    MediaPipe finds one person an image. ImportError without the extra; ValueError, naming the file, for a missing or
+    unreadable image, one under 32 pixels, and one without a person.
+    """
+    with _model() as model:
+        return join([_detections(path, *_landmarks(model, path)) for path in paths])
+
+
+def landmarks(path: str | os.PathLike[str]) -> tuple[Array, Array, tuple[int, int]]:
+    """MediaPipe's landmarks (33, 4) relative to the image, world landmarks (33, 4), and the image's width and height.
+
+    What `keypoints.mediapipe.write` takes. Raises as `detect`.
+    """
+    with _model() as model:
+        return _landmarks(model, path)
+
+
+def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
+    """The pixels (height, width, 3) of an image, turned as its EXIF says. ValueError if unreadable or tiny."""
+    from PIL import Image, ImageOps
+
+    if not Path(path).is_file():
+        raise ValueError(f"{path}: no such file")
+    try:
+        with Image.open(path) as image:
+            pixels = np.array(ImageOps.exif_transpose(image).convert("RGB"))
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise ValueError(f"{path}: expected an image: {error}") from None
+    if min(pixels.shape[:2]) < SMALLEST:
+        height, width = pixels.shape[:2]
+        raise ValueError(
+            f"{path}: expected an image of at least {SMALLEST} × {SMALLEST} pixels, got {width} × {height}"
+        )
+    return pixels
+
+
+def _model() -> Any:
+    """The model whose weights are in MediaPipe's wheel; each image by itself, as none follows another."""
+    try:
+        from mediapipe.python.solutions import pose
+    except ImportError as error:
+        raise ImportError(f'photos need MediaPipe: pip install "ipman_rs[photo]" ({error})') from error
+    return pose.Pose(static_image_mode=True, model_complexity=1)
+
+
+def _landmarks(model: Any, path: str | os.PathLike[str]) -> tuple[Array, Array, tuple[int, int]]:
+    pixels = read(path)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "SymbolDatabase.GetPrototype", UserWarning)  # between MediaPipe and protobuf
+        result = model.process(pixels)
+    if result.pose_landmarks is None:
+        raise ValueError(f"{path}: expected a person, found none")
+    height, width = pixels.shape[:2]
+    return _four(result.pose_landmarks), _four(result.pose_world_landmarks), (width, height)
+
+
+def _four(found: Any) -> Array:
+    return np.array([[point.x, point.y, point.z, point.visibility] for point in found.landmark])
+
+
+def _detections(path: str | os.PathLike[str], found: Array, world: Array, size: tuple[int, int]) -> Detections:
+    kept = [index for index, name in enumerate(mediapipe.NAMES) if name is not None]
+    found, world = found[kept], world[kept]
+    return Detections(
+        tuple(name for name in mediapipe.NAMES if name is not None),
+        found[None, :, :2] * size,
+        found[None, :, 3].clip(0, 1),
+        (str(path),),
+        np.array([size], float),
+        world[None, :, :3],
+        world[None, :, 3].clip(0, 1),
+    )

@@ -1,0 +1,64 @@
+"""What is known before a fit: the body model, what was observed of each body, and where ground and camera are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+from torch import Tensor
+
+import ipman_rs.torch as ipt
+
+from .camera import Camera
+
+if TYPE_CHECKING:
+    from .landmarks import Landmarks
+
+
+@dataclass(frozen=True)
+class Presented:
+    """A pose that the person was shown and imitates: pose (B, J − 1, 3), and the vertices (n,) that touch in it."""
+
+    pose: Tensor
+    contact: Tensor | None = None
+
+
+@dataclass(frozen=True)
+class Problem:
+    """B bodies. Points that were not seen have confidence 0; their coordinates are any finite number."""
+
+    body: ipt.BodyModel
+    landmarks: Landmarks  # K named points of the body
+    camera: Camera
+    ground: ipt.Ground | None = None  # None: not known yet
+    points: Tensor | None = None  # (B, K, 2) pixels
+    confidence: Tensor | None = None  # (B, K), 0 to 1
+    points_3d: Tensor | None = None  # (B, K, 3) m, in the world
+    confidence_3d: Tensor | None = None  # (B, K)
+    image_size: Tensor | None = None  # (B, 2) width and height, pixels
+    height: Tensor | None = None  # (B,) m, of the person
+    mass: Tensor | None = None  # (B,) kg
+    presented: Presented | None = None
+    static: Tensor | None = None  # (B,) bool, `switch.static` where the stage began; None: not asked for
+
+    @property
+    def num_bodies(self) -> int:
+        return len(self.camera.focal)
+
+    def rows(self, index: Tensor) -> Problem:
+        """The bodies of these indices, in this order; an index may come more than once."""
+        return replace(self, **{field.name: _rows(getattr(self, field.name), index) for field in fields(self)})
+
+
+def _rows(value: Any, index: Tensor) -> Any:
+    if isinstance(value, Tensor):
+        return value[index]
+    if isinstance(value, Camera):
+        return Camera(*(getattr(value, field.name)[index] for field in fields(value)))
+    if isinstance(value, ipt.Ground):
+        return (
+            ipt.Ground.of_unit(value.normal.expand(-1, 3)[index], value.height[index]) if value.height.ndim else value
+        )
+    if isinstance(value, Presented):
+        return replace(value, pose=value.pose[index])
+    return value

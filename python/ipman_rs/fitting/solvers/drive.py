@@ -1,0 +1,38 @@
+"""Many solvers, one a body, fed by an objective that is evaluated for all of them at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+
+import numpy as np
+
+from .outcome import Look, Options, Outcome, Vector
+
+Solver = Generator[Vector, Look, Outcome]
+# The bodies' indices and their points (n, P) -> what each looks like.
+Evaluate = Callable[[Sequence[int], Vector], Sequence[Look]]
+
+
+def minimise(
+    solver: Callable[[Vector, Options], Solver],
+    starts: Vector,
+    evaluate: Evaluate,
+    options: Options,
+    progress: Callable[[int], None] | None = None,
+) -> list[Outcome]:
+    """One outcome a row of `starts` (B, P). `progress` is told how many have ended."""
+    running = {body: solver(start, options) for body, start in enumerate(starts)}
+    points = {body: next(generator) for body, generator in running.items()}
+    outcomes: dict[int, Outcome] = {}
+    while points:
+        bodies = sorted(points)
+        looks = evaluate(bodies, np.stack([points[body] for body in bodies]))
+        for body, look in zip(bodies, looks, strict=True):
+            try:
+                points[body] = running[body].send(look)
+            except StopIteration as stop:
+                outcomes[body] = stop.value
+                del points[body]
+        if progress is not None:
+            progress(len(outcomes))
+    return [outcomes[body] for body in range(len(starts))]

@@ -1,0 +1,96 @@
+"""L-BFGS with a line search for the strong Wolfe conditions: what SMPLify-X and -XMC solve with.
+
+Nocedal & Wright, Numerical Optimization, 2nd ed., algorithms 7.4, 7.5, 3.5 and 3.6.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Generator
+
+import numpy as np
+
+from .outcome import Look, Options, Outcome, Vector
+
+MEMORY = 10
+SUFFICIENT, CURVATURE = 1e-4, 0.9  # the constants of the Wolfe conditions
+TRIES = 20  # of one line search
+STILL = 3  # iterations with hardly any decrease that count as the end
+
+Search = Generator[Vector, Look, "tuple[float, Look] | None"]
+
+
+def lbfgs(start: Vector, options: Options) -> Generator[Vector, Look, Outcome]:
+    """A step that does not end lower is undone and shrunk; the best point is never lost."""
+    point, look = start, (yield start)
+    if not look.finite:
+        return Outcome(start, look.value, 0, "not finite")
+    memory: deque[tuple[Vector, Vector]] = deque(maxlen=MEMORY)
+    still = 0
+    for iteration in range(options.iterations):
+        if np.abs(look.gradient).max(initial=0) <= options.gradient:
+            return Outcome(point, look.value, iteration, "gradient")
+        direction = -_product(memory, look.gradient)
+        if direction @ look.gradient >= 0:
+            memory.clear()
+            direction = -look.gradient
+        first = 1.0 if memory else min(1.0, 1.0 / np.abs(look.gradient).sum())
+        found = yield from _search(point, look, direction, first)
+        if found is None:
+            if not memory:
+                return Outcome(point, look.value, iteration, "no descent")
+            memory.clear()
+            continue
+        step, new = found
+        change, turn = step * direction, new.gradient - look.gradient
+        if change @ turn > 1e-10 * (turn @ turn):
+            memory.append((change, turn))
+        still = still + 1 if look.value - new.value <= options.decrease else 0
+        point, look = point + change, new
+        if still == STILL:
+            return Outcome(point, look.value, iteration + 1, "decrease")
+    return Outcome(point, look.value, options.iterations, "iterations")
+
+
+def _product(memory: deque[tuple[Vector, Vector]], gradient: Vector) -> Vector:
+    """The inverse Hessian's estimate times the gradient: the two-loop recursion."""
+    result, shares = gradient.copy(), []
+    for change, turn in reversed(memory):
+        share = (change @ result) / (change @ turn)
+        result -= share * turn
+        shares.append(share)
+    if memory:
+        change, turn = memory[-1]
+        result *= (change @ turn) / (turn @ turn)
+    for (change, turn), share in zip(memory, reversed(shares), strict=True):
+        result += (share - (turn @ result) / (change @ turn)) * change
+    return result
+
+
+def _search(point: Vector, start: Look, direction: Vector, step: float) -> Search:
+    """A step that satisfies the strong Wolfe conditions, or the lowest that was found; None if nothing is lower."""
+    slope = float(start.gradient @ direction)
+    low, low_look, high, high_value = 0.0, start, None, np.inf
+    for _ in range(TRIES):
+        look = yield point + step * direction
+        value = look.value if look.finite else np.inf
+        if value > start.value + SUFFICIENT * step * slope or value >= low_look.value and low > 0:
+            high, high_value = step, value
+        else:
+            slope_here = float(look.gradient @ direction)
+            if abs(slope_here) <= -CURVATURE * slope:
+                return step, look
+            if slope_here * ((high if high is not None else np.inf) - low) >= 0:
+                high, high_value = low, low_look.value
+            low, low_look = step, look
+        step = 2 * step if high is None else _between(low, low_look, direction, high, high_value)
+    return (low, low_look) if low_look.value < start.value else None
+
+
+def _between(low: float, look: Look, direction: Vector, high: float, high_value: float) -> float:
+    """The minimum of the parabola through both values and the slope at `low`, kept away from the ends."""
+    width = high - low
+    slope = float(look.gradient @ direction)
+    curve = high_value - look.value - slope * width
+    share = -slope * width / (2 * curve) if np.isfinite(curve) and curve > 0 else 0.5
+    return low + width * min(max(share, 0.1), 0.9)

@@ -1,0 +1,47 @@
+"""What solvers are told, and what they tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Options:
+    """When to stop. Tolerances are absolute: a saturated ground term is a constant that would fool relative ones."""
+
+    iterations: int = 100
+    gradient: float = 1e-4  # of the largest component
+    decrease: float = 1e-6  # of the cost, in each of the last three iterations
+
+
+@dataclass(frozen=True)
+class Look:
+    """The objective at a point: value, gradient (P,), and a model of the Hessian (P, P) for solvers that ask."""
+
+    value: float
+    gradient: Vector
+    hessian: Vector | None = None
+
+    @property
+    def finite(self) -> bool:
+        return bool(np.isfinite(self.value) and np.isfinite(self.gradient).all())
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The best point (P,) and how it was reached. reason: "gradient", "decrease" (both converged), "iterations", "no
+    descent" or "not finite" (the start itself, which is handed back)."""
+
+    point: Vector
+    value: float
+    iterations: int
+    reason: str
+
+    @property
+    def converged(self) -> bool:
+        return self.reason in ("gradient", "decrease")

@@ -1,0 +1,186 @@
+"""Where a fit starts: the mean body before the camera, as far away as its size in the image tells, turned the way that
+explains the points best.
+
+SMPLify-X estimates the depth by similar triangles and tries a turn by 180°; SMPLify-XMC searches over yaws. Here both:
+every yaw is fitted for a few iterations, and the lowest cost wins.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from .camera import NEAREST
+from .problem import Problem
+from .rotations import matrix, vector
+from .solvers import Options
+from .variables import Variables
+
+# Far joints of the trunk, whose lengths change least with the pose, and then those of the legs and arms.
+SPANS = (
+    (("left_shoulder", "left_hip"), ("right_shoulder", "right_hip")),
+    (
+        ("left_hip", "left_knee"),
+        ("right_hip", "right_knee"),
+        ("left_knee", "left_ankle"),
+        ("right_knee", "right_ankle"),
+    ),
+    (("left_shoulder", "left_elbow"), ("right_shoulder", "right_elbow")),
+)
+SEEN = 0.1  # confidence from which a point counts as seen
+WEIGHTS = {"reprojection": 4.0, "pose_prior": 40.0, "joint_limits": 200.0, "shape_prior": 50.0}
+DEEPEST = 100.0  # m
+
+
+def level_camera(pitch: float | Tensor = 0.0) -> Tensor:
+    """R (3, 3) or (..., 3, 3) of a camera that looks along the world's −z, its x axis level; pitch in radians, positive
+    looking down."""
+    pitch = torch.as_tensor(pitch, dtype=torch.float64)
+    facing = torch.diag(torch.tensor([1.0, -1.0, -1.0], dtype=torch.float64))
+    zero = torch.zeros_like(pitch)
+    return matrix(torch.stack([pitch, zero, zero], dim=-1)) @ facing
+
+
+def neutral(problem: Problem) -> dict[str, Tensor]:
+    """The mean body in the presented pose, or standing, arms down, at the world's origin; the camera as given."""
+    bodies, model = problem.num_bodies, problem.body.body
+
+    def zeros(*shape: int) -> Tensor:
+        return torch.zeros(bodies, *shape, dtype=torch.float64)
+
+    pose = zeros(model.num_joints - 1, 3)
+    if problem.presented is not None:
+        pose = problem.presented.pose.double()
+    else:
+        from ipman_rs.body import poses
+
+        standing = torch.as_tensor(poses.pose_of(model, "standing"))[1:]
+        pose = standing.expand(bodies, -1, -1).clone()
+    return {
+        "orient": zeros(3),
+        "pose": pose,
+        "betas": zeros(min(model.num_betas, 10)),
+        "transl": zeros(3),
+        "camera_orient": vector(problem.camera.rotation),
+        "camera_transl": problem.camera.translation.clone(),
+        "log_focal": zeros(2),
+    }
+
+
+def before_camera(problem: Problem, yaws: int = 4, iterations: int = 12) -> dict[str, Tensor]:
+    """Variables with the body placed before the camera, which stays. Needs points in an image."""
+    return _best(problem, neutral(problem), yaws, ("orient", "transl"), iterations, moves_camera=False)
+
+
+def camera_around(problem: Problem, yaws: int = 12, iterations: int = 12) -> dict[str, Tensor]:
+    """Variables with the camera placed around the body, which stays in its own frame with its ground."""
+    free = ("camera_orient", "camera_transl")
+    return _best(problem, neutral(problem), yaws, free, iterations, moves_camera=True)
+
+
+def _best(
+    problem: Problem,
+    variables: Mapping[str, Tensor],
+    yaws: int,
+    free: tuple[str, ...],
+    iterations: int,
+    moves_camera: bool,
+) -> dict[str, Tensor]:
+    from .config import Stage
+    from .fit import run_stage
+
+    copies = torch.arange(problem.num_bodies).repeat_interleave(yaws)
+    many = problem.rows(copies)
+    starts = {name: value[copies] for name, value in variables.items()}
+    turns = torch.arange(yaws, dtype=torch.float64).repeat(problem.num_bodies) * (2 * math.pi / yaws)
+    starts = _placed(many, starts, turns, moves_camera)
+    stage = Stage("start", free, WEIGHTS, "levenberg", Options(iterations=iterations, gradient=1.0, decrease=1.0))
+    found, report = run_stage(many, starts, stage, {})
+    costs = np.nan_to_num(sum(report.terms.values()), nan=np.inf).reshape(-1, yaws)
+    winners = torch.from_numpy(costs.argmin(axis=1)) + yaws * torch.arange(problem.num_bodies)
+    return {name: value[winners] for name, value in found.items()}
+
+
+def _placed(problem: Problem, variables: Variables, yaws: Tensor, moves_camera: bool) -> dict[str, Tensor]:
+    """The body, or the camera, turned by the yaws and moved so that the trunk is seen where it was in the image."""
+    zero = torch.zeros_like(yaws)
+    turn = matrix(torch.stack([zero, yaws, zero], dim=-1))
+    rotation = problem.camera.rotation
+    if moves_camera:
+        rotation = rotation @ turn
+        variables = {**variables, "camera_orient": vector(rotation)}
+    else:
+        roll = _roll(problem)
+        tilt = matrix(torch.stack([zero, zero, roll], dim=-1))  # about the camera's line of sight
+        upright = rotation.transpose(1, 2) @ tilt @ rotation
+        variables = {**variables, "orient": vector(upright @ turn @ matrix(variables["orient"]))}
+    pose = torch.cat([variables["orient"][:, None], variables["pose"]], dim=1)
+    points = problem.landmarks(pose, variables["betas"], variables["transl"])
+    seen = (rotation[:, None] * points[:, :, None]).sum(dim=-1)  # turned into the camera's axes
+    depth = _depth(problem, points)
+    weight = _seen(problem).double()
+    weight = weight / weight.sum(dim=1, keepdim=True).clamp(min=1)
+    assert problem.points is not None
+    ray = (problem.points - problem.camera.center[:, None]) / problem.camera.focal[:, None]
+    middle = ((ray * weight[..., None]).sum(dim=1) * depth[:, None], depth[:, None])
+    shift = torch.cat(middle, dim=1) - (seen * weight[..., None]).sum(dim=1)
+    if moves_camera:
+        return {**variables, "camera_transl": shift}
+    world = ((shift - problem.camera.translation)[:, :, None] * rotation).sum(dim=1)
+    return {**variables, "transl": variables["transl"] + world}
+
+
+def _seen(problem: Problem) -> Tensor:
+    assert problem.confidence is not None
+    return problem.confidence > SEEN
+
+
+def _ends(problem: Problem, name: str) -> int | None:
+    names = problem.landmarks.names
+    return names.index(name) if name in names else None
+
+
+def _depth(problem: Problem, points: Tensor) -> Tensor:
+    """(B,): f · length / length in the image, by the first group of spans of which one is seen; 5 m if none is."""
+    assert problem.points is not None
+    seen, depth = _seen(problem), torch.full((len(points),), torch.nan, dtype=torch.float64)
+    for spans in SPANS:
+        found = [(_ends(problem, a), _ends(problem, b)) for a, b in spans]
+        pairs = [(a, b) for a, b in found if a is not None and b is not None]
+        if not pairs:
+            continue
+        first, second = map(list, zip(*pairs, strict=True))
+        both = (seen[:, first] & seen[:, second]).double()
+        real = ((points[:, first] - points[:, second]).norm(dim=-1) * both).sum(dim=1)
+        image = (
+            ((problem.points[:, first] - problem.points[:, second]) / problem.camera.focal[:, None]).norm(dim=-1) * both
+        ).sum(dim=1)
+        depth = torch.where(depth.isnan() & (image > 0), real / image.clamp(min=1e-12), depth)
+    return depth.nan_to_num(5.0).clamp(min=10 * NEAREST, max=DEEPEST)
+
+
+def _roll(problem: Problem) -> Tensor:
+    """(B,) radians: how far the trunk in the image is turned from upright, in steps of 90°."""
+    assert problem.points is not None
+    ends = [_ends(problem, f"{side}_{joint}") for joint in ("hip", "shoulder") for side in ("left", "right")]
+    bodies = len(problem.points)
+    if any(end is None for end in ends):
+        return torch.zeros(bodies, dtype=torch.float64)
+    points = problem.points[:, ends]
+    up = points[:, 2:].mean(dim=1) - points[:, :2].mean(dim=1)
+    roll = torch.atan2(up[:, 0], -up[:, 1])
+    known = _seen(problem)[:, ends].all(dim=1)
+    return torch.where(known, (roll / (math.pi / 2)).round() * (math.pi / 2), 0.0)
+
+
+def options(start: Mapping[str, Any]) -> dict[str, Any]:
+    """The `start` of a preset without its `search`. ValueError for an unknown option."""
+    unknown = sorted(set(start) - {"search", "yaws", "iterations"})
+    if unknown:
+        raise ValueError(f"start: expected search, yaws or iterations, got {', '.join(unknown)}")
+    return {name: int(value) for name, value in start.items() if name != "search"}

@@ -1,0 +1,41 @@
+"""The terms of fitting objectives, one a file. A new one is one file and one line here."""
+
+from __future__ import annotations
+
+from .bending import Bending
+from .gmm_prior import GaussianMixture
+from .hand_prior import HandPrior
+from .joint_limits import JointLimits
+from .measured_shape import MeasuredShape
+from .physics import Balance, Ground, Stability
+from .points_3d import Points3D
+from .pose_prior import PosePrior
+from .presented_contact import PresentedContact
+from .presented_pose import PresentedPose
+from .reprojection import Reprojection
+from .self_contact import SelfContact, SelfPenetration
+from .shape_prior import ShapePrior
+from .term import LeastSquares, Term
+from .vposer import VPoser
+
+TERMS: dict[str, type[Term]] = {
+    "reprojection": Reprojection,
+    "points_3d": Points3D,
+    "joint_limits": JointLimits,
+    "pose_prior": PosePrior,
+    "gmm_prior": GaussianMixture,
+    "vposer": VPoser,
+    "presented_pose": PresentedPose,
+    "presented_contact": PresentedContact,
+    "shape_prior": ShapePrior,
+    "measured_shape": MeasuredShape,
+    "bending": Bending,
+    "hand_prior": HandPrior,
+    "stability": Stability,
+    "ground": Ground,
+    "balance": Balance,
+    "self_contact": SelfContact,
+    "self_penetration": SelfPenetration,
+}
+
+__all__ = ["TERMS", "LeastSquares", "Term"]

@@ -1,0 +1,75 @@
+"""The paper's intuitive-physics terms, and this project's balance cost in place of stability, from the compiled core:
+
+    stability   ‖g(CoM) − g(CoP)‖                                  m
+    ground      mean of α1 tanh²(h/α2) over h ≥ 0, plus mean of β1 tanh²(h/β2) over h < 0
+    balance     log(1 + J), see `ipman_rs.torch.balance_cost`       nats
+
+with the constants of a preset of `ipman_rs.presets`. Terms of one preset share one evaluation.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import torch
+from torch import Tensor
+
+import ipman_rs.torch as ipt
+from ipman_rs import BodyTemplate
+from ipman_rs.body import BodyModel
+
+from ..candidate import Candidate
+from ..problem import Problem
+from .term import Term
+
+
+class Physics(Term):
+    """preset: a name of `ipman_rs.presets`, `usual` if None.
+    samples: of the body's surface, those of its template if None; fewer are faster and coarser.
+    only_static: leave alone a body that was in the air or falling where the stage began (`problem.static`).
+    """
+
+    needs_mesh = True
+    usual = "paper-o"
+    quantities: tuple[str, ...]  # of IntuitivePhysicsLoss, summed
+
+    def __init__(
+        self, problem: Problem, preset: str | None = None, samples: int | None = None, only_static: bool = False
+    ):
+        super().__init__(problem)
+        if problem.ground is None:
+            raise ValueError("ground: expected one for terms of physics; give it, or let a stage find it (find_ground)")
+        self.loss = _loss(problem.body.body, preset or self.usual, samples)
+        missing = set(self.quantities) - set(self.loss.terms)
+        if missing:
+            raise ValueError(f"preset: {preset!r} has {', '.join(self.loss.terms)}, but no {', '.join(missing)}")
+        self.gate = problem.static if only_static else None
+
+    def cost(self, candidate: Candidate) -> Tensor:
+        values = candidate.shared(self.loss, lambda: self.loss(candidate.vertices, self.problem.ground))
+        total = torch.stack([values[name] for name in self.quantities], dim=-1).sum(dim=-1)
+        return total if self.gate is None else torch.where(self.gate, total, 0)
+
+
+class Stability(Physics):
+    quantities = ("stability",)
+
+
+class Ground(Physics):
+    quantities = ("pull", "push")
+
+
+class Balance(Physics):
+    usual = "balanced"
+    quantities = ("balance",)
+
+
+@lru_cache(maxsize=16)
+def _loss(body: BodyModel, preset: str, samples: int | None) -> ipt.IntuitivePhysicsLoss:
+    """One object for all terms of the same constants: by it they find each other's evaluation."""
+    return ipt.IntuitivePhysicsLoss(_template(body, samples), preset=preset, reduction="none")
+
+
+@lru_cache(maxsize=16)
+def _template(body: BodyModel, samples: int | None) -> BodyTemplate:
+    return body.template if samples is None else body.make_template(samples)
