@@ -48,7 +48,8 @@ def _step(look: Look, damping: float) -> tuple[Vector, float]:
         raise ValueError("levenberg: expected a model of the Hessian, got none")
     diagonal = hessian.diagonal()
     stiff = damping * np.maximum(diagonal, 1e-6 * diagonal.max(initial=0) + 1e-12)
-    step, info = scipy.linalg.lapack.dposv(hessian + np.diag(stiff), -look.gradient)[1:]
-    if info:  # not positive definite: more damping
+    try:
+        step = -scipy.linalg.cho_solve(scipy.linalg.cho_factor(hessian + np.diag(stiff)), look.gradient)
+    except scipy.linalg.LinAlgError:  # not positive definite: more damping
         return np.zeros_like(look.gradient), 0.0
     return step, float(-look.gradient @ step - 0.5 * step @ hessian @ step)

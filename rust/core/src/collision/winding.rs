@@ -226,7 +226,7 @@ mod tests {
                 assert!((work().sum::<f64>(level) - expected).abs() < 1e-13);
                 assert!((work().sum::<f32>(level) - expected).abs() < 1e-5);
             }
-            let half = |face: [u32; 3]| face[0] % 2 == 0;
+            let half = |face: [u32; 3]| face[0].is_multiple_of(2);
             let some = of_some(&tree, &boxes, at, &|_| false, &half);
             let work = OfTriangles { triangles: &some, points: &points, at };
             let faces: Vec<_> = mesh.faces.iter().copied().filter(|&face| half(face)).collect();
