@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from types import SimpleNamespace
 
 import keypoint_files as files
@@ -13,6 +14,7 @@ from click.testing import CliRunner
 
 import ipman_rs as ip
 from ipman_rs.cli import main
+from ipman_rs.fitting import camera_file
 
 
 @pytest.fixture(scope="module")
@@ -263,6 +265,47 @@ def test_without_torch(tmp_path, standing, monkeypatch):
     result = CliRunner().invoke(main, ["fit", "x.json", "-o", str(tmp_path)])
     assert result.exit_code == 1
     assert "pip install 'ipman_rs[fit]'" in result.stderr
+
+
+def test_a_known_camera(fit, tmp_path, standing):
+    """The same scene told as one camera in a turned and moved world: the body is the same, where the world says."""
+    c, s = math.cos(0.4), math.sin(0.4)
+    turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])  # of the world about its upward axis
+    rotation, translation = np.diag([1.0, -1.0, -1.0]) @ turn.T, np.array([0.3, 1.2, 0.5])
+    content = {"R": rotation.tolist(), "t": translation.tolist(), "K": [[800, 0, 240], [0, 800, 320], [0, 0, 1]]}
+    camera = tmp_path / "camera.json"
+    camera.write_text(json.dumps(content))
+    anna = files.write(tmp_path / "anna.json", standing)
+    plain = arrays(fit(anna, "--focal", "800").folder / "anna" / "anna.npz")
+    known = arrays(fit(anna, "--camera", str(camera)).folder / "anna" / "anna.npz")
+    np.testing.assert_allclose(known["focal"][0], [800, 800])
+    # A few iterations, whose damping knows the world's axes, end somewhat apart.
+    np.testing.assert_allclose(known["projected"], plain["projected"], atol=2)
+    np.testing.assert_allclose(known["body_pose"], plain["body_pose"], atol=0.03)
+
+    def seen(stored):
+        place = stored["transl"][0] + ip.load_body("anny-lite").forward().joints[0]  # the root, at about mean shape
+        return stored["camera_rotation"][0] @ place + stored["camera_translation"][0]
+
+    np.testing.assert_allclose(seen(known), seen(plain), atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ("no json", "not a JSON file"),
+        ('{"eye": 3}', "expected an object with some of R, t"),
+        ('{"R": [1, 2, 3]}', "R: expected 3 × 3 finite numbers"),
+        ('{"R": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}', "R: expected a rotation"),
+        ('{"focal": -3}', "focal: expected positive pixels"),
+        ('{"t": [0, 0, NaN]}', "t: expected 3 finite numbers"),
+    ],
+)
+def test_what_is_no_camera(tmp_path, content, says):
+    path = tmp_path / "camera.json"
+    path.write_text(content)
+    with pytest.raises(ValueError, match=re.escape(says)):
+        camera_file.read(path)
 
 
 def test_focal_length_is_the_diagonal(fit, tmp_path, standing):

@@ -36,8 +36,13 @@ if TYPE_CHECKING:
     help="How far the camera looks down; negative: up.",
 )  # fmt: skip
 @click.option(
+    "--camera", type=click.Path(path_type=Path), metavar="FILE",
+    help="JSON of a known camera: R, t (world to camera), focal, center, or K; before --focal and --camera-pitch.",
+)  # fmt: skip
+@click.option(
     "--ground", type=FLOOR, default="found", show_default=True, metavar="HEIGHT|found",
-    help="Height of the floor in metres above the camera (below it: negative); found: under the feet.",
+    help="Height of the floor in metres above the world's origin, which is the camera unless --camera says where that "
+    "is (below it: negative); found: under the feet.",
 )  # fmt: skip
 @click.option("--height", type=float, metavar="M", help="Height of the person, where a preset weighs measured_shape.")
 @click.option("--mass", type=float, metavar="KG", help="Mass of the person, where a preset weighs measured_shape.")
@@ -127,10 +132,11 @@ def _items(inputs: tuple[Path, ...], reading: Any) -> tuple[list[Item], list[tup
 
 
 def _settings(options: dict[str, Any]) -> Settings:
-    from ..fitting import config
+    from ..fitting import camera_file, config
     from .fit_run import Settings
 
     try:
+        options["camera"] = None if options["camera"] is None else camera_file.read(options["camera"])
         return Settings(config=config.load(options.pop("preset")), **options)
     except ValueError as error:
         raise click.UsageError(str(error)) from error

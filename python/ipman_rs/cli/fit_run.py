@@ -14,6 +14,7 @@ import ipman_rs as ip
 import ipman_rs.torch as ipt
 
 from ..fitting import detected, start
+from ..fitting.camera_file import KnownCamera
 from ..fitting.config import Config, weighs
 from ..fitting.detections import join
 from ..fitting.fit import fit, on_the_ground
@@ -35,6 +36,7 @@ class Settings:
     model: str
     focal: float | None = None
     pitch: float = 0.0
+    camera: KnownCamera | None = None
     ground: float | None = None
     height: float | None = None
     mass: float | None = None
@@ -101,6 +103,7 @@ def _fitted(batch: list[Item], settings: Settings, body: ipt.BodyModel) -> Itera
         return
     seen = join([item.seen for item in kept if item.seen is not None])
     where = {"focal": settings.focal, "pitch": settings.pitch, "ground": settings.ground}
+    where |= {} if settings.camera is None else {"camera": settings.camera}
     problem = detected.problem(body, seen, **where, height=settings.height, mass=settings.mass)
     problem = _presented(problem, settings)
     config = settings.config

@@ -13,11 +13,13 @@ import ipman_rs.torch as ipt
 from ipman_rs.checks import positive
 
 from .camera import Camera
+from .camera_file import KnownCamera
 from .detections import Detections
 from .landmarks import Landmarks, known
 from .problem import Problem
 from .start import SEEN, level_camera
 
+NOTHING_KNOWN = KnownCamera()
 FEWEST = 6  # points seen, below which a body is a guess
 FEET = (
     "left_ankle",
@@ -37,6 +39,7 @@ def problem(
     *,
     focal: float | None = None,
     pitch: float = 0.0,
+    camera: KnownCamera = NOTHING_KNOWN,
     ground: float | None = None,
     height: float | None = None,
     mass: float | None = None,
@@ -44,8 +47,8 @@ def problem(
     """The fit of each person of `detections`, a row each. ValueError without image sizes, or for numbers out of range.
 
     `focal`: pixels, the image's diagonal if None. `pitch`: degrees by which the camera looks down, under 90 either way;
-    it stands at the world's origin. `ground`: height of the floor in the world (below the camera: negative), found by
-    the fit if None. `height` m and `mass` kg of the person.
+    it stands at the world's origin. What `camera` knows goes before both. `ground`: height of the floor in the world
+    (below the camera: negative), found by the fit if None. `height` m and `mass` kg of the person.
     """
     if detections.image_size is None:
         raise ValueError("image_size: expected width and height of the images, got none")
@@ -59,18 +62,25 @@ def problem(
     def each(name: str, value: float | None) -> Tensor | None:
         return None if value is None else torch.full((people,), positive(name, value), dtype=torch.float64)
 
+    def known_of(numbers: tuple[float, ...] | None, *shape: int) -> Tensor | None:
+        if numbers is None:
+            return None
+        return torch.tensor(numbers, dtype=torch.float64).reshape(shape).repeat(people, *(1 for _ in shape))
+
     length = size.norm(dim=1) if focal is None else each("focal", focal)
     assert length is not None
-    camera = Camera(
-        length[:, None].expand(people, 2).clone(),
-        size / 2,
-        level_camera(math.radians(pitch)).expand(people, 3, 3).clone(),
-        torch.zeros(people, 3, dtype=torch.float64),
+    rotation, translation = known_of(camera.rotation, 3, 3), known_of(camera.translation, 3)
+    lengths, center = known_of(camera.focal, 2), known_of(camera.center, 2)
+    before = Camera(
+        length[:, None].expand(people, 2).clone() if lengths is None else lengths,
+        size / 2 if center is None else center,
+        level_camera(math.radians(pitch)).expand(people, 3, 3).clone() if rotation is None else rotation,
+        torch.zeros(people, 3, dtype=torch.float64) if translation is None else translation,
     )
     return Problem(
         body,
         Landmarks(body, names),
-        camera,
+        before,
         None if ground is None else _floor(people, ground),
         torch.from_numpy(seen.points),
         torch.from_numpy(seen.confidence),
