@@ -1,4 +1,5 @@
-"""Rotation vectors, matrices and unit quaternions (x, y, z, w): roma's, under the names used here."""
+"""Rotation vectors, matrices and unit quaternions (x, y, z, w): roma's, under the names used here; `special_procrustes`
+is the rotation nearest to a matrix."""
 
 from __future__ import annotations
 
@@ -6,8 +7,9 @@ import torch
 from roma import rotmat_to_rotvec as vector
 from roma import rotvec_to_rotmat as matrix
 from roma import rotvec_to_unitquat as quaternion
+from roma import special_procrustes
 
-__all__ = ["left_jacobian", "matrix", "quaternion", "vector"]
+__all__ = ["left_jacobian", "matrix", "quaternion", "special_procrustes", "vector"]
 
 
 def left_jacobian(rotations: torch.Tensor) -> torch.Tensor:

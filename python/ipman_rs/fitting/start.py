@@ -17,7 +17,7 @@ from torch import Tensor
 
 from .camera import NEAREST
 from .problem import Problem
-from .rotations import matrix, vector
+from .rotations import matrix, special_procrustes, vector
 from .solvers import Options
 from .variables import Variables
 
@@ -81,6 +81,25 @@ def camera_around(problem: Problem, yaws: int = 12, iterations: int = 12) -> dic
     """Variables with the camera placed around the body, which stays in its own frame with its ground."""
     free = ("camera_orient", "camera_transl")
     return _best(problem, neutral(problem), yaws, free, iterations, moves_camera=True)
+
+
+def at_points(problem: Problem) -> dict[str, Tensor]:
+    """Variables with the body moved and turned as a whole onto its points in the world, by least squares (Kabsch)."""
+    if problem.points_3d is None:
+        raise ValueError("points_3d: expected points (B, K, 3) in the world, got none")
+    variables = neutral(problem)
+    pose = torch.cat([variables["orient"][:, None], variables["pose"]], dim=1)
+    body = problem.landmarks(pose, variables["betas"], variables["transl"])
+    weight = torch.ones_like(body[..., 0]) if problem.confidence_3d is None else problem.confidence_3d
+    weight = (weight / weight.sum(dim=1, keepdim=True).clamp(min=1e-12))[..., None]
+    middle, target = (body * weight).sum(dim=1), (problem.points_3d * weight).sum(dim=1)
+    centred = (problem.points_3d - target[:, None]) * weight
+    spread = (centred[..., :, None] * (body - middle[:, None])[..., None, :]).sum(dim=1)
+    turn = special_procrustes(spread, method="svd")
+    # The root joint stays where it is when the body turns.
+    root = problem.body(pose[:1].to(problem.body.dtype)).joints[:, 0].to(middle)
+    turned = (turn * (middle - root)[:, None]).sum(dim=2)
+    return {**variables, "orient": vector(turn @ matrix(variables["orient"])), "transl": target - root - turned}
 
 
 def _best(
