@@ -1,15 +1,21 @@
-"""Rotation vectors, matrices and unit quaternions (x, y, z, w): roma's, under the names used here; `special_procrustes`
-is the rotation nearest to a matrix."""
+"""Rotation vectors, matrices and unit quaternions (x, y, z, w): roma's, under the names used here."""
 
 from __future__ import annotations
 
 import torch
+from roma import procrustes
 from roma import rotmat_to_rotvec as vector
 from roma import rotvec_to_rotmat as matrix
 from roma import rotvec_to_unitquat as quaternion
-from roma import special_procrustes
 
-__all__ = ["left_jacobian", "matrix", "quaternion", "special_procrustes", "vector"]
+__all__ = ["left_jacobian", "matrix", "nearest", "quaternion", "vector"]
+
+
+def nearest(matrices: torch.Tensor) -> torch.Tensor:
+    """The rotations nearest to matrices (..., 3, 3)."""
+    found = procrustes(matrices, force_rotation=True, method="svd")
+    assert isinstance(found, torch.Tensor)
+    return found
 
 
 def left_jacobian(rotations: torch.Tensor) -> torch.Tensor:

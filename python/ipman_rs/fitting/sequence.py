@@ -1,20 +1,20 @@
 """Fitting a recording: T frames of one person, whose shape, focal length and ground are the same in all of them.
 
-1. Warm start, frame by frame. From the frame that shows most, forwards and backwards, each frame is fitted by the first
-   stage, from its own start or from its neighbour's result, whichever costs less. Shape and focal length are those that
-   the first of them found.
+1. Warm start. From the frame that shows most, forwards and backwards, a frame every tenth of a second is fitted by the
+   first stage, from its own start or from the result of the one before, whichever costs less; then the frames between,
+   from the nearest of these. Shape and focal length are those that the first frame found.
 2. Every stage together. One Levenberg-Marquardt for the whole recording: own pose and place of every frame, one shape,
    and the smoothness, which ties each frame to the next two. Its Hessian is a band with a border (`solvers.arrow`), so
    an iteration is as long as the recording, and nothing is alternated. Presets of another solver are solved like this,
    too. Some 0.4 MB a frame.
 
-The ground, where it is not known and a stage asks for it, lies level at the median over the frames of the lowest vertex:
-a person who jumps now and then does not move it.
+The ground, where it is not known and a stage asks for it, lies level at the median over the frames of the lowest
+vertex: a person who jumps now and then does not move it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -29,12 +29,14 @@ from .config import Config, Stage
 from .fit import CHUNK, Fit, StageReport, judged, on_the_ground, one_thread, run_stage
 from .objective import Objective
 from .problem import Problem
-from .solvers import Look, Options, levenberg, minimise
+from .solvers import Look, Options, minimise
 from .solvers.arrow import Arrow, solve
+from .solvers.levenberg import levenberg
 from .terms.smoothness import Smoothness
 from .variables import Variables, pack, unpack
 
 SHARED = ("betas", "log_focal")
+KEY = 0.1  # s: people look much the same after this time
 Progress = Callable[[str, int], None]
 
 
@@ -51,9 +53,9 @@ def fit_sequence(
 ) -> Fit:
     """Fit the frames, rows of `problem` in the order of time, from `variables` on by the stages of `config`.
 
-    `smoothness` weighs the squared acceleration (m/s²)² of the body's points, see `terms.smoothness`, at `rate` frames a
-    second; with `order` 1 it is their velocity. `done` (T,) bool: frames whose start is an earlier result and needs no
-    warm start. `progress` hears a stage and how many frames it has behind it.
+    `smoothness` weighs the squared acceleration (m/s²)² of the body's points, see `terms.smoothness`, at `rate` frames
+    a second; with `order` 1 it is their velocity. `done` (T,) bool: frames whose start is an earlier result and needs
+    no warm start. `progress` hears a stage and how many frames it has behind it.
     """
     smooth = Smoothness(problem.body, problem.num_bodies, rate, order)
     smooth.band *= not_negative("smoothness", smoothness)
@@ -64,7 +66,7 @@ def fit_sequence(
                 problem = on_one_ground(problem, variables)
             problem = judged(problem, variables)
             if number == 0:
-                variables = warm_start(problem, variables, stage, config, done, progress)
+                variables = warm_start(problem, variables, stage, config, rate, done, progress)
             together = Together(problem, variables, stage, config, smooth)
             variables, report = together.solved(progress)
             reports.append(report)
@@ -85,10 +87,11 @@ def warm_start(
     variables: Variables,
     stage: Stage,
     config: Config,
+    rate: float = 1.0,
     done: Tensor | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Tensor]:
-    """Every frame fitted by itself, after its neighbour; what is shared is the same in all of them."""
+    """Every frame fitted by itself, beginning near a neighbour; what is shared is the same in all of them."""
     frames = problem.num_bodies
     done = torch.zeros(frames, dtype=torch.bool) if done is None else done
     results = {name: value.clone() for name, value in variables.items()}
@@ -96,33 +99,65 @@ def warm_start(
     stage = replace(stage, solver="levenberg")
     own = tuple(name for name in stage.free if name not in SHARED)
 
-    def fit_frame(frame: int, start: Variables, free: tuple[str, ...]) -> None:
-        found, _ = run_stage(problem.rows(torch.tensor([frame])), start, replace(stage, free=free), config.terms)
+    def fit_frames(index: Tensor, starts: Variables, free: tuple[str, ...]) -> None:
+        found, _ = run_stage(problem.rows(index), starts, replace(stage, free=free), config.terms)
         for name, value in found.items():
-            results[name][frame] = value[0]
+            results[name][index] = value
 
     if not done[seed]:
-        fit_frame(seed, {name: value[[seed]] for name, value in variables.items()}, stage.free)
+        first = torch.tensor([seed])
+        fit_frames(first, {name: value[first] for name, value in variables.items()}, stage.free)
     for name in SHARED:
         results[name][:] = results[name][seed].clone()
-    for count, (frame, neighbour) in enumerate(outwards(seed, frames), 2):
-        if not done[frame] and own:
-            starts = {name: value[[frame, neighbour]] for name, value in results.items()}
-            twice = problem.rows(torch.tensor([frame, frame]))
-            objective = Objective(twice, starts, own, stage.weights, config.terms)
-            with torch.no_grad():
-                costs = objective.costs(objective.candidate(pack(starts, own)))
-            better = int(sum(costs.values()).nan_to_num(torch.inf).argmin())
-            fit_frame(frame, {name: value[[better]] for name, value in starts.items()}, own)
+    ready = 1
+    for steps in rounds(seed, frames, max(1, round(KEY * rate))):
+        here, near = torch.tensor([step for step in steps if not done[step[0]]], dtype=torch.long).reshape(-1, 2).T
+        if len(here) and own:
+            starts = _cheaper(
+                Objective(
+                    problem.rows(here),
+                    {name: value[here] for name, value in results.items()},
+                    own,
+                    stage.weights,
+                    config.terms,
+                ),
+                {name: value[near] for name, value in results.items()},
+            )
+            fit_frames(here, starts, own)
+        ready += len(steps)
         if progress is not None:
-            progress(f"{stage.name}, frame by frame", count)
+            progress(f"{stage.name}, frame by frame", ready)
     return results
 
 
-def outwards(seed: int, frames: int) -> Iterator[tuple[int, int]]:
-    """Frames after the seed, then those before it, each with the neighbour that came before it."""
-    yield from ((frame, frame - 1) for frame in range(seed + 1, frames))
-    yield from ((frame, frame + 1) for frame in range(seed - 1, -1, -1))
+def _cheaper(objective: Objective, other: Variables) -> dict[str, Tensor]:
+    """The objective's own variables or the others, a row each, whichever cost less."""
+    totals = []
+    for variables in (objective.variables, other):
+        with torch.no_grad():
+            costs = objective.costs(objective.candidate(pack(variables, objective.free)))
+        totals.append(torch.stack(list(costs.values())).sum(dim=0).nan_to_num(torch.inf))
+    better = totals[1] < totals[0]
+    return {
+        name: torch.where(better.reshape(-1, *[1] * (own.ndim - 1)), other[name], own)
+        for name, own in objective.variables.items()
+    }
+
+
+def rounds(seed: int, frames: int, stride: int) -> Iterator[list[tuple[int, int]]]:
+    """Frames to be fitted side by side, each with the frame whose result it begins from: every `stride`-th frame, one
+    after the other away from the seed, and then all the rest at once."""
+    for direction in (1, -1):
+        for frame in range(seed + direction * stride, frames if direction > 0 else -1, direction * stride):
+            yield [(frame, frame - direction * stride)]
+    rest = []
+    for frame in range(frames):
+        if (frame - seed) % stride:
+            near = seed + round((frame - seed) / stride) * stride
+            near = near if 0 <= near < frames else near - stride if near > seed else near + stride
+            rest.append((frame, near))
+    if rest:
+        yield rest
 
 
 def seen(problem: Problem) -> Tensor:
@@ -211,6 +246,6 @@ class Together:
         return self.smooth.cost(x)
 
 
-def _times(left: Sequence[np.ndarray] | np.ndarray, right: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+def _times(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Matrix products frame by frame."""
     return np.stack([a @ b for a, b in zip(left, right, strict=True)])

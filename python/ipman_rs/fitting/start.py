@@ -17,7 +17,7 @@ from torch import Tensor
 
 from .camera import NEAREST
 from .problem import Problem
-from .rotations import matrix, special_procrustes, vector
+from .rotations import matrix, nearest, vector
 from .solvers import Options
 from .variables import Variables
 
@@ -95,7 +95,7 @@ def at_points(problem: Problem) -> dict[str, Tensor]:
     middle, target = (body * weight).sum(dim=1), (problem.points_3d * weight).sum(dim=1)
     centred = (problem.points_3d - target[:, None]) * weight
     spread = (centred[..., :, None] * (body - middle[:, None])[..., None, :]).sum(dim=1)
-    turn = special_procrustes(spread, method="svd")
+    turn = nearest(spread)
     # The root joint stays where it is when the body turns.
     root = problem.body(pose[:1].to(problem.body.dtype)).joints[:, 0].to(middle)
     turned = (turn * (middle - root)[:, None]).sum(dim=2)
