@@ -1,14 +1,14 @@
 """Fitting a body to recorded markers: start, the places of this person's markers, and all frames together.
 
 recorded = fit_tracks(ipt.BodyModel("anny"), markers.read("squats.trc"), every=5)
-recorded.fit.candidate.vertices            (T, V, 3) m, in the laboratory
-recorded.errors.mean()                     m, from the markers
+recorded.fit.candidate.vertices            # (T, V, 3) m, in the laboratory
+np.nanmean(recorded.errors)                # m, from the markers
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -33,10 +33,12 @@ POSES = 24  # of the recording, spread over it, that say where the markers are
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """The fit of T frames. `tracks` are their known markers (M); `unknown` those that nobody knows the place of."""
+    """The fit of T frames. `tracks` are their known markers (M), at these `sites` of the body; `unknown` are those that
+    nobody knows the place of."""
 
     fit: Fit
     tracks: markers.Tracks
+    sites: Mapping[str, markers.Site | str]
     unknown: tuple[str, ...]
 
     @property
@@ -56,13 +58,15 @@ def fit_tracks(
     calibrate: int = 2,
     smoothness: float = 0.01,
     ground: float = 0.0,
+    person: Recorded | None = None,
     progress: Callable[[str, int], None] | None = None,
 ) -> Recorded:
     """Fit every `every`-th frame, by the preset `markers` unless another is given, on the laboratory's floor at y =
     `ground` m.
 
-    `calibrate`: how often the markers are moved on the body to where fits of some frames see them. `smoothness` as in
-    `fit_sequence`. ValueError if too few of the markers are known.
+    `calibrate`: how often the markers are moved on the body to where fits of some frames see them. `person`: another
+    recording of the same person and day, usually of standing still, whose shape and places of markers are kept.
+    `smoothness` as in `fit_sequence`. ValueError if too few of the markers are known.
     """
     if every < 1:
         raise ValueError(f"every: expected 1 or more, got {every}")
@@ -75,25 +79,48 @@ def fit_tracks(
         )
     unknown = tuple(name for name in tracks.names if name not in sites)
     tracks = tracks.select(list(sites))
-    some = frames(tracks, np.unique(np.linspace(0, len(tracks) - 1, min(POSES, len(tracks))).round().astype(int)))
+    if person is not None:
+        betas = person.fit.variables["betas"][:1]
+        sites |= {name: site for name, site in person.sites.items() if name in sites}
+        config = _shape_kept(config)
+    else:
+        some = frames(tracks, np.unique(np.linspace(0, len(tracks) - 1, min(POSES, len(tracks))).round().astype(int)))
+        betas, sites = _calibrated(body, some, sites, ground, config, calibrate, progress)
     tracks = frames(tracks, np.arange(0, len(tracks), every))
+    problem = problem_of(body, tracks, sites, ground)
+    start = at_points(problem)
+    if betas is not None:
+        start["betas"] = betas.expand(len(tracks), -1).clone()
+    rate = 1 / float(np.median(np.diff(tracks.times))) if len(tracks) > 1 else 1.0
+    found = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
+    return Recorded(found, tracks, sites, unknown)
+
+
+def _shape_kept(config: Config) -> Config:
+    stages = [replace(stage, free=tuple(name for name in stage.free if name != "betas")) for stage in config.stages]
+    return replace(config, stages=tuple(stages))
+
+
+def _calibrated(
+    body: ipt.BodyModel,
+    tracks: markers.Tracks,
+    sites: dict[str, markers.Site | str],
+    ground: float,
+    config: Config,
+    times: int,
+    progress: Callable[[str, int], None] | None,
+) -> tuple[Tensor | None, dict[str, markers.Site | str]]:
+    """The shape (1, b) and the places of the markers after that many fits of these frames; none of a shape after 0."""
     variables: dict[str, Tensor] | None = None
-    for _ in range(calibrate):
-        problem = problem_of(body, some, sites, ground)
+    for _ in range(times):
+        problem = problem_of(body, tracks, sites, ground)
         start = at_points(problem) if variables is None else variables
         found = fit_sequence(problem, start, config, smoothness=0, progress=progress)
         variables = dict(found.variables)
         bodies = found.candidate.full_pose, variables["betas"], variables["transl"]
-        points, confidence = torch.from_numpy(some.points), torch.from_numpy(some.confidence)
+        points, confidence = torch.from_numpy(tracks.points), torch.from_numpy(tracks.confidence)
         sites = calibrated(body, sites, bodies, points, confidence)
-    problem = problem_of(body, tracks, sites, ground)
-    start = at_points(problem)
-    if variables is not None:
-        start["betas"] = variables["betas"][:1].expand_as(start["betas"]).clone()
-    rate = 1 / float(np.median(np.diff(tracks.times))) if len(tracks) > 1 else 1.0
-    return Recorded(
-        fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress), tracks, unknown
-    )
+    return None if variables is None else variables["betas"][:1], sites
 
 
 def problem_of(

@@ -131,13 +131,13 @@ def warm_start(
 
 
 def _cheaper(objective: Objective, other: Variables) -> dict[str, Tensor]:
-    """The objective's own variables or the others, a row each, whichever cost less."""
+    """The objective's own variables or the others, whichever cost less, a row each; the others where nothing was seen."""
     totals = []
     for variables in (objective.variables, other):
         with torch.no_grad():
             costs = objective.costs(objective.candidate(pack(variables, objective.free)))
         totals.append(torch.stack(list(costs.values())).sum(dim=0).nan_to_num(torch.inf))
-    better = totals[1] < totals[0]
+    better = (totals[1] <= totals[0]) | (seen(objective.problem) == 0)
     return {
         name: torch.where(better.reshape(-1, *[1] * (own.ndim - 1)), other[name], own)
         for name, own in objective.variables.items()

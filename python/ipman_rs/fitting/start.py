@@ -84,16 +84,22 @@ def camera_around(problem: Problem, yaws: int = 12, iterations: int = 12) -> dic
 
 
 def at_points(problem: Problem) -> dict[str, Tensor]:
-    """Variables with the body moved and turned as a whole onto its points in the world, by least squares (Kabsch)."""
+    """Variables with the body moved and turned as a whole onto its points in the world, by least squares (Kabsch).
+
+    Points that are not finite count as not seen.
+    """
     if problem.points_3d is None:
         raise ValueError("points_3d: expected points (B, K, 3) in the world, got none")
     variables = neutral(problem)
     pose = torch.cat([variables["orient"][:, None], variables["pose"]], dim=1)
     body = problem.landmarks(pose, variables["betas"], variables["transl"])
-    weight = torch.ones_like(body[..., 0]) if problem.confidence_3d is None else problem.confidence_3d
+    points = problem.points_3d.nan_to_num()
+    weight = problem.points_3d.isfinite().all(dim=-1).double()
+    if problem.confidence_3d is not None:
+        weight = weight * problem.confidence_3d
     weight = (weight / weight.sum(dim=1, keepdim=True).clamp(min=1e-12))[..., None]
-    middle, target = (body * weight).sum(dim=1), (problem.points_3d * weight).sum(dim=1)
-    centred = (problem.points_3d - target[:, None]) * weight
+    middle, target = (body * weight).sum(dim=1), (points * weight).sum(dim=1)
+    centred = (points - target[:, None]) * weight
     spread = (centred[..., :, None] * (body - middle[:, None])[..., None, :]).sum(dim=1)
     turn = nearest(spread)
     # The root joint stays where it is when the body turns.

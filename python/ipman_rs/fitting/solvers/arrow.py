@@ -51,7 +51,7 @@ class Arrow:
         if not len(self.corner):
             return solved[:, 0]
         schur = self.corner + np.diag(stiff[own:]) - border.T @ solved[:, 1:]
-        shared = scipy.linalg.solve(schur, right[own:] - border.T @ solved[:, 0], assume_a="pos")
+        shared = scipy.linalg.cho_solve(scipy.linalg.cho_factor(schur), right[own:] - border.T @ solved[:, 0])
         return np.concatenate([solved[:, 0] - solved[:, 1:] @ shared, shared])
 
     def band(self) -> Vector:
