@@ -112,7 +112,8 @@ def test_frames_of_an_earlier_result_are_not_searched_again(problem, smooth, mon
     )
     assert once_more.converged.all()
     assert heard[-1] == ("pose", problem.num_bodies)
-    torch.testing.assert_close(once_more.variables["pose"], smooth.variables["pose"], atol=0.02, rtol=0)
+    moved = (once_more.candidate.landmarks - smooth.candidate.landmarks).norm(dim=-1)
+    assert moved.max() < 0.01
 
 
 def test_a_frame_that_is_no_number_follows_its_neighbours(problem, smooth):

@@ -131,7 +131,7 @@ def warm_start(
 
 
 def _cheaper(objective: Objective, other: Variables) -> dict[str, Tensor]:
-    """The objective's own variables or the others, whichever cost less, a row each; the others where nothing was seen."""
+    """The objective's own variables or the others, a row each: what costs less, and the others if nothing was seen."""
     totals = []
     for variables in (objective.variables, other):
         with torch.no_grad():
