@@ -1,8 +1,8 @@
 """Fitting a recording: T frames of one person, whose shape, focal length and ground are the same in all of them.
 
 1. Warm start. From the frame that shows most, forwards and backwards, a frame every tenth of a second is fitted by the
-   first stage, from its own start or from the result of the one before, whichever costs less; then the frames between,
-   from the nearest of these. Shape and focal length are those that the first frame found.
+   first stage, from its own start and from the result of the one before, and what costs less is kept; then the frames
+   between in the same way, from the nearest of these. Shape and focal length are those that the first frame found.
 2. Every stage together. One Levenberg-Marquardt for the whole recording: own pose and place of every frame, one shape,
    and the smoothness, which ties each frame to the next two. Its Hessian is a band with a border (`solvers.arrow`), so
    an iteration is as long as the recording, and nothing is alternated. Presets of another solver are solved like this,
@@ -100,9 +100,14 @@ def warm_start(
     own = tuple(name for name in stage.free if name not in SHARED)
 
     def fit_frames(index: Tensor, starts: Variables, free: tuple[str, ...]) -> None:
-        found, _ = run_stage(problem.rows(index), starts, replace(stage, free=free), config.terms)
+        """From one start a frame, or from two, one half of the rows after the other."""
+        both = index.repeat(len(starts["pose"]) // len(index))
+        found, report = run_stage(problem.rows(both), starts, replace(stage, free=free), config.terms)
+        costs = np.nan_to_num(sum(report.terms.values()), nan=np.inf).reshape(-1, len(index))
+        costs[0, (seen(problem)[index] == 0).numpy()] = np.inf  # nothing speaks for the frame's own start
+        winners = torch.from_numpy((len(costs) - 1 - costs[::-1].argmin(axis=0)) * len(index) + np.arange(len(index)))
         for name, value in found.items():
-            results[name][index] = value
+            results[name][index] = value[winners]
 
     if not done[seed]:
         first = torch.tensor([seed])
@@ -113,35 +118,12 @@ def warm_start(
     for steps in rounds(seed, frames, max(1, round(KEY * rate))):
         here, near = torch.tensor([step for step in steps if not done[step[0]]], dtype=torch.long).reshape(-1, 2).T
         if len(here) and own:
-            starts = _cheaper(
-                Objective(
-                    problem.rows(here),
-                    {name: value[here] for name, value in results.items()},
-                    own,
-                    stage.weights,
-                    config.terms,
-                ),
-                {name: value[near] for name, value in results.items()},
-            )
+            starts = {name: torch.cat([value[here], value[near]]) for name, value in results.items()}
             fit_frames(here, starts, own)
         ready += len(steps)
         if progress is not None:
             progress(f"{stage.name}, frame by frame", ready)
     return results
-
-
-def _cheaper(objective: Objective, other: Variables) -> dict[str, Tensor]:
-    """The objective's own variables or the others, a row each: what costs less, and the others if nothing was seen."""
-    totals = []
-    for variables in (objective.variables, other):
-        with torch.no_grad():
-            costs = objective.costs(objective.candidate(pack(variables, objective.free)))
-        totals.append(torch.stack(list(costs.values())).sum(dim=0).nan_to_num(torch.inf))
-    better = (totals[1] <= totals[0]) | (seen(objective.problem) == 0)
-    return {
-        name: torch.where(better.reshape(-1, *[1] * (own.ndim - 1)), other[name], own)
-        for name, own in objective.variables.items()
-    }
 
 
 def rounds(seed: int, frames: int, stride: int) -> Iterator[list[tuple[int, int]]]:
