@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import torch
+from roma import procrustes
 from roma import rotmat_to_rotvec as vector
 from roma import rotvec_to_rotmat as matrix
 from roma import rotvec_to_unitquat as quaternion
 
-__all__ = ["left_jacobian", "matrix", "quaternion", "vector"]
+__all__ = ["left_jacobian", "matrix", "nearest", "quaternion", "vector"]
+
+
+def nearest(matrices: torch.Tensor) -> torch.Tensor:
+    """The rotations nearest to matrices (..., 3, 3)."""
+    found = procrustes(matrices, force_rotation=True, method="svd")
+    assert isinstance(found, torch.Tensor)
+    return found
 
 
 def left_jacobian(rotations: torch.Tensor) -> torch.Tensor:

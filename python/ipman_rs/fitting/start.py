@@ -17,7 +17,7 @@ from torch import Tensor
 
 from .camera import NEAREST
 from .problem import Problem
-from .rotations import matrix, vector
+from .rotations import matrix, nearest, vector
 from .solvers import Options
 from .variables import Variables
 
@@ -81,6 +81,45 @@ def camera_around(problem: Problem, yaws: int = 12, iterations: int = 12) -> dic
     """Variables with the camera placed around the body, which stays in its own frame with its ground."""
     free = ("camera_orient", "camera_transl")
     return _best(problem, neutral(problem), yaws, free, iterations, moves_camera=True)
+
+
+def at_points(problem: Problem) -> dict[str, Tensor]:
+    """Variables with the mean body on its points in the world: in that named pose of `ipman_rs.body.poses` which comes
+    nearest when it is moved and turned as a whole (Kabsch). Points that are not finite count as not seen."""
+    if problem.points_3d is None:
+        raise ValueError("points_3d: expected points (B, K, 3) in the world, got none")
+    from ipman_rs.body import poses
+
+    variables = neutral(problem)
+    best, nearest_yet = _onto_points(problem, variables)
+    for name in poses.NAMES if problem.presented is None else ():
+        pose = torch.as_tensor(poses.pose_of(problem.body.body, name))[1:].expand_as(variables["pose"])
+        found, away = _onto_points(problem, {**variables, "pose": pose})
+        nearer = away < nearest_yet
+        best = {key: torch.where(nearer.reshape(-1, *[1] * (a.ndim - 1)), found[key], a) for key, a in best.items()}
+        nearest_yet = torch.where(nearer, away, nearest_yet)
+    return best
+
+
+def _onto_points(problem: Problem, variables: Variables) -> tuple[dict[str, Tensor], Tensor]:
+    """The body moved and turned as a whole onto its points, and the mean squared distance (B,) that is left."""
+    assert problem.points_3d is not None
+    pose = torch.cat([variables["orient"][:, None], variables["pose"]], dim=1)
+    body = problem.landmarks(pose, variables["betas"], variables["transl"])
+    points = problem.points_3d.nan_to_num()
+    weight = problem.points_3d.isfinite().all(dim=-1).double()
+    if problem.confidence_3d is not None:
+        weight = weight * problem.confidence_3d
+    weight = (weight / weight.sum(dim=1, keepdim=True).clamp(min=1e-12))[..., None]
+    middle, target = (body * weight).sum(dim=1), (points * weight).sum(dim=1)
+    body, points = body - middle[:, None], points - target[:, None]
+    turn = nearest((weight[..., None] * points[..., :, None] * body[..., None, :]).sum(dim=1))
+    away = points - (turn[:, None] * body[:, :, None]).sum(dim=3)
+    # The root joint stays where it is when the body turns.
+    root = problem.body(pose[:1].to(problem.body.dtype)).joints[:, 0].to(middle)
+    turned = (turn * (middle - root)[:, None]).sum(dim=2)
+    found = {**variables, "orient": vector(turn @ matrix(variables["orient"])), "transl": target - root - turned}
+    return found, (weight * away.square()).sum(dim=(1, 2))
 
 
 def _best(

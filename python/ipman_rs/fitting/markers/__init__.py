@@ -22,7 +22,7 @@ from .tracks import Tracks
 
 READERS: dict[str, Callable[..., Tracks]] = {".trc": trc.read, ".c3d": c3d.read}
 
-__all__ = ["MARKERS", "READERS", "Tracks", "read", "sites"]
+__all__ = ["MARKERS", "READERS", "Site", "Tracks", "read", "sites"]
 
 
 def read(path: str | os.PathLike[str], up: str | None = None) -> Tracks:

@@ -5,7 +5,8 @@ Madsen, Nielsen & Tingleff, Methods for Non-Linear Least Squares Problems, 2004,
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -16,8 +17,14 @@ STILL = 3  # iterations with hardly any decrease that count as the end
 START, STIFFEST = 1e-3, 1e12  # damping
 
 
-def levenberg(start: Vector, options: Options) -> Generator[Vector, Look, Outcome]:
-    """Looks must carry a model of the Hessian, positive semidefinite. A step that does not end lower is undone."""
+def levenberg(
+    start: Vector, options: Options, solve: Callable[[Any, float], tuple[Vector, float]] | None = None
+) -> Generator[Vector, Look, Outcome]:
+    """Looks must carry a model of the Hessian, positive semidefinite. A step that does not end lower is undone.
+
+    `solve`: (look, damping) -> step and the decrease it promises, for Hessians that are no plain matrix.
+    """
+    solve = solve or _step
     point, look = start, (yield start)
     if not look.finite:
         return Outcome(start, look.value, 0, "not finite")
@@ -25,7 +32,7 @@ def levenberg(start: Vector, options: Options) -> Generator[Vector, Look, Outcom
     for iteration in range(options.iterations):
         if np.abs(look.gradient).max(initial=0) <= options.gradient:
             return Outcome(point, look.value, iteration, "gradient")
-        step, promised = _step(look, damping)
+        step, promised = solve(look, damping)
         new = yield point + step
         gain = (look.value - new.value) / promised if new.finite and promised > 0 else -1.0
         if gain <= 0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +22,12 @@ class Options:
 
 @dataclass(frozen=True)
 class Look:
-    """The objective at a point: value, gradient (P,), and a model of the Hessian (P, P) for solvers that ask."""
+    """The objective at a point: value, gradient (P,), and a model of the Hessian for solvers that ask: (P, P), or what
+    their `solve` understands."""
 
     value: float
     gradient: Vector
-    hessian: Vector | None = None
+    hessian: Any = None
 
     @property
     def finite(self) -> bool:

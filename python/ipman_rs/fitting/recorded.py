@@ -1,0 +1,150 @@
+"""Fitting a body to recorded markers: start, the places of this person's markers, and all frames together.
+
+recorded = fit_tracks(ipt.BodyModel("anny"), markers.read("squats.trc"), every=5)
+recorded.fit.candidate.vertices            # (T, V, 3) m, in the laboratory
+np.nanmean(recorded.errors)                # m, from the markers
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+import ipman_rs.torch as ipt
+
+from . import markers
+from .camera import Camera
+from .config import Config, load
+from .fit import Fit
+from .landmarks import Landmarks
+from .markers.calibration import calibrated
+from .problem import Problem
+from .sequence import fit_sequence
+from .start import at_points
+
+FEWEST = 6  # known markers, without which a body is a guess
+POSES = 24  # of the recording, spread over it, that say where the markers are
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """The fit of T frames. `tracks` are their known markers (M), at these `sites` of the body; `unknown` are those that
+    nobody knows the place of."""
+
+    fit: Fit
+    tracks: markers.Tracks
+    sites: Mapping[str, markers.Site | str]
+    unknown: tuple[str, ...]
+
+    @property
+    def errors(self) -> NDArray[np.float64]:
+        """Distances (T, M), m, from the markers to their places on the fitted bodies; NaN where one was not seen."""
+        with torch.no_grad():
+            away = np.linalg.norm(self.fit.candidate.landmarks.numpy() - self.tracks.points, axis=-1)
+        return np.where(self.tracks.confidence > 0, away, np.nan)
+
+
+def fit_tracks(
+    body: ipt.BodyModel,
+    tracks: markers.Tracks,
+    config: Config | None = None,
+    *,
+    every: int = 1,
+    calibrate: int = 2,
+    smoothness: float = 0.01,
+    ground: float = 0.0,
+    person: Recorded | None = None,
+    progress: Callable[[str, int], None] | None = None,
+) -> Recorded:
+    """Fit every `every`-th frame, by the preset `markers` unless another is given, on the laboratory's floor at y =
+    `ground` m.
+
+    `calibrate`: how often the markers are moved on the body to where fits of some frames see them. `person`: another
+    recording of the same person and day, usually of standing still, whose shape and places of markers are kept.
+    `smoothness` as in `fit_sequence`. ValueError if too few of the markers are known.
+    """
+    if every < 1:
+        raise ValueError(f"every: expected 1 or more, got {every}")
+    config = load("markers") if config is None else config
+    sites = markers.sites(body.body, tracks.names)
+    if len(sites) < FEWEST:
+        raise ValueError(
+            f"{tracks.source}: expected at least {FEWEST} markers with known places, got {len(sites)} of "
+            f"{', '.join(tracks.names)}"
+        )
+    unknown = tuple(name for name in tracks.names if name not in sites)
+    tracks = tracks.select(list(sites))
+    if person is not None:
+        betas = person.fit.variables["betas"][:1]
+        sites |= {name: site for name, site in person.sites.items() if name in sites}
+        config = _shape_kept(config)
+    else:
+        some = frames(tracks, np.unique(np.linspace(0, len(tracks) - 1, min(POSES, len(tracks))).round().astype(int)))
+        betas, sites = _calibrated(body, some, sites, ground, config, calibrate, progress)
+    tracks = frames(tracks, np.arange(0, len(tracks), every))
+    problem = problem_of(body, tracks, sites, ground)
+    start = at_points(problem)
+    if betas is not None:
+        start["betas"] = betas.expand(len(tracks), -1).clone()
+    rate = 1 / float(np.median(np.diff(tracks.times))) if len(tracks) > 1 else 1.0
+    found = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
+    return Recorded(found, tracks, sites, unknown)
+
+
+def _shape_kept(config: Config) -> Config:
+    stages = [replace(stage, free=tuple(name for name in stage.free if name != "betas")) for stage in config.stages]
+    return replace(config, stages=tuple(stages))
+
+
+def _calibrated(
+    body: ipt.BodyModel,
+    tracks: markers.Tracks,
+    sites: dict[str, markers.Site | str],
+    ground: float,
+    config: Config,
+    times: int,
+    progress: Callable[[str, int], None] | None,
+) -> tuple[Tensor | None, dict[str, markers.Site | str]]:
+    """The shape (1, b) and the places of the markers after that many fits of these frames; none of a shape after 0."""
+    variables: dict[str, Tensor] | None = None
+    for _ in range(times):
+        problem = problem_of(body, tracks, sites, ground)
+        start = at_points(problem) if variables is None else variables
+        found = fit_sequence(problem, start, config, smoothness=0, progress=progress)
+        variables = dict(found.variables)
+        bodies = found.candidate.full_pose, variables["betas"], variables["transl"]
+        points, confidence = torch.from_numpy(tracks.points), torch.from_numpy(tracks.confidence)
+        sites = calibrated(body, sites, bodies, points, confidence)
+    return None if variables is None else variables["betas"][:1], sites
+
+
+def problem_of(
+    body: ipt.BodyModel, tracks: markers.Tracks, sites: dict[str, markers.Site | str], ground: float = 0.0
+) -> Problem:
+    """The frames of `tracks`, whose markers are at `sites`, on a floor at y = `ground`; the camera is a placeholder."""
+    count = len(tracks)
+
+    def each(*numbers: float) -> Tensor:
+        return torch.tensor(numbers, dtype=torch.float64).expand(count, -1).clone()
+
+    camera = Camera(each(1, 1), each(0, 0), torch.eye(3, dtype=torch.float64).repeat(count, 1, 1), each(0, 0, 0))
+    return Problem(
+        body,
+        Landmarks(body, sites, sites),
+        camera,
+        ipt.Ground(each(0, 1, 0), each(ground)[:, 0]),
+        points_3d=torch.from_numpy(tracks.points),
+        confidence_3d=torch.from_numpy(tracks.confidence),
+    )
+
+
+def frames(tracks: markers.Tracks, index: NDArray[np.integer]) -> markers.Tracks:
+    """These frames of a recording."""
+    return markers.Tracks(
+        tracks.names, tracks.points[index], tracks.confidence[index], tracks.times[index], tracks.source
+    )
