@@ -35,7 +35,7 @@ def fit(tmp_path):
             raise result.exception
         page = out / "report.json"
         report = json.loads(page.read_text()) if page.is_file() else {"bodies": [], "failures": []}
-        flags = {body["name"]: body["fit"]["flags"] for body in report["bodies"]}
+        flags = {body["name"]: body["fit"]["flags"] for body in report["bodies"] if "fit" in body}
         return SimpleNamespace(
             code=result.exit_code, out=result.stdout, err=result.stderr, folder=out, report=report, flags=flags
         )
@@ -311,3 +311,34 @@ def test_what_is_no_camera(tmp_path, content, says):
 def test_focal_length_is_the_diagonal(fit, tmp_path, standing):
     said = fit(files.write(tmp_path / "anna.json", standing))
     assert arrays(said.folder / "anna" / "anna.npz")["focal"][0] == pytest.approx([math.hypot(*files.SIZE)] * 2)
+
+
+def test_frames_of_one_person(fit, tmp_path):
+    """A sequence has one shape, its poses over time in one file, and leaves out a frame that cannot be read."""
+    folder = tmp_path / "walk"
+    folder.mkdir()
+    for frame in range(4):
+        files.write(folder / f"{frame}.json", files.seen("standing", depth=4.0 + 0.02 * frame))
+    (folder / "9.json").write_text("{broken")
+    said = fit(folder, "--sequence", "--fps", "10")
+    assert said.code == 1  # for the broken file
+    stored = arrays(said.folder / "walk" / "walk.npz")
+    assert stored["body_pose"].shape == (4, 69)
+    assert stored["betas"].shape == (1, 10)
+    assert stored["mocap_frame_rate"] == 10
+    steps = np.diff(stored["transl"][:, 2])
+    np.testing.assert_allclose(steps, -0.02, atol=0.01)  # away from the camera
+    record = json.loads((said.folder / "walk" / "fit.json").read_text())
+    assert record["median_error_px"] < 3
+    before = (said.folder / "walk" / "fit.json").stat().st_mtime_ns
+    fit(folder, "--sequence", "--fps", "10", "--resume")
+    assert (said.folder / "walk" / "fit.json").stat().st_mtime_ns == before
+
+
+def test_markers(fit, shared):
+    said = fit(shared("gait2354") / "subject01_static.trc", "--every", "100", preset="markers")
+    assert said.code == 0
+    record = json.loads((said.folder / "subject01_static" / "fit.json").read_text())
+    assert record["mean_marker_error_m"] < 0.02
+    stored = arrays(said.folder / "subject01_static" / "subject01_static.npz")
+    assert len(stored["transl"]) == len(stored["body_pose"])

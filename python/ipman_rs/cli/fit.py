@@ -54,22 +54,38 @@ if TYPE_CHECKING:
 @click.option(
     "--pictures", type=click.IntRange(0), default=8, show_default=True, help="Draw the first N items (seconds each)."
 )
+@click.option("--sequence", is_flag=True, help="The inputs, in their order, are frames of one person.")
+@click.option("--fps", type=float, default=30.0, show_default=True, help="Frames a second of a --sequence.")
+@click.option(
+    "--every", type=click.IntRange(1), default=1, show_default=True, help="Fit each n-th frame of recordings."
+)
 @click.option("--resume", is_flag=True, help="Skip items that were finished with the same input and options.")
 def fit(
-    inputs: tuple[Path, ...], output: Path, image: Path | None, pictures: int, resume: bool, **options: Any
+    inputs: tuple[Path, ...],
+    output: Path,
+    image: Path | None,
+    pictures: int,
+    resume: bool,
+    sequence: bool,
+    fps: float,
+    every: int,
+    **options: Any,
 ) -> None:
-    """Fit a body to each photo or set of keypoints, with intuitive physics.
+    """Fit a body to each photo, set of keypoints or marker recording, with intuitive physics.
 
     INPUT is a photo (.png .jpg; needs the extra photo), a keypoint file (.json of OpenPose, COCO, COCO-WholeBody or
-    MediaPipe), or a folder of them. Every person is fitted for themselves; of several in one image one is taken.
-    In OUTPUT every item gets a folder with its parameters (.npz, for `ipman analyze`), mesh (.glb), fit.json and
-    pictures; report.html and report.json tell of all.
+    MediaPipe), a marker file (.trc, or .c3d with the extra c3d), or a folder of them. Every person is fitted for
+    themselves, but for the frames of a --sequence; of several in one image one is taken. In OUTPUT every item gets a
+    folder with its parameters (.npz, for `ipman analyze`), mesh (.glb), fit.json and pictures; report.html and
+    report.json tell of all.
 
     \b
     ipman fit photo.jpg -o out
     ipman fit keypoints/ -o out --image-size 1920x1080 --resume
     ipman fit person.json --image photo.png -o out --focal 1100 --camera-pitch 8
     ipman fit yoga.json -o out --preset balanced --pose tree --height 1.7
+    ipman fit frames/ -o out --sequence --fps 25    one person over time, with one shape
+    ipman fit squats.trc -o out --every 5           optical markers, by the preset markers
 
     Exit code: 0 when every item has a body, 1 when one has none (the others have), 2 for wrong usage.
     """
@@ -79,21 +95,29 @@ def fit(
     from .fit_inputs import Reading
 
     reading = Reading(options.pop("person"), options.pop("image_size"), image)
-    items, failures = _items(inputs, reading)
+    items, tracks, failures = _items(inputs, reading)
     settings = _settings(options)
-    studies: list[Study] = []
+    if fps <= 0:
+        raise click.UsageError(f"--fps: expected more than 0, got {fps}")
+    studies, failed = _recordings(tracks, items if sequence else [], settings, (every, fps), output, resume)
+    failures += failed
+    items = [] if sequence else items
     records: dict[str, dict[str, Any]] = {}
     if items:
         records = _run(items, settings, output, resume)
         failures += [(item.source, item.failure) for item in items if item.failure is not None]
-        studies = _studies(items, records, settings, output, pictures)
+        studies += _studies(items, records, settings, output, pictures)
     for source, what in failures:
         console.error(f"{source}: {what}")
     if studies:
         from .commands import write
 
         page = write(studies, output, failures, own_folders=True)
-        console.print_fits(studies)
+        fits, recorded = [s for s in studies if s.fitted is not None], [s for s in studies if s.fitted is None]
+        if fits:
+            console.print_fits(fits)
+        if recorded:
+            console.print_table(recorded)
         console.say(f"report: {page}")
     sys.exit(1 if failures else 0)
 
@@ -104,8 +128,8 @@ def _needs(*modules: str) -> None:
         raise click.ClickException(f"fitting needs {', '.join(missing)}: pip install 'ipman_rs[fit]'")
 
 
-def _items(inputs: tuple[Path, ...], reading: Any) -> tuple[list[Item], list[tuple[str, str]]]:
-    """The people in the inputs, under names of their own, and the files that have none."""
+def _items(inputs: tuple[Path, ...], reading: Any) -> tuple[list[Item], list[Path], list[tuple[str, str]]]:
+    """The people in the inputs, under names of their own, the marker files, and the files that have nobody."""
     from ..view.report import safe_names
     from . import fit_inputs
 
@@ -119,7 +143,10 @@ def _items(inputs: tuple[Path, ...], reading: Any) -> tuple[list[Item], list[tup
             failures.append((str(path), error.what))
     if reading.photo is not None and len(paths) > 1:
         raise click.UsageError(f"--image belongs to one keypoint file, got {len(paths)} inputs")
+    tracks = [path for path in paths if path.suffix.lower() in fit_inputs.MARKERS]
     for path in paths:
+        if path in tracks:
+            continue
         try:
             found += fit_inputs.items(path, reading)
         except FileError as error:
@@ -128,7 +155,25 @@ def _items(inputs: tuple[Path, ...], reading: Any) -> tuple[list[Item], list[tup
             failures.append((str(path), str(error)))
     for item, name in zip(found, safe_names([item.name for item in found]), strict=True):
         item.name = name
-    return found, failures
+    return found, tracks, failures
+
+
+def _recordings(
+    tracks: list[Path], frames: list[Item], settings: Settings, pace: tuple[int, float], output: Path, resume: bool
+) -> tuple[list[Study], list[tuple[str, str]]]:
+    """The fitted recordings, measured, and those that failed."""
+    from . import fit_recordings
+
+    studies: list[Study] = []
+    failures: list[tuple[str, str]] = []
+    for recording in fit_recordings.recordings(tracks, frames):
+        try:
+            studies.append(fit_recordings.fitted(recording, settings, fit_recordings.Pace(*pace), output, resume))
+        except FileError as error:
+            failures.append((recording.source, error.what))
+        except OSError as error:
+            failures.append((recording.source, str(error)))
+    return studies, failures
 
 
 def _settings(options: dict[str, Any]) -> Settings:

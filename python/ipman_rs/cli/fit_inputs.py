@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 IMAGES = (".png", ".jpg", ".jpeg")
 KEYPOINTS = (".json",)
-ENDINGS = (*KEYPOINTS, *IMAGES)
+MARKERS = (".trc", ".c3d")
+ENDINGS = (*KEYPOINTS, *IMAGES, *MARKERS)
 
 
 @dataclass

@@ -32,16 +32,21 @@ _BEFORE = "before_"
 
 def write_item(item: Item, result: Result, body: BodyModel, folder: Path, told: dict[str, Any], obj: bool) -> None:
     """Write one fitted body. Raises OSError."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / RECORD).unlink(missing_ok=True)  # incomplete from here on
     arrays = result.arrays()
     vertices = posed(body, arrays)
-    files = {f"{item.name}.npz": _npz(arrays), f"{item.name}.glb": mesh_files.glb(vertices, body.faces)}
+    files: dict[str, Any] = {f"{item.name}.npz": arrays, f"{item.name}.glb": mesh_files.glb(vertices, body.faces)}
     if obj:
         files[f"{item.name}.obj"] = mesh_files.obj(vertices, body.faces)
+    write_files(folder, files, {"name": item.name, "source": item.source, **told})
+
+
+def write_files(folder: Path, files: dict[str, Any], record: dict[str, Any]) -> None:
+    """Write files, bytes or arrays for an .npz, and then the record that makes the folder complete. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / RECORD).unlink(missing_ok=True)  # incomplete from here on
     for name, content in files.items():
-        _replace(folder / name, content)
-    record = {"name": item.name, "source": item.source, **told, "files": sorted(files)}
+        _replace(folder / name, content if isinstance(content, bytes) else _npz(content))
+    record = {**record, "files": sorted(files)}
     _replace(folder / RECORD, (json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1) + "\n").encode())
 
 

@@ -16,7 +16,7 @@ import ipman_rs.torch as ipt
 from ..fitting import detected, start
 from ..fitting.camera_file import KnownCamera
 from ..fitting.config import Config, weighs
-from ..fitting.detections import join
+from ..fitting.detections import Detections, join
 from ..fitting.fit import fit, on_the_ground
 from ..fitting.problem import Presented, Problem
 from ..fitting.result import Result, results
@@ -101,11 +101,7 @@ def _fitted(batch: list[Item], settings: Settings, body: ipt.BodyModel) -> Itera
     kept = [item for item in batch if not _refused(item, body)]
     if not kept:
         return
-    seen = join([item.seen for item in kept if item.seen is not None])
-    where = {"focal": settings.focal, "pitch": settings.pitch, "ground": settings.ground}
-    where |= {} if settings.camera is None else {"camera": settings.camera}
-    problem = detected.problem(body, seen, **where, height=settings.height, mass=settings.mass)
-    problem = _presented(problem, settings)
+    problem = problem_of(body, join([item.seen for item in kept if item.seen is not None]), settings)
     config = settings.config
     with console.progress(f"fitting {len(kept)}", len(kept) * len(config.stages)) as step:
         problem, variables = _started(problem, config)
@@ -117,6 +113,14 @@ def _fitted(batch: list[Item], settings: Settings, body: ipt.BodyModel) -> Itera
             continue
         item.flags += result.doubts()
         yield item, result
+
+
+def problem_of(body: ipt.BodyModel, seen: Detections, settings: Settings) -> Problem:
+    """What is known of each person that was seen."""
+    where = {"focal": settings.focal, "pitch": settings.pitch, "ground": settings.ground}
+    where |= {} if settings.camera is None else {"camera": settings.camera}
+    problem = detected.problem(body, seen, **where, height=settings.height, mass=settings.mass)
+    return _presented(problem, settings)
 
 
 def _refused(item: Item, body: ipt.BodyModel) -> bool:

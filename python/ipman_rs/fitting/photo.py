@@ -58,7 +58,7 @@ def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
 def _model() -> Any:
     """The model whose weights are in MediaPipe's wheel; each image by itself, as none follows another."""
     try:
-        from mediapipe.python.solutions import pose
+        from mediapipe.python.solutions import pose  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise ImportError(f'photos need MediaPipe: pip install "ipman_rs[photo]" ({error})') from error
     return pose.Pose(static_image_mode=True, model_complexity=1)

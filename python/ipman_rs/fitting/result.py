@@ -143,9 +143,9 @@ def results(fit: Fit, config: Config, start: Variables) -> list[Result]:
 
 
 def parameters(body: BodyModel, variables: Variables) -> Arrays:
-    """SMPL's names for the pose, shape and place of one body."""
-    pose = _array(torch.cat([variables["orient"][:, None], variables["pose"]], dim=1))[0]
-    found: Arrays = {name: pose[columns].reshape(1, -1) for name, columns in joints_of(body).items()}
+    """SMPL's names for the pose, shape and place of bodies, a row each."""
+    pose = _array(torch.cat([variables["orient"][:, None], variables["pose"]], dim=1))
+    found: Arrays = {name: pose[:, columns].reshape(len(pose), -1) for name, columns in joints_of(body).items()}
     return {**found, "betas": _array(variables["betas"]), "transl": _array(variables["transl"])}
 
 

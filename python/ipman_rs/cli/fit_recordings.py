@@ -1,0 +1,173 @@
+"""Recordings for `ipman fit`: a marker file, or keypoints frame by frame, become one body over time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import console
+from .errors import FileError
+from .fit_outputs import complete, write_files
+
+if TYPE_CHECKING:
+    from ..fitting.fit import Fit
+    from ..view import Study
+    from .fit_inputs import Item
+    from .fit_run import Settings
+
+
+@dataclass
+class Recording:
+    """One person over time: a marker file, or the frames of keypoint files or photos in their order."""
+
+    name: str
+    source: str
+    paths: list[Path]
+    frames: list[Item] | None = None  # None: markers
+
+
+@dataclass(frozen=True)
+class Pace:
+    """every: fit each n-th frame. fps: frames a second of keypoints, which do not say."""
+
+    every: int = 1
+    fps: float = 30.0
+
+
+def fitted(recording: Recording, settings: Settings, pace: Pace, output: Path, resume: bool) -> Study:
+    """Fit a recording, write its folder and measure it. Raises FileError."""
+    folder = output / recording.name
+    identity = _identity(recording, settings, pace)
+    if not (resume and complete(folder, identity)):
+        try:
+            found, told, rate = (
+                _fit_markers(recording, settings, pace)
+                if recording.frames is None
+                else _fit_frames(recording, settings, pace)
+            )
+        except ValueError as error:
+            raise FileError(recording.paths[0], str(error)) from error
+        record = {"name": recording.name, "source": recording.source, **told, **_stages(found)}
+        record |= {"preset": _preset(recording, settings), "identity": identity}
+        write_files(folder, {f"{recording.name}.npz": _arrays(found, rate)}, record)
+    return _measured(recording, folder, settings)
+
+
+def _preset(recording: Recording, settings: Settings) -> str:
+    """Markers have a preset of their own, unless another was asked for."""
+    return "markers" if recording.frames is None and settings.config.name == "fast" else settings.config.name
+
+
+def _fit_markers(recording: Recording, settings: Settings, pace: Pace) -> tuple[Fit, dict[str, Any], float]:
+    import ipman_rs.torch as ipt
+
+    from ..fitting import config, markers, recorded
+
+    preset = _preset(recording, settings)
+    chosen = config.load(preset) if preset == "markers" else settings.config
+    tracks = markers.read(recording.paths[0])
+    body, count = ipt.BodyModel(settings.model), len(range(0, len(tracks), pace.every))
+    with console.progress(f"fitting {recording.name}", count) as step:
+        told = {"every": pace.every, "ground": settings.ground or 0.0}
+        found = recorded.fit_tracks(
+            body, tracks, chosen, **told, progress=lambda _stage, done: step.to(min(done, count))
+        )
+    errors = found.errors
+    each = {name: _number(np.nanmean(column)) for name, column in zip(found.tracks.names, errors.T, strict=True)}
+    record = {"mean_marker_error_m": _number(np.nanmean(errors)), "marker_errors_m": each, "unknown": [*found.unknown]}
+    times = found.tracks.times
+    return found.fit, record, float(1 / np.median(np.diff(times))) if len(times) > 1 else 1.0
+
+
+def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> tuple[Fit, dict[str, Any], float]:
+    import ipman_rs.torch as ipt
+
+    from ..fitting import start
+    from ..fitting.detections import join
+    from ..fitting.sequence import fit_sequence
+    from .fit_inputs import look
+    from .fit_run import problem_of
+
+    assert recording.frames is not None
+    items, unseen = recording.frames[:: pace.every], []
+    with console.progress(f"reading {recording.name}", len(items)) as step:
+        for item in items:
+            try:
+                if item.seen is None:
+                    look(item)
+            except FileError as error:
+                unseen.append(f"{item.source}: {error.what}")
+            step.one()
+    kept = [item for item in items if item.seen is not None]
+    if not kept:
+        raise ValueError(f"nobody was found in any of {len(items)} frames; first of all: {unseen[0]}")
+    body = ipt.BodyModel(settings.model)
+    problem = problem_of(body, join([item.seen for item in kept if item.seen is not None]), settings)
+    rate = pace.fps / pace.every
+    with console.progress(f"fitting {recording.name}", len(kept)) as step:
+        variables = start.before_camera(problem, **start.options(settings.config.start))
+        told = {"rate": rate, "progress": lambda _stage, done: step.to(min(done, len(kept)))}
+        found = fit_sequence(problem, variables, settings.config, **told)
+    assert problem.points is not None
+    median = (found.candidate.projected - problem.points).norm(dim=-1).median()
+    return found, {"frames_left_out": unseen, "median_error_px": _number(median)}, rate
+
+
+def _stages(found: Fit) -> dict[str, Any]:
+    stages = [
+        {
+            "name": stage.name,
+            "reason": stage.reasons[0],
+            "iterations": int(stage.iterations[0]),
+            "terms": {name: _number(cost.mean()) for name, cost in stage.terms.items()},
+        }
+        for stage in found.stages
+    ]
+    return {"converged": bool(found.converged.all()), "stages": stages}
+
+
+def _arrays(found: Fit, rate: float) -> dict[str, np.ndarray]:
+    """Parameters over time, as `ipman analyze` reads them."""
+    from ..fitting.result import parameters
+
+    body = found.problem.body.body
+    arrays = parameters(body, found.variables)
+    arrays |= {"betas": arrays["betas"][:1], "mocap_frame_rate": np.array(rate), "model": np.array(body.name)}
+    if found.problem.ground is not None:
+        arrays["ground_height"] = found.problem.ground.height[:1].numpy()
+    return arrays
+
+
+def _measured(recording: Recording, folder: Path, settings: Settings) -> Study:
+    from .measure import Request, measure
+
+    path = folder / f"{recording.name}.npz"
+    with np.load(path, allow_pickle=False) as stored:
+        height = float(stored["ground_height"][0]) if "ground_height" in stored.files else None
+    return measure(path, Request(model=settings.model, ground=height))
+
+
+def _identity(recording: Recording, settings: Settings, pace: Pace) -> str:
+    digest = hashlib.sha256(json.dumps([settings.identity(), repr(pace)]).encode())
+    for path in recording.paths:
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if np.isfinite(float(value)) else None
+
+
+def recordings(tracks: Sequence[Path], items: Sequence[Item]) -> list[Recording]:
+    """One of each marker file, and one of all the items, in their order."""
+    found = [Recording(path.stem, str(path), [path]) for path in tracks]
+    if items:
+        folder = items[0].path.resolve().parent
+        found.append(Recording(folder.name, str(folder), [item.path for item in items], [*items]))
+    return found
