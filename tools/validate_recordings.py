@@ -60,12 +60,12 @@ class Trial:
     @property
     def com(self) -> Array:
         """(T, 3) m: of the whole volume."""
-        return self.solid.center.double().numpy()
+        return np.asarray(self.solid.center, dtype=np.float64)
 
     @property
     def mass(self) -> Array:
         """(T,) kg: volume × 985 kg/m³ of the posed mesh."""
-        return self.solid.mass.double().numpy()
+        return np.asarray(self.solid.mass, dtype=np.float64)
 
     @cached_property
     def ground(self) -> ipt.Ground:
@@ -86,7 +86,7 @@ def main() -> None:
     if missing := [name for name in ("squat_forceplates", "gait2354") if not (DATA / name).is_dir()]:
         raise SystemExit(f"{', '.join(missing)} is not at {DATA}: set IPMAN_SHARED_DATA")
     trials = list(fitted())
-    shown = {trial.name: trial for trial in trials if trial.body.body.name == BODIES[0] and trial.shape != "itself"}
+    shown = {trial.name: trial for trial in reversed(trials) if trial.body.body.name == BODIES[0]}
     for name, rows in (("recordings", figures(trials)), ("cop", pressures(trials))):
         table = "\n".join(rows)
         print(table, end="\n\n")
@@ -101,7 +101,7 @@ def main() -> None:
 def fitted() -> Iterator[Trial]:
     for name in BODIES:
         body = ipt.BodyModel(name)
-        standing = trial(body, "static1", "static1")
+        standing = trial(body, "static1", "itself")
         yield standing
         yield trial(body, "squats1", "static1", standing.recorded)
         yield trial(body, "squats1", "itself")
@@ -161,6 +161,10 @@ def pressures(trials: list[Trial]) -> Iterator[str]:
         cells = [one.com[:, [0, 2]], *(one.pressed(gamma) for gamma in GAMMAS)]
         told = " | ".join(f"{1e3 * distance(cell, one.cop):.1f}" for cell in cells)
         yield f"| {one.name} | {one.body.body.name} | {one.shape} | {told} |"
+    for one in trials[:2]:
+        if one.opensim is not None and one.cop is not None:
+            apart = 1e3 * distance(one.opensim[:, [0, 2]], one.cop)
+            yield f"| {one.name} | OpenSim's model | by hand | {apart:.1f} |{' |' * len(GAMMAS)}"
 
 
 def distance(points: Array, others: Array) -> float:
@@ -179,7 +183,7 @@ def heights(squats: Trial, path: Path) -> None:
     above.plot(times, theirs, color="0.6", lw=3, label="OpenSim, manually scaled model")
     above.plot(times, ours, color="C0", lw=1.2, label=f"fitted body ({squats.body.body.name}), whole volume")
     above.set_ylabel("height of the CoM, m")
-    above.legend(frameon=False, loc="lower right")
+    above.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
     below.axhline(0, color="0.6", lw=0.8)
     below.plot(times, 1e3 * (ours - theirs), color="C0", lw=1.2)
     below.set_ylim(-22, 22)
@@ -196,7 +200,7 @@ def floors(standing: Trial, squats: Trial, path: Path) -> None:
     figure, (left, right) = canvas(1, 2, (11, 4.2), width_ratios=[1, 1.7])
     low = standing.vertices[0, :, 1] < standing.ground.height[0] + 0.03
     soles = standing.vertices[0, low].numpy()
-    left.plot(1e3 * soles[:, 2], 1e3 * soles[:, 0], ".", color="0.82", ms=2, label="soles of the fitted body")
+    left.plot(1e3 * soles[:, 2], 1e3 * soles[:, 0], ".", color="0.6", ms=3, label="soles of the fitted body")
     shown = {"measured CoP": (standing.cop, "k", "o"), "CoM": (standing.com[:, [0, 2]], "C0", "s")}
     shown |= {f"paper's CoP, γ = {g}": (standing.pressed(g), f"C{n}", "^") for n, g in ((3, 10), (1, 100))}
     for name, (points, color, mark) in shown.items():
@@ -206,7 +210,7 @@ def floors(standing: Trial, squats: Trial, path: Path) -> None:
     left.set_xlabel("z, mm (the person faces up the page)")
     left.set_ylabel("x, mm")
     left.set_title("standing, mean", fontsize=10)
-    left.margins(y=0.45)
+    left.margins(y=0.3)
     left.legend(frameon=False, fontsize=7, loc="upper center", ncols=2)
     times = squats.recorded.tracks.times
     right.plot(times, 1e3 * squats.cop[:, 0], "k", lw=1, label="measured CoP")
@@ -223,7 +227,7 @@ def floors(standing: Trial, squats: Trial, path: Path) -> None:
 
 
 def people(standing: Trial, squats: Trial, path: Path) -> None:
-    """Fitted bodies from the side with the markers, and the CoM."""
+    """Fitted bodies from the side and from behind, with the markers, the CoM and the measured CoP."""
     lowest = int(squats.com[:, 1].argmin())
     frames = [(standing, 0), (squats, lowest // 2), (squats, lowest)]
     figure, axes = canvas(1, 4, (11, 4.6), sharey=True)
@@ -239,14 +243,15 @@ def draw(axis, one: Trial, frame: int, across: int) -> None:
 
     away = 2 - across
     vertices, faces = one.vertices[frame].numpy(), one.body.body.faces
-    sign = 1 if away == 2 else -1  # the person faces +x: from their right, and from the front
+    sign = 1 if away == 2 else -1  # the person faces +x: seen from their right, or from behind
     corners = vertices[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     light = (normal / np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-12))[:, away] * sign
     order = (sign * corners[:, :, away].mean(axis=1)).argsort()
     order = order[light[order] > 0]
-    shade = np.repeat((0.55 + 0.4 * light[order])[:, None], 3, axis=1)
-    axis.add_collection(PolyCollection(corners[order][:, :, [across, 1]], facecolors=shade, edgecolors="none"))
+    shade = np.repeat((0.45 + 0.45 * light[order])[:, None], 3, axis=1)
+    seen = list(corners[order][:, :, [across, 1]])
+    axis.add_collection(PolyCollection(seen, facecolors=shade, edgecolors="face", linewidths=0.3))
     points = one.recorded.tracks.points[frame]
     axis.plot(points[:, across], points[:, 1], "o", ms=2.5, color="C3")
     axis.plot(*one.com[frame, [across, 1]], "P", ms=9, color="C0", mec="w")
@@ -254,9 +259,9 @@ def draw(axis, one: Trial, frame: int, across: int) -> None:
         axis.plot(one.cop[frame, 0 if across == 0 else 1], 0, "^", ms=7, color="k")
     axis.axhline(0, color="0.5", lw=0.8)
     axis.set_aspect("equal")
-    axis.autoscale_view()
-    if across == 2:
-        axis.invert_xaxis()
+    middle = vertices[:, across].mean()
+    axis.set_xlim(middle - 0.5, middle + 0.5)
+    axis.set_xticks([])
     axis.set_title(f"{one.name}, {one.recorded.tracks.times[frame]:.1f} s", fontsize=9)
 
 

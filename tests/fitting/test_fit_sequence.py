@@ -73,8 +73,8 @@ def test_one_shape_for_all_frames(smooth):
 def test_what_was_recorded_is_found():
     exact, truth = recording(noise=0)
     weights = {"points_3d": 1e4, "shape_prior": 1e-3, "pose_prior": 1e-4}
-    (stage,) = MARKERS.stages
-    config = replace(MARKERS, stages=(replace(stage, weights=weights),))
+    near, stage = MARKERS.stages
+    config = replace(MARKERS, stages=(near, replace(stage, weights=weights)))
     found = sequence.fit_sequence(exact, start.at_points(exact), config, smoothness=0)
     away = (found.candidate.landmarks - exact.points_3d).norm(dim=-1)
     assert away.max() < 0.002  # what the priors leave
@@ -90,9 +90,12 @@ def test_smoothness_takes_away_jitter(problem, smooth):
     assert away[1] < away[0] + 0.005  # the noise
 
 
-def test_frames_side_by_side_change_no_bit(problem, smooth, monkeypatch):
+def test_frames_side_by_side_and_threads_change_no_bit(problem, smooth, monkeypatch):
     monkeypatch.setattr(sequence, "CHUNK", 4)
+    threads = torch.get_num_threads()
+    torch.set_num_threads(3 - min(threads, 2))
     again = fitted(problem, smoothness=STRONG)
+    torch.set_num_threads(threads)
     for name, value in smooth.variables.items():
         assert torch.equal(value, again.variables[name]), name
 

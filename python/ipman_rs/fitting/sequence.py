@@ -224,5 +224,5 @@ class Together:
 
 
 def _times(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Matrix products frame by frame."""
-    return np.stack([a @ b for a, b in zip(left, right, strict=True)])
+    """Matrix products frame by frame, on torch's one thread."""
+    return torch.bmm(torch.from_numpy(left), torch.from_numpy(right)).numpy()

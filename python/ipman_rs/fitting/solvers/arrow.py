@@ -3,7 +3,9 @@
     | A   B | own numbers of T frames, A a band of blocks
     | Bᵀ  C | shared numbers
 
-Solved by the band's Cholesky factor and the Schur complement C − Bᵀ A⁻¹ B, so the time is linear in the frames.
+Solved by Cholesky's factors of the band, block by block, and the Schur complement C − Bᵀ A⁻¹ B, so the time is linear
+in the frames. In torch, whose one thread (`fit.one_thread`) always gives the same bits; scipy's banded solver takes as
+many threads as it finds.
 """
 
 from __future__ import annotations
@@ -11,7 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import torch
+from torch import Tensor
+from torch.linalg import cholesky, solve_triangular
 
 from .outcome import Look, Vector
 
@@ -42,29 +46,51 @@ class Arrow:
         return np.tril(whole) + np.tril(whole, -1).T
 
     def solve(self, stiff: Vector, right: Vector) -> Vector:
-        """x of (H + diag stiff) x = right. LinAlgError if that matrix is not positive definite."""
-        own = len(right) - len(self.corner)
-        band = self.band()
-        band[0] += stiff[:own]
-        border = self.border.reshape(own, -1)
-        solved = scipy.linalg.solveh_banded(band, np.column_stack([right[:own], border]), lower=True, overwrite_ab=True)
-        if not len(self.corner):
-            return solved[:, 0]
-        schur = self.corner + np.diag(stiff[own:]) - border.T @ solved[:, 1:]
-        shared = scipy.linalg.cho_solve(scipy.linalg.cho_factor(schur), right[own:] - border.T @ solved[:, 0])
-        return np.concatenate([solved[:, 0] - solved[:, 1:] @ shared, shared])
+        """x of (H + diag stiff) x = right. RuntimeError if that matrix is not positive definite."""
+        frames, size, shared = self.border.shape
+        own = frames * size
+        blocks = torch.from_numpy(self.blocks).clone()
+        blocks[0].diagonal(dim1=1, dim2=2).add_(torch.from_numpy(stiff[:own]).reshape(frames, size))
+        border = torch.from_numpy(self.border)
+        right_own = torch.from_numpy(right[:own]).reshape(frames, size, 1)
+        solved = _solve_band(_factored(blocks), torch.cat([right_own, border], dim=2)).reshape(own, -1)
+        if not shared:
+            return solved[:, 0].numpy()
+        flat = border.reshape(own, shared)
+        left = flat.T @ solved
+        schur = torch.from_numpy(self.corner + np.diag(stiff[own:])) - left[:, 1:]
+        rest = torch.from_numpy(right[own:])[:, None] - left[:, :1]
+        factor = cholesky(schur)
+        ours = solve_triangular(factor.T, solve_triangular(factor, rest, upper=False), upper=True)
+        return torch.cat([solved[:, :1] - solved[:, 1:] @ ours, ours])[:, 0].numpy()
 
-    def band(self) -> Vector:
-        """A's lower diagonals ((k + 1) p, T p): [d, j] = A[j + d, j]."""
-        reach, frames, size = self.blocks.shape[:3]
-        band = np.zeros((reach * size, frames, size))
-        row, column = np.indices((size, size))
-        for k in range(reach):
-            below = k * size + row - column
-            for b in range(size):
-                kept = below[:, b] >= 0
-                band[below[kept, b], : frames - k, b] = self.blocks[k, : frames - k, kept, b]
-        return band.reshape(reach * size, frames * size)
+
+def _factored(blocks: Tensor) -> Tensor:
+    """A's lower Cholesky factor in the layout of `Arrow.blocks`, in place."""
+    reach, frames = blocks.shape[:2]
+    for s in range(frames):
+        for j in range(1, min(reach, s + 1)):  # what frame s − j has left of it
+            for k in range(min(reach - j, frames - s)):
+                blocks[k, s] -= blocks[k + j, s - j] @ blocks[j, s - j].T
+        blocks[0, s] = cholesky(blocks[0, s])
+        for k in range(1, min(reach, frames - s)):
+            blocks[k, s] = solve_triangular(blocks[0, s], blocks[k, s].T, upper=False).T
+    return blocks
+
+
+def _solve_band(factor: Tensor, right: Tensor) -> Tensor:
+    """x (T, p, n) of L Lᵀ x = right, forwards and then backwards."""
+    reach, frames = factor.shape[:2]
+    x = right.clone()
+    for s in range(frames):
+        for k in range(1, min(reach, s + 1)):
+            x[s] -= factor[k, s - k] @ x[s - k]
+        x[s] = solve_triangular(factor[0, s], x[s], upper=False)
+    for s in range(frames - 1, -1, -1):
+        for k in range(1, min(reach, frames - s)):
+            x[s] -= factor[k, s].T @ x[s + k]
+        x[s] = solve_triangular(factor[0, s].T, x[s], upper=True)
+    return x
 
 
 def solve(look: Look, damping: float) -> tuple[Vector, float]:
@@ -76,6 +102,6 @@ def solve(look: Look, damping: float) -> tuple[Vector, float]:
     stiff = damping * np.maximum(diagonal, 1e-6 * diagonal.max(initial=0) + 1e-12)
     try:
         step = arrow.solve(stiff, -look.gradient)
-    except np.linalg.LinAlgError:  # not positive definite: more damping
+    except RuntimeError:  # torch's LinAlgError: not positive definite: more damping
         return np.zeros_like(look.gradient), 0.0
-    return step, float(0.5 * (-look.gradient @ step + step @ (stiff * step)))
+    return step, float(0.5 * (step * (stiff * step - look.gradient)).sum())
