@@ -67,13 +67,12 @@ class Benchmark:
     iterations: int = 100
     split: str = "test"
 
-    def run(self, block: Block, progress: Callable[[str], None] = lambda text: None) -> tuple[Truth, list[Result]]:
-        self.folder.mkdir(parents=True, exist_ok=True)
-        truth = self.truth(block.kind, progress)
+    def run(self, block: Block, progress: Callable[[], None] = lambda: None) -> tuple[Truth, list[Result]]:
+        """`progress` is called after each row."""
+        truth = self.truth(block.kind)
         task: Task | None = None
         results = []
         for row in block.rows:
-            progress(f"{block.name}: {row.name}")
             preset = config(row, self.iterations)
             place = self.place(block, preset)
             task = task or self.task(block, truth)
@@ -81,16 +80,19 @@ class Benchmark:
                 self.fit(task, preset, place)
             found, seconds = kept(task, place)
             results.append(Result(row, figures(snapped(found) if row.snap else found, task, truth), seconds))
+            progress()
         return truth, results
 
-    def truth(self, kind: str, progress: Callable[[str], None]) -> Truth:
-        count = self.bodies if kind == "balanced" else self.controls
+    def count(self, kind: str) -> int:
+        return self.bodies if kind == "balanced" else self.controls
+
+    def truth(self, kind: str, progress: Callable[[int], None] | None = None) -> Truth:
+        """The people of a kind; `progress` is told how many are drawn."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        count = self.count(kind)
         path = self.folder / f"people-{self.split}-{kind}-{count}.npz"
         if not path.exists():
-            scenes = draw_scenes(
-                count, SPLITS[self.split], kind, lambda done: progress(f"people, {kind}: {done} of {count}")
-            )
-            Truth.of(scenes).save(path)
+            Truth.of(draw_scenes(count, SPLITS[self.split], kind, progress)).save(path)
         return Truth.load(path)
 
     def task(self, block: Block, truth: Truth) -> Task:
@@ -109,8 +111,7 @@ class Benchmark:
 
     def place(self, block: Block, preset: Config) -> Path:
         """The file of a fit: named by all that decides it."""
-        count = self.bodies if block.kind == "balanced" else self.controls
-        told = [self.split, count, block.kind, block.noise, preset.terms, [asdict(stage) for stage in preset.stages]]
+        told = [self.split, self.count(block.kind), block.kind, block.noise, preset.terms, [asdict(stage) for stage in preset.stages]]
         key = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
         return self.folder / f"fit-{key}.npz"
 
