@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .benchmark import benchmark
 from .errors import FileError
 from .options import GROUND, PRESETS, UP
 
@@ -38,6 +39,9 @@ def main() -> None:
     ipman demo -o out               the named poses of the built-in body
     ipman analyze body.obj -o out   your own mesh; open out/report.html afterwards
     """
+
+
+main.add_command(benchmark)
 
 
 @main.command()
