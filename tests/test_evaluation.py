@@ -17,7 +17,8 @@ def draw():
 
 def test_similarity_is_found_again(draw):
     points = draw.standard_normal((5, 24, 3))
-    turns, scales, shifts = Rotation.random(5, rng=draw).as_matrix(), draw.uniform(0.5, 2, 5), draw.standard_normal((5, 3))
+    turns, scales = Rotation.random(5, rng=draw).as_matrix(), draw.uniform(0.5, 2, 5)
+    shifts = draw.standard_normal((5, 3))
     target = scales[:, None, None] * points @ turns.swapaxes(1, 2) + shifts[:, None]
     scale, rotation, shift = similarity(points, target)
     np.testing.assert_allclose(scale, scales, rtol=1e-12)

@@ -29,7 +29,7 @@ def known(drawn):
 
 
 def test_people_are_out_of_reach(known):
-    """The best betas leave 5 to 20 mm of their resting surfaces; of a body of the fitter's own, nothing but rounding."""
+    """The best betas leave 5 to 20 mm of their resting surfaces, and next to nothing of a body of the fitter's own."""
     assert 5 < truth.floors(known)["shape"] < 20
     assert truth.floors(known)["correspondence"] < 0.1
     own = np.asarray(load_body("anny")(betas=0.5 * np.ones(10)).vertices)
@@ -76,14 +76,14 @@ def test_truth_survives_its_file(known, tmp_path):
 
 
 def test_the_camera_sees_the_person(known):
-    """Points of the problem are the projected landmarks but for the noise, and upright people are upright in the image."""
+    """Points of the problem are the projected landmarks but for the noise, and the image's y runs down."""
     camera = settings.cameras(known, np.random.default_rng(0))
     seen = camera.see(torch.from_numpy(known.surface))
     assert (seen[..., 2] > 1).all()
     turns = camera.rotation
     np.testing.assert_allclose(turns @ turns.transpose(1, 2), np.eye(3)[None].repeat(4, 0), atol=1e-12)
     assert (torch.linalg.det(turns) > 0.999).all()
-    assert (turns[:, 1, 1] < -0.5).all()  # the image's y runs down
+    assert (turns[:, 1, 1] < -0.5).all()
     task = settings.calibrated(known, 0)
     landmarks = torch.from_numpy(known.landmarks)
     there = truth.known(load_body(truth.FITTED))

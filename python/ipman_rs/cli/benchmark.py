@@ -17,7 +17,9 @@ def benchmark() -> None:
 @click.option(
     "-n", "--bodies", type=click.IntRange(1), default=105, show_default=True, help="Balanced people, 7 families."
 )
-@click.option("--controls", type=click.IntRange(1), default=42, show_default=True, help="Tipped people, and jumping ones.")
+@click.option(
+    "--controls", type=click.IntRange(1), default=42, show_default=True, help="Tipped people, and jumping ones."
+)
 @click.option(
     "--iterations", type=click.IntRange(1), default=100, show_default=True, help="Of a stage at most, for every row."
 )

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Presented:
-    """A pose that the person was shown and imitates: pose (B, J − 1, 3), the vertices (n,) that touch in it, and how its
-    root is turned (B, 3) in the presented frame."""
+    """A pose that the person was shown and imitates: pose (B, J − 1, 3), the vertices (n,) that touch in it, and the
+    root's rotation vector (B, 3) in the presented frame, none if None."""
 
     pose: Tensor
     contact: Tensor | None = None

@@ -98,7 +98,7 @@ def _record(block: Block, truth: Truth, results: Sequence[Result]) -> dict[str, 
     return {
         "name": block.name,
         "kind": block.kind,
-        "noise": block.noise,
+        "told": block.told,
         "bodies": len(truth),
         "truth": {**true, "families": true_of},
         "rows": rows,
@@ -123,10 +123,10 @@ def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
                 pve = rows["ours"][f"against {other}"]["PVE"]
                 judged.append((f"{block['name']}: ours no worse than {other}", pve[1] <= 0, f"PVE {_interval(pve)} mm"))
             continue
-        row = "both" if block["noise"] is None else "ours"
+        row = "both" if not isinstance(block["told"], float) else "ours"
         pve, bose = (rows[row]["against baseline"][key] for key in ("PVE", "BoSE 3 cm"))
         said = f"PVE {_interval(pve)} mm, BoSE 3 cm {_interval(bose, 0)} points"
-        if block["noise"] is None:
+        if not isinstance(block["told"], float):
             judged.append((f"{block['name']}: both terms better", pve[2] < 0 and bose[1] > 0, said))
         else:
             judged.append((f"{block['name']}: ours more balanced, PVE no worse", pve[1] <= 0 and bose[1] > 0, said))

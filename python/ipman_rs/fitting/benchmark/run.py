@@ -17,7 +17,7 @@ from ..fit import Fit, StageReport, fit, one_thread
 from .measure import Figures, figures, snapped
 from .rows import CALIBRATED, PRESENTED, Row, config
 from .scenes import draw_scenes
-from .settings import Task, calibrated, presented
+from .settings import Task, calibrated, presented, regressed
 from .truth import Truth
 
 SPLITS = {"test": 20_000, "tune": 10_000}  # seeds of the people
@@ -26,11 +26,12 @@ CONTROLS = ("baseline", "both", "ours", "ours without physics")
 
 @dataclass(frozen=True)
 class Block:
-    """People, what is told of them, and the rows. noise: degrees of the presented pose, None without one."""
+    """People, what is told of them, and the rows. told: None (the camera and the floor), "regressed" (a start, too), or
+    the degrees of noise of a presented pose."""
 
     name: str
     kind: str
-    noise: float | None
+    told: float | str | None
     rows: tuple[Row, ...]
 
 
@@ -41,6 +42,7 @@ def blocks() -> list[Block]:
         Block("calibrated", "balanced", None, tuple(CALIBRATED)),
         Block("presented, 3°", "balanced", 3.0, tuple(PRESENTED)),
         Block("presented, 10°", "balanced", 10.0, tuple(PRESENTED)),
+        Block("calibrated, good start", "balanced", "regressed", tuple(CALIBRATED)),
         Block("calibrated, tipped", "tipped", None, few),
         Block("calibrated, jumping", "jumping", None, few),
         Block("presented, 3°, tipped", "tipped", 3.0, few_presented),
@@ -97,9 +99,11 @@ class Benchmark:
 
     def task(self, block: Block, truth: Truth) -> Task:
         with one_thread():
-            if block.noise is None:
+            if block.told is None:
                 return calibrated(truth, SPLITS[self.split])
-            return presented(truth, SPLITS[self.split], block.noise)
+            if isinstance(block.told, str):
+                return regressed(truth, SPLITS[self.split])
+            return presented(truth, SPLITS[self.split], block.told)
 
     def fit(self, task: Task, preset: Config, place: Path) -> None:
         begun = time.process_time()
@@ -111,7 +115,14 @@ class Benchmark:
 
     def place(self, block: Block, preset: Config) -> Path:
         """The file of a fit: named by all that decides it."""
-        told = [self.split, self.count(block.kind), block.kind, block.noise, preset.terms, [asdict(stage) for stage in preset.stages]]
+        told = [
+            self.split,
+            self.count(block.kind),
+            block.kind,
+            block.told,
+            preset.terms,
+            [asdict(stage) for stage in preset.stages],
+        ]
         key = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
         return self.folder / f"fit-{key}.npz"
 

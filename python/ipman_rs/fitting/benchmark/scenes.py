@@ -40,7 +40,7 @@ TIPPED, RAISED = (15.0, 30.0), (0.15, 0.40)  # degrees, m
 
 @dataclasses.dataclass(frozen=True)
 class Scene:
-    """A posed person: body, its template and family; full_pose (24, 3), transl (3,), vertices (V, 3), joints (24, 3)."""
+    """A posed person: body and template, full_pose (24, 3), transl (3,), and so vertices (V, 3) and joints (24, 3)."""
 
     person: BodyModel
     template: ip.BodyTemplate
@@ -58,7 +58,9 @@ class Scene:
         return np.asarray(self.person(self.full_pose, transl=self.transl).joints)
 
 
-def draw_scenes(count: int, seed: int, kind: str = "balanced", progress: Callable[[int], None] | None = None) -> list[Scene]:
+def draw_scenes(
+    count: int, seed: int, kind: str = "balanced", progress: Callable[[int], None] | None = None
+) -> list[Scene]:
     """`count` people, the families in turn. The same seed draws the same people in the same poses for every kind:
     "balanced", "tipped" (standing families turned 15° to 30° about a level axis) or "jumping" (raised by 15 to 40 cm).
     """

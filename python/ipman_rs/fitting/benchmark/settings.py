@@ -1,6 +1,7 @@
 """What a fit is told of people: points in an image, and
 
 calibrated   the camera and the floor in the world; no pose (IPMAN-O*)
+regressed    as calibrated, but fits begin where a network's estimate might be, and not at a search over yaws
 presented    a pose that the person imitates, true but for some degrees a number, with its floor; height and mass; the
              camera and its focal length are unknown (IPMAN-O)
 
@@ -33,6 +34,7 @@ Array = NDArray[np.float64]
 SIZE = 1000.0  # pixels, width and height of the image
 NOISE, OUTLIERS, FAR, DROPPED = 0.01, 1 / 30, 0.05, 0.1
 FOCAL = (1.0, 2.0)  # times the image's height; where it is unknown, fits begin at the mean of the logarithm
+REGRESSED, DEPTH = 10.0, 0.05  # degrees of each number, and of the logarithm of the distance
 DISTANCE, CAMERA_HEIGHT, ROLL = (3.0, 5.0), (0.6, 1.8), 2.0  # m, m, degrees
 
 
@@ -50,6 +52,20 @@ def calibrated(truth: Truth, seed: int) -> Task:
     camera = cameras(truth, draw)
     problem = _seen(truth, camera, draw)
     return Task(problem, start.before_camera(problem), camera)
+
+
+def regressed(truth: Truth, seed: int) -> Task:
+    """Starts: the true pose but for a noise, the mean shape, the pelvis seen where it is but at a wrong distance."""
+    draw = np.random.default_rng([seed, 3])
+    task = calibrated(truth, seed)
+    pose = torch.from_numpy(truth.pose + math.radians(REGRESSED) * draw.standard_normal(truth.pose.shape))
+    away = torch.from_numpy(np.exp(DEPTH * draw.standard_normal(len(truth))))
+    camera = task.camera
+    place = -(camera.rotation * camera.translation[:, :, None]).sum(dim=1)
+    pelvis = place + away[:, None] * (torch.from_numpy(truth.joints[:, 0]) - place)
+    resting = torch.from_numpy(np.asarray(load_body(FITTED)().joints)[0])
+    starts = {**start.neutral(task.problem), "orient": pose[:, 0], "pose": pose[:, 1:], "transl": pelvis - resting}
+    return Task(task.problem, starts, camera)
 
 
 def presented(truth: Truth, seed: int, noise: float) -> Task:
@@ -130,4 +146,4 @@ def _under(pose: Array, above: Array) -> ipt.Ground:
     return ipt.Ground(torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(len(pose), 3), torch.from_numpy(level))
 
 
-__all__ = ["Task", "calibrated", "presented"]
+__all__ = ["Task", "calibrated", "presented", "regressed"]

@@ -61,8 +61,8 @@ class Stability(Physics):
 
 
 class Ground(Physics):
-    """pull: a factor on that part. The pull is felt by all that is within some 30 cm of the floor, the push by the soles
-    alone: at 1 a body that is free to move comes to rest centimetres inside the floor."""
+    """pull: a factor on that part. All that is within some 30 cm of the floor feels the pull, the soles alone the push:
+    at 1 a body that is free to move comes to rest centimetres inside the floor."""
 
     quantities = ("pull", "push")
 
