@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .benchmark import benchmark
 from .errors import FileError
 from .fit import fit
 from .options import GROUND, PRESETS, UP
@@ -43,6 +44,7 @@ def main() -> None:
 
 
 main.add_command(fit)
+main.add_command(benchmark)
 
 
 @main.command()

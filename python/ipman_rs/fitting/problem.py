@@ -17,10 +17,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Presented:
-    """A pose that the person was shown and imitates: pose (B, J − 1, 3), and the vertices (n,) that touch in it."""
+    """A pose that the person was shown and imitates: pose (B, J − 1, 3), the vertices (n,) that touch in it, and the
+    root's rotation vector (B, 3) in the presented frame, none if None."""
 
     pose: Tensor
     contact: Tensor | None = None
+    orient: Tensor | None = None
 
 
 @dataclass(frozen=True)
@@ -60,5 +62,5 @@ def _rows(value: Any, index: Tensor) -> Any:
             ipt.Ground.of_unit(value.normal.expand(-1, 3)[index], value.height[index]) if value.height.ndim else value
         )
     if isinstance(value, Presented):
-        return replace(value, pose=value.pose[index])
+        return replace(value, pose=value.pose[index], orient=None if value.orient is None else value.orient[index])
     return value

@@ -53,16 +53,17 @@ def neutral(problem: Problem) -> dict[str, Tensor]:
     def zeros(*shape: int) -> Tensor:
         return torch.zeros(bodies, *shape, dtype=torch.float64)
 
-    pose = zeros(model.num_joints - 1, 3)
+    orient, pose = zeros(3), zeros(model.num_joints - 1, 3)
     if problem.presented is not None:
         pose = problem.presented.pose.double()
+        orient = orient if problem.presented.orient is None else problem.presented.orient.double()
     else:
         from ipman_rs.body import poses
 
         standing = torch.as_tensor(poses.pose_of(model, "standing"))[1:]
         pose = standing.expand(bodies, -1, -1).clone()
     return {
-        "orient": zeros(3),
+        "orient": orient,
         "pose": pose,
         "betas": zeros(min(model.num_betas, 10)),
         "transl": zeros(3),

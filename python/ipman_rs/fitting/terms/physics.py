@@ -9,7 +9,9 @@ with the constants of a preset of `ipman_rs.presets`. Terms of one preset share 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -17,6 +19,7 @@ from torch import Tensor
 import ipman_rs.torch as ipt
 from ipman_rs import BodyTemplate
 from ipman_rs.body import BodyModel
+from ipman_rs.checks import not_negative
 
 from ..candidate import Candidate
 from ..problem import Problem
@@ -32,6 +35,7 @@ class Physics(Term):
     needs_mesh = True
     usual = "paper-o"
     quantities: tuple[str, ...]  # of IntuitivePhysicsLoss, summed
+    factors: Mapping[str, float] = {}  # of the quantities, 1 where nothing is said
 
     def __init__(
         self, problem: Problem, preset: str | None = None, samples: int | None = None, only_static: bool = False
@@ -47,7 +51,8 @@ class Physics(Term):
 
     def cost(self, candidate: Candidate) -> Tensor:
         values = candidate.shared(self.loss, lambda: self.loss(candidate.vertices, self.problem.ground))
-        total = torch.stack([values[name] for name in self.quantities], dim=-1).sum(dim=-1)
+        parts = [self.factors.get(name, 1.0) * values[name] for name in self.quantities]
+        total = torch.stack(parts, dim=-1).sum(dim=-1)
         return total if self.gate is None else torch.where(self.gate, total, 0)
 
 
@@ -56,7 +61,14 @@ class Stability(Physics):
 
 
 class Ground(Physics):
+    """pull: a factor on that part. All that is within some 30 cm of the floor feels the pull, the soles alone the push:
+    at 1 a body that is free to move comes to rest centimetres inside the floor."""
+
     quantities = ("pull", "push")
+
+    def __init__(self, problem: Problem, pull: float = 1.0, **options: Any):
+        super().__init__(problem, **options)
+        self.factors = {"pull": not_negative("pull", pull)}
 
 
 class Balance(Physics):
