@@ -89,8 +89,8 @@ def corresponding(vertices: Array) -> Array:
 
 @cache
 def correspondence() -> tuple[NDArray[np.int64], Array]:
-    """Vertices of `anny` (V, 3) and their weights (V, 3): the points of its resting mean surface that are nearest to the
-    fitted body's vertices."""
+    """Vertices of `anny` (V, 3) and their weights (V, 3): the points of its resting mean surface that are nearest to
+    the fitted body's vertices."""
     full, lite = load_body("anny"), load_body(FITTED)
     near = cKDTree(full.v_template).query(lite.v_template, NEAREST)[1]
     corners, weights = [], []
