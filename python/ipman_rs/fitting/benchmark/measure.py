@@ -38,8 +38,8 @@ class Figures:
 
 def figures(fit: Fit, task: Task, truth: Truth) -> Figures:
     """Where the camera is known, errors are those in the world. Where it is not, aligned errors are in the axes of the
-    cameras, and those in the world after the turn about the vertical and the shift along the floor that fit best,
-    heights being heights above the floor."""
+    cameras, and those in the world are after the turn about the vertical and the shift along the floor that fit best,
+    heights being those above the floor."""
     candidate = fit.candidate
     with torch.no_grad():
         posed, camera, body = candidate.posed, candidate.camera, fit.problem.body
