@@ -8,6 +8,9 @@ SHELL := /bin/bash
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= out/demo
+FIT_OUT ?= out/demo-fit
+IMAGE ?= # a photo to draw under the keypoints of demo-fit
+KEYPOINTS := python/ipman_rs/fitting/examples/basketball.json
 
 # PYTHON=python3.12 make … chooses for a new .venv; otherwise the first of these that is new enough.
 NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 10))
@@ -29,10 +32,12 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard rust-toolchain.toml) 
 	$(shell find rust -type d -o -name '*.rs' -o -name Cargo.toml)
 BINARY := python/ipman_rs/_core.abi3.so
 
-.PHONY: help demo test test-rust test-python test-levels lint format wheel bench clean FORCE
+.PHONY: help demo demo-poses demo-fit test test-rust test-python test-levels lint format wheel bench clean FORCE
 
 help:
-	@echo 'make demo     the named poses of the embedded body, analysed: table, pictures and report in $(OUT)'
+	@echo 'make demo     demo-poses: the named poses of the embedded body, analysed, report in $(OUT); and'
+	@echo '              demo-fit: a body fitted to the keypoints of a photo, report in $(FIT_OUT) (IMAGE=photo.png draws it'
+	@echo '              under them; installs torch, some minutes the first time, and takes ten seconds afterwards)'
 	@echo 'make test     every test, Rust and Python (installs torch and the test tools)'
 	@echo 'make lint     formats and lints checked, nothing changed'
 	@echo 'make format   sources formatted'
@@ -41,10 +46,17 @@ help:
 	@echo 'make clean    remove what was built (.venv, target, out, dist)'
 	@echo 'PYTHON=python3.12 make …   chooses the interpreter of a new .venv'
 
-demo: $(VENV)/built
+demo: demo-poses demo-fit
+
+demo-poses: $(VENV)/built
 	ipman demo -o $(OUT)
 	@echo
 	@echo 'The report: $(abspath $(OUT))/report.html   (numbers: report.json and report.npz, pictures: *.png)'
+
+demo-fit: $(VENV)/fit-tools | $(if $(filter demo,$(MAKECMDGOALS)),demo-poses)
+	ipman fit $(KEYPOINTS) -o $(FIT_OUT) $(if $(strip $(IMAGE)),--image '$(strip $(IMAGE))')
+	@echo
+	@echo 'The fitted body: $(abspath $(FIT_OUT))/report.html   (parameters, mesh and pictures: $(FIT_OUT)/basketball)'
 
 test: test-rust test-python test-levels
 	@echo
@@ -107,8 +119,12 @@ $(VENV)/built: $(SOURCES) $(if $(wildcard $(BINARY)),,FORCE) | $(VENV)/created
 	$(MATURIN_DEVELOP)
 	touch $@
 
+$(VENV)/fit-tools: pyproject.toml | $(VENV)/built
+	$(MATURIN_DEVELOP) --extras fit
+	touch $@
+
 $(VENV)/test-tools: pyproject.toml | $(VENV)/built
-	$(MATURIN_DEVELOP) --extras torch --group test
+	$(MATURIN_DEVELOP) --extras fit --group test
 	touch $@
 
 $(VENV)/bench-tools: pyproject.toml | $(VENV)/test-tools

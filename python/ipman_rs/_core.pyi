@@ -49,6 +49,24 @@ class Template:
     def sample_barycentric(self) -> NDArray[np.float64]:
         """The weights of each sample on its face's vertices, (S, 3)."""
 
+@final
+class Collision:
+    """All that is known of a template's collisions before a pose."""
+
+    def __new__(cls, template: Template, vertices: NDArray[np.float64], geodesic: float) -> Collision:
+        """The rest shape (V, 3) of a template; surface within `geodesic` metres of a vertex is not opposite to it."""
+
+    def windings(self, vertices: NDArray[_Float]) -> NDArray[_Float]:
+        """The winding number of each body at its vertices: (B, V, 3) -> (B, V)."""
+
+    def depths(self, vertices: NDArray[_Float]) -> NDArray[_Float]:
+        """How deep each vertex is inside another part of its body, m, 0 outside: (B, V, 3) -> (B, V)."""
+
+    def self_contact(
+        self, vertices: NDArray[_Float], options: Sequence[float]
+    ) -> tuple[NDArray[_Float], NDArray[_Float]]:
+        """push and pull (B, 2), their gradients (B, 2, V, 3). options: push_width, pull_width, pull_weight, near."""
+
 # Pose (n, J, 3 or 6), betas (n, k), expression (n, k) and translation (n, 3), or directions or gradients of these, in
 # the skin's dtype; n is the batch, or 1 where all bodies share a parameter. None: not given, or not asked for.
 _Parameters = tuple[NDArray[Any] | None, NDArray[Any] | None, NDArray[Any] | None, NDArray[Any] | None]

@@ -62,6 +62,7 @@ class BodyTemplate:
         samples = _whole("num_samples", num_samples, 1, 10_000_000)
         self._seed = _whole("seed", seed, 0, 2**64 - 1)
         self._core = _core.Template(self.vertices, self.faces, self.face_parts, samples, self._seed)
+        self._collisions: dict[float, _core.Collision] = {}
         self.part_names = _names(part_names, self.num_parts)
         for array in (self.vertices, self.faces, self.face_parts):
             array.setflags(write=False)

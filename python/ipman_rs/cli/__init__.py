@@ -1,4 +1,4 @@
-"""The command line: `ipman demo` and `ipman analyze`. Heavy imports wait until a command runs."""
+"""The command line: `ipman demo`, `ipman analyze` and `ipman fit`. Heavy imports wait until a command runs."""
 
 from __future__ import annotations
 

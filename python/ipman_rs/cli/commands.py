@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import FileError
+from .fit import fit
 from .options import GROUND, PRESETS, UP
 
 if TYPE_CHECKING:
@@ -37,7 +38,11 @@ def main() -> None:
     \b
     ipman demo -o out               the named poses of the built-in body
     ipman analyze body.obj -o out   your own mesh; open out/report.html afterwards
+    ipman fit photo.jpg -o out      a body for the person in a photo
     """
+
+
+main.add_command(fit)
 
 
 @main.command()
@@ -60,7 +65,7 @@ def demo(output: Path, preset: str) -> None:
             "Named poses", vertices, body.template, ip.Ground.y_up(), preset, labels=names, progress=step.to,
             source="the built-in body “anny”, y up, standing on the plane y = 0",
         )  # fmt: skip
-    page = _write([study], output, [])
+    page = write([study], output, [])
     console.print_table([study])
     console.say(f"report: {page}")
 
@@ -69,8 +74,9 @@ def demo(output: Path, preset: str) -> None:
 @click.argument("bodies", nargs=-1, required=True, metavar="BODY...", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), help="Report folder.")
 @click.option(
-    "--body", "model", default="anny", show_default=True, metavar="NAME|PATH",
-    help="Body model that parameters pose: anny, anny-lite, or an SMPL, SMPL+H or SMPL-X file (.pkl, .npz).",
+    "--body", "model", metavar="NAME|PATH",
+    help="Body model that parameters pose: anny, anny-lite, or an SMPL, SMPL+H or SMPL-X file (.pkl, .npz). "
+    "Default: the one that the file names, or anny.",
 )  # fmt: skip
 @click.option(
     "--up", type=UP, metavar="AXIS", default=None,
@@ -89,7 +95,7 @@ def demo(output: Path, preset: str) -> None:
 def analyze(
     bodies: tuple[Path, ...],
     output: Path | None,
-    model: str,
+    model: str | None,
     up: tuple[float, float, float] | None,
     ground: float | None,
     parts: Path | None,
@@ -127,7 +133,7 @@ def analyze(
             failures.append((str(path), error.what))
             console.error(str(error))
     # The report first: a reader that closes stdout early (`| head`) must not cost it.
-    page = _write(studies, output, failures) if studies and output is not None else None
+    page = write(studies, output, failures) if studies and output is not None else None
     if as_json:
         _print_json(studies, failures)
     elif studies:
@@ -137,13 +143,15 @@ def analyze(
     sys.exit(1 if failures else 0)
 
 
-def _write(studies: list[Study], output: Path, failures: list[tuple[str, str]]) -> Path:
+def write(studies: list[Study], output: Path, failures: list[tuple[str, str]], own_folders: bool = False) -> Path:
+    """The report's page. Ends the command where nothing can be written."""
     from ..view.report import count_files, write_report
     from . import console
 
     try:
         with console.progress("writing the report", count_files(studies)) as step:
-            return write_report(studies, output, failures, progress=lambda _name: step.one()).resolve()
+            told = {"progress": lambda _name: step.one(), "own_folders": own_folders}
+            return write_report(studies, output, failures, **told).resolve()
     except OSError as error:
         console.error(f"{output}: the report cannot be written ({error.strerror or error}); choose another folder")
         sys.exit(1)

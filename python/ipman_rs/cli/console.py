@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -96,6 +97,38 @@ def _row(study: Study, frames: int | slice) -> list[Text]:
         _number(np.median(value["balance"]), 1, 2),
     ]
     return [*map(Text, cells), Text(said, style="green" if stable.all() else "red")]
+
+
+def print_fits(studies: Sequence[Study]) -> None:
+    """A line for each fitted body: how its fit went, how it stands, and what to look at."""
+    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
+    table.add_column("item", overflow="fold", min_width=14)
+    table.add_column("converged", no_wrap=True)
+    for title in ("iterations", "error px", "error %", "CoM–CoP mm", "margin mm"):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("look", overflow="fold")
+    for study in studies:
+        if study.fitted is not None:
+            table.add_row(*_fit_row(study, study.fitted.record))
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 160
+    console.print(table)
+
+
+def _fit_row(study: Study, record: Mapping[str, Any]) -> list[Text]:
+    value = {key: column[0] for key, column in study.numbers.items()}
+    errors = record["reprojection"]
+    said = "yes" if record["converged"] else f"no: {record['reason']}"
+    cells = [
+        str(record["iterations"]),
+        _number(errors["median_px"], 1, 1),
+        _number(errors["median_percent"], 1, 1),
+        _number(value["com_cop_distance"], 1e3, 0),
+        _number(value["margin"] if value["has_contact"] else np.inf, 1e3, 0),
+        "; ".join(one_line(text) for text in (*record["flags"], *record["notes"])),
+    ]
+    return [Text(one_line(study.name)), Text(said, style="green" if record["converged"] else "red"), *map(Text, cells)]
 
 
 def _number(value: float, factor: float, digits: int) -> str:

@@ -26,7 +26,7 @@ from .recording import Recording
 class Request:
     """The options that every body of one command shares."""
 
-    model: str = "anny"
+    model: str | None = None  # the one that a file names, or anny
     up: tuple[float, float, float] | None = None
     ground: float | None = None
     parts: Path | None = None
@@ -75,7 +75,7 @@ def _measure(path: Path, request: Request) -> view.Study:
         )  # fmt: skip
 
 
-def read(path: Path, model: str) -> Recording:
+def read(path: Path, model: str | None) -> Recording:
     """The bodies in a file, by the ending of its name."""
     if not path.is_file():
         what = "is a folder; name the files in it" if path.is_dir() else "there is no such file"
@@ -125,7 +125,7 @@ def _template(recording: Recording, request: Request) -> tuple[Any, list[str]]:
         face_parts, names = read_parts(request.parts, faces, recording.vertex_map)
         template = ip.BodyTemplate(first, faces, face_parts, names)
         return template, [f"parts: {len(names)} from {request.parts}"]
-    body = match_body(faces, len(first), request.model)
+    body = match_body(faces, len(first), request.model or "anny")
     if body is not None:
         return body.template, [f"parts: the {len(body.part_names)} of the body {body.name}, whose topology it has"]
     template = ip.BodyTemplate(first, faces)

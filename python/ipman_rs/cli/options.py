@@ -35,19 +35,38 @@ class UpAxis(click.ParamType):
 class GroundHeight(click.ParamType):
     name = "height"
 
+    def __init__(self, word: str) -> None:
+        self.word = word
+
     def convert(self, value, param, ctx):
-        """Metres, or None for auto."""
+        """Metres, or None for the word."""
         if value is None or isinstance(value, float):
             return value
-        if value.strip().lower() == "auto":
+        if value.strip().lower() == self.word:
             return None
         try:
             height = float(value)
         except ValueError:
             height = math.nan
         if not math.isfinite(height):
-            self.fail(f"{value!r} is neither a height in metres nor auto", param, ctx)
+            self.fail(f"{value!r} is neither a height in metres nor {self.word}", param, ctx)
         return height
 
 
-UP, GROUND = UpAxis(), GroundHeight()
+class ImageSize(click.ParamType):
+    name = "size"
+
+    def convert(self, value, param, ctx):
+        """Width and height in pixels."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            width, height = (float(side) for side in value.lower().split("x"))
+        except ValueError:
+            width = height = math.nan
+        if not (0 < width < math.inf and 0 < height < math.inf):
+            self.fail(f"{value!r} is no width and height in pixels such as 1920x1080", param, ctx)
+        return width, height
+
+
+UP, GROUND, FLOOR, SIZE = UpAxis(), GroundHeight("auto"), GroundHeight("found"), ImageSize()

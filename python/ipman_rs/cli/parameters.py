@@ -56,11 +56,19 @@ class _Npz:
                 return array
         return None
 
+    def model(self) -> str:
+        """The embedded body that `ipman fit` wrote down, or anny."""
+        from ..body import embedded
 
-def read_npz(path: Path, model: str) -> Recording:
-    """The bodies of an .npz file. Raises FileError."""
+        named = str(safe_npz.read(self.path, "model")) if "model" in self.names else ""
+        return named if named in embedded.NAMES else "anny"
+
+
+def read_npz(path: Path, model: str | None) -> Recording:
+    """The bodies of an .npz file; `model` None: of the body that the file names, or anny. Raises FileError."""
     try:
         stored = _Npz(path)
+        model = model or stored.model()
         if stored.names & {"vertices", "verts", "v"}:
             return _read_vertices(stored, model)
         if stored.names & {"poses", "pose", "fullpose", *_PIECES}:

@@ -37,6 +37,11 @@ class Config:
     start: Mapping[str, Any]
 
 
+def weighs(config: Config, *terms: str) -> bool:
+    """Whether any stage has a weight for any of these terms."""
+    return any(stage.weights.get(name, 0) > 0 for stage in config.stages for name in terms)
+
+
 def load(name: str | Path) -> Config:
     """A built-in preset by its name, or a YAML file by its path.
 

@@ -20,17 +20,24 @@ from .problem import Problem
 from .solvers import SOLVERS, Look, Options, Outcome, minimise
 from .variables import Variables, pack, unpack
 
+CONVERGED = ("gradient", "decrease")  # reasons
 CHUNK = 64  # bodies side by side: beyond, nothing gets faster and the Jacobian of the landmarks gets large
 
 
 @dataclass(frozen=True)
 class StageReport:
-    """How a stage went, an entry a body: reason (`solvers.Outcome`), iterations, and the terms' weighted costs."""
+    """How a stage went, an entry a body: reason (`solvers.Outcome`), iterations, and the terms' weighted costs.
+
+    `variables` are those that it ended with. `trace` has the costs of each body's successive best points, start and end
+    included, if they were asked for.
+    """
 
     name: str
     reasons: list[str]
     iterations: list[int]
     terms: dict[str, np.ndarray]  # (B,) each
+    variables: Variables
+    trace: list[dict[str, np.ndarray]] | None = None  # B times (n,) each
 
 
 @dataclass(frozen=True)
@@ -45,7 +52,7 @@ class Fit:
     def converged(self) -> np.ndarray:
         """(B,) bool: whether every stage converged."""
         reasons = np.array([stage.reasons for stage in self.stages])
-        return np.isin(reasons, ("gradient", "decrease")).all(axis=0)
+        return np.asarray(np.isin(reasons, CONVERGED).all(axis=0))
 
     @property
     def candidate(self) -> Candidate:
@@ -54,16 +61,23 @@ class Fit:
 
 
 def fit(
-    problem: Problem, variables: Variables, config: Config, progress: Callable[[str, int], None] | None = None
+    problem: Problem,
+    variables: Variables,
+    config: Config,
+    progress: Callable[[str, int], None] | None = None,
+    trace: bool = False,
 ) -> Fit:
-    """Fit B bodies from `variables` on by the stages of `config`; `progress` hears a stage and how many ended."""
+    """Fit B bodies from `variables` on by the stages of `config`; `progress` hears a stage and how many ended.
+
+    `trace`: report the terms by iteration, for one more evaluation each.
+    """
     reports = []
     with one_thread():
         for stage in config.stages:
             if stage.find_ground:
                 problem = on_the_ground(problem, variables)
             problem = judged(problem, variables)
-            variables, report = run_stage(problem, variables, stage, config.terms, progress)
+            variables, report = run_stage(problem, variables, stage, config.terms, progress, trace)
             reports.append(report)
     return Fit(problem, variables, reports)
 
@@ -104,20 +118,24 @@ def run_stage(
     stage: Stage,
     terms: Mapping[str, Mapping[str, Any]],
     progress: Callable[[str, int], None] | None = None,
+    trace: bool = False,
 ) -> tuple[dict[str, torch.Tensor], StageReport]:
     objective = Objective(problem, variables, stage.free, stage.weights, terms)
     starts = pack(variables, stage.free).numpy()
     outcomes: list[Outcome] = []
+    traces: list[dict[str, np.ndarray]] = []
     for first in range(0, len(starts), CHUNK):
         part = _Shrinking(objective.rows(range(first, min(first + CHUNK, len(starts)))), stage.solver == "levenberg")
         told = None if progress is None else (lambda ended, first=first: progress(stage.name, first + ended))
         outcomes += minimise(SOLVERS[stage.solver], starts[first : first + CHUNK], part, stage.options, told)
+        traces += part.trace() if trace else []
     rows = torch.from_numpy(np.stack([outcome.point for outcome in outcomes]))
     variables = unpack(rows, stage.free, variables)
     with torch.no_grad():
         costs = objective.costs(objective.candidate(rows))
     reasons, iterations = [outcome.reason for outcome in outcomes], [outcome.iterations for outcome in outcomes]
-    return variables, StageReport(stage.name, reasons, iterations, {name: cost.numpy() for name, cost in costs.items()})
+    ended = {name: cost.numpy() for name, cost in costs.items()}
+    return variables, StageReport(stage.name, reasons, iterations, ended, variables, traces if trace else None)
 
 
 class _Shrinking:
@@ -127,6 +145,7 @@ class _Shrinking:
         self.whole, self.wants_models = objective, wants_models
         self.bodies: Sequence[int] = range(objective.problem.num_bodies)
         self.objective = objective
+        self.best: list[list[tuple[float, np.ndarray]]] = [[] for _ in self.bodies]
 
     def __call__(self, bodies: Sequence[int], points: np.ndarray) -> list[Look]:
         if 2 * len(bodies) <= len(self.bodies):
@@ -135,7 +154,23 @@ class _Shrinking:
         everywhere = np.repeat(points[:1], len(self.bodies), axis=0)
         everywhere[place] = points
         looks = self.objective.models(everywhere) if self.wants_models else self.objective.looks(everywhere)
+        for body, point, i in zip(bodies, points, place, strict=True):
+            if looks[i].finite and (not self.best[body] or looks[i].value < self.best[body][-1][0]):
+                self.best[body].append((looks[i].value, point))
         return [looks[i] for i in place]
+
+    def trace(self) -> list[dict[str, np.ndarray]]:
+        """The weighted costs of each body's points that were the best so far: what its solver accepted."""
+        lengths = [len(best) for best in self.best]
+        nowhere = pack(self.whole.variables, self.whole.free).numpy()
+        columns = []
+        with torch.no_grad():
+            for step in range(max(lengths)):
+                rows = [best[min(step, len(best) - 1)][1] if best else nowhere[i] for i, best in enumerate(self.best)]
+                columns.append(self.whole.costs(self.whole.candidate(torch.from_numpy(np.stack(rows)))))
+        names = self.whole.weights if columns else ()
+        costs = {name: torch.stack([column[name] for column in columns]).numpy() for name in names}
+        return [{name: cost[:length, body] for name, cost in costs.items()} for body, length in enumerate(lengths)]
 
 
 __all__ = ["Fit", "Options", "StageReport", "fit", "run_stage"]

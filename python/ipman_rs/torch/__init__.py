@@ -22,6 +22,7 @@ from .physics_loss import IntuitivePhysicsLoss as IntuitivePhysicsLoss
 from .pressure import center_of_pressure as center_of_pressure
 from .pressure import pressure as pressure
 from .sampling import sample_surface as sample_surface
+from .self_contact import self_contact_loss as self_contact_loss
 from .support import base_of_support as base_of_support
 from .support import bose as bose
 from .support import support_margin as support_margin

@@ -6,6 +6,7 @@ view.write_report([study], Path("out"))                    # report.html, report
 
 from __future__ import annotations
 
+from .fitted import Fitted
 from .floor import draw_floor_view
 from .html import page
 from .picture import draw_picture
@@ -13,4 +14,4 @@ from .report import write_report
 from .study import Study, study
 from .timeline import draw_timeline
 
-__all__ = ["Study", "draw_floor_view", "draw_picture", "draw_timeline", "page", "study", "write_report"]
+__all__ = ["Fitted", "Study", "draw_floor_view", "draw_picture", "draw_timeline", "page", "study", "write_report"]

@@ -9,19 +9,20 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Camera:
-    """Eye (3,), the axes right, up and back as rows (3, 3), focal length and centre in pixels."""
+    """Eye (3,), the axes right, up and back as rows (3, 3), focal length (or those of x and y) and centre in pixels."""
 
     eye: np.ndarray
     axes: np.ndarray
-    focal: float
+    focal: float | tuple[float, float]
     center: tuple[float, float]
 
     def pixels(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (..., 2), y downwards, and the distance (...,) in front of the eye, of world points (..., 3)."""
         local = (points - self.eye) @ self.axes.T
         distance = np.maximum(-local[..., 2], 1e-6)
-        x = self.center[0] + self.focal * local[..., 0] / distance
-        y = self.center[1] - self.focal * local[..., 1] / distance
+        fx, fy = np.broadcast_to(self.focal, 2)
+        x = self.center[0] + fx * local[..., 0] / distance
+        y = self.center[1] - fy * local[..., 1] / distance
         return np.stack([x, y], axis=-1), distance
 
 

@@ -6,6 +6,8 @@ import base64
 import json
 from collections.abc import Sequence
 from importlib.resources import files
+from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,17 +27,23 @@ _SHOWN = (
 )  # fmt: skip
 
 
-def page(studies: Sequence[Study], failures: Sequence[tuple[str, str]] = ()) -> str:
-    """The HTML text. Names and messages are escaped wherever they stand, inside the data too."""
+def page(
+    studies: Sequence[Study], failures: Sequence[tuple[str, str]] = (), folders: Sequence[Path | None] = ()
+) -> str:
+    """The HTML text. Names and messages are escaped wherever they stand, inside the data too.
+
+    ``folders`` hold the studies' pictures; those of fitted bodies are shown on the page.
+    """
     from jinja2 import Environment, select_autoescape
     from markupsafe import Markup
 
     import ipman_rs as ip
 
-    folder = files("ipman_rs.view") / "page"
+    folders = folders or [None] * len(studies)
+    here = files("ipman_rs.view") / "page"
     environment = Environment(autoescape=select_autoescape(default=True, default_for_string=True))
     data = {
-        "bodies": [_body(study) for study in studies],
+        "bodies": [_body(study, folder) for study, folder in zip(studies, folders, strict=True)],
         "heat": _base64(np.round(colors.heat_table() * 255).astype(np.uint8)),
         "series": [{"key": key, "title": title, "unit": unit, "factor": factor, "color": color}
                    for key, title, unit, factor, color in SERIES],
@@ -43,15 +51,15 @@ def page(studies: Sequence[Study], failures: Sequence[tuple[str, str]] = ()) -> 
         "partColors": list(colors.PART_COLORS),
     }  # fmt: skip
     stops = colors.heat_table(9)
-    return environment.from_string((folder / "page.html").read_text(encoding="utf-8")).render(
+    return environment.from_string((here / "page.html").read_text(encoding="utf-8")).render(
         title=studies[0].name if len(studies) == 1 else f"{len(studies)} bodies",
         version=ip.__version__,
         studies=studies,
         failures=failures,
         data=Markup(script_json(data)),
-        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
-        scene=Markup((folder / "scene.js").read_text(encoding="utf-8")),
-        script=Markup((folder / "page.js").read_text(encoding="utf-8")),
+        style=Markup((here / "page.css").read_text(encoding="utf-8")),
+        scene=Markup((here / "scene.js").read_text(encoding="utf-8")),
+        script=Markup((here / "page.js").read_text(encoding="utf-8")),
         gradient=", ".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in stops * 255),
         colors=data["colors"],
     )
@@ -63,7 +71,7 @@ def script_json(value: Any) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _body(study: Study) -> dict[str, Any]:
+def _body(study: Study, folder: Path | None) -> dict[str, Any]:
     keys = study.key_frames
     vertices = _floor_axes(study, study.vertices[keys])
     finite = np.isfinite(vertices)
@@ -77,6 +85,7 @@ def _body(study: Study) -> dict[str, Any]:
         "name": study.name,
         "source": study.source,
         "notes": list(study.notes),
+        "pictures": _pictures(study, folder),
         "method": study.com_method,
         "preset": study.preset.name,
         "alpha": study.preset.alpha,
@@ -102,6 +111,24 @@ def _body(study: Study) -> dict[str, Any]:
         "numbers": {key: plain(_short(study.numbers[key])) for key in _SHOWN},
         "partVolumes": plain(_short(study.numbers["part_volumes"][keys])),
     }
+
+
+def _pictures(study: Study, folder: Path | None) -> list[dict[str, str]]:
+    """Pictures as the page holds them: JPEGs of a size for the screen."""
+    from PIL import Image
+
+    if study.fitted is None or folder is None:
+        return []
+    shown = []
+    for name, title in study.fitted.pictures():
+        stream = BytesIO()
+        with Image.open(folder / name) as image:
+            small = image.convert("RGB")
+            small.thumbnail((1400, 900))
+            small.save(stream, "JPEG", quality=86)
+        text = base64.b64encode(stream.getvalue()).decode("ascii")
+        shown.append({"title": title, "src": f"data:image/jpeg;base64,{text}"})
+    return shown
 
 
 def _floor_axes(study: Study, points: np.ndarray) -> np.ndarray:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
@@ -27,17 +28,16 @@ _SAMPLES = 2
 _TOP = 3.0
 
 
-def draw_picture(study: Study, frame: int, path: Path) -> None:
-    """Write the perspective PNG of one frame."""
+def draw_picture(study: Study, frame: int, path: Path | IO[bytes], camera: Camera | None = None) -> None:
+    """Write the perspective PNG of one frame, seen from its front right if `camera` does not say otherwise."""
     figure, axes = new_page(WIDTH, HEIGHT)
     body = np.asarray(study.vertices[frame], dtype=np.float64)
     top = heat_top(study)
     if np.isfinite(body).all():
-        shadow = study.ground.project(body)
-        camera = look_at(np.concatenate([body, shadow]), np.asarray(study.ground.normal, dtype=np.float64), _BOX)
-        _draw_floor(axes, camera, study, body, shadow)
+        camera = camera or camera_on([body], study)
+        _draw_floor(axes, camera, study, body, study.ground.project(body))
         _draw_support(axes, camera, study.polygons[frame])
-        _draw_body(axes, camera, study, body, top)
+        draw_body(axes, camera, study, body, top, (WIDTH, HEIGHT))
         _draw_markers(axes, camera, study, frame)
     else:
         axes.text(WIDTH / 2, HEIGHT / 2, "this body has no finite position", ha="center", color=colors.MUTED, size=15)
@@ -46,11 +46,17 @@ def draw_picture(study: Study, frame: int, path: Path) -> None:
     save(figure, path)
 
 
-def save(figure: Figure, path: Path) -> None:
+def camera_on(bodies: Sequence[np.ndarray], study: Study, turn: float = 35.0, tilt: float = 16.0) -> Camera:
+    """A camera that sees these bodies (V, 3) and their shadows; turned and tilted as `look_at` says."""
+    points = np.concatenate([part for body in bodies for part in (body, study.ground.project(body))])
+    return look_at(points, np.asarray(study.ground.normal, dtype=np.float64), _BOX, turn, tilt)
+
+
+def save(figure: Figure, path: Path | IO[bytes]) -> None:
     """Write a PNG; characters of a name that the font lacks become boxes without a word."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
-        figure.savefig(path, dpi=100)
+        figure.savefig(path, dpi=100, format="png")
 
 
 def heat_top(study: Study) -> float:
@@ -111,7 +117,10 @@ def _draw_support(axes: Axes, camera: Camera, polygon: np.ndarray) -> None:
     axes.plot(*np.vstack([points, points[:1]]).T, color=colors.SUPPORT_EDGE, linewidth=2.5, zorder=2.1)
 
 
-def _draw_body(axes: Axes, camera: Camera, study: Study, body: np.ndarray, top: float) -> None:
+def draw_body(
+    axes: Axes, camera: Camera, study: Study, body: np.ndarray, top: float, size: tuple[int, int], opacity: float = 1.0
+) -> None:
+    """The skin with its pressure on a picture of `size` pixels."""
     faces = study.template.faces
     pixels, distance = camera.pixels(body)
     normals = vertex_normals(body, faces)
@@ -119,8 +128,10 @@ def _draw_body(axes: Axes, camera: Camera, study: Study, body: np.ndarray, top: 
         faces = faces[faces_viewer(pixels[faces])]
     values = np.concatenate([normals, study.ground.signed_height(body)[:, None]], axis=-1)
     # Only the box around the body is drawn, in whole picture pixels.
-    low = np.clip(np.floor(pixels.min(axis=0)), 0, (WIDTH, HEIGHT)).astype(int)
-    high = np.clip(np.ceil(pixels.max(axis=0)), 0, (WIDTH, HEIGHT)).astype(int)
+    low = np.clip(np.floor(pixels.min(axis=0)), 0, size).astype(int)
+    high = np.clip(np.ceil(pixels.max(axis=0)), 0, size).astype(int)
+    if (high <= low).any():
+        return
     width, height = (high - low) * _SAMPLES
     image, covered = rasterize((pixels - low)[faces] * _SAMPLES, 1.0 / distance[faces], values[faces], width, height)
     seen = image[covered]
@@ -131,6 +142,7 @@ def _draw_body(axes: Axes, camera: Camera, study: Study, body: np.ndarray, top: 
     rgba[covered, 3] = 1.0
     small = shrink(rgba, _SAMPLES)
     small[..., :3] /= np.maximum(small[..., 3:], 1e-6)
+    small[..., 3] *= opacity
     place = (low[0], high[0], high[1], low[1])
     axes.imshow(np.clip(small, 0.0, 1.0), extent=place, zorder=3, interpolation="nearest")
 

@@ -38,9 +38,11 @@ def report_record(studies: Sequence[Study], failures: Sequence[tuple[str, str]] 
 
 def study_record(study: Study) -> dict[str, Any]:
     template = study.template
+    fitted = {} if study.fitted is None else {"fit": plain(study.fitted.record)}
     return {
         "name": study.name,
         "source": study.source,
+        **fitted,
         "notes": list(study.notes),
         "preset": plain(asdict(study.preset)),
         "ground": {"normal": plain(study.ground.normal), "height": plain(study.ground.height)},

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .fitted import draw_fitted
 from .floor import draw_floor_view
 from .html import page
 from .picture import draw_picture
@@ -22,13 +23,15 @@ def write_report(
     directory: Path,
     failures: Sequence[tuple[str, str]] = (),
     progress: Callable[[str], None] = lambda written: None,
+    own_folders: bool = False,
 ) -> Path:
     """Write the report of one or more studies into ``directory`` and return the path of its page.
 
     `report.html` and `report.json` cover all studies. `report.npz` and the pictures of a single study lie beside them,
-    those of several studies in a folder each, named after the study. ``failures`` are (file, error) pairs to be told in
-    the report. Of a recording of more than 10,000 frames the page and `report.json` list evenly spaced ones and those
-    with pictures, and only these keep the outline of their base of support; `report.npz` has the figures of all.
+    those of several studies, or with ``own_folders``, in a folder each, named after the study. ``failures`` are (file,
+    error) pairs to be told in the report. Of a recording of more than 10,000 frames the page and `report.json` list
+    evenly spaced ones and those with pictures, and only these keep the outline of their base of support; `report.npz`
+    has the figures of all.
     ``progress`` is called with the name of each file written. Raises OSError where nothing can be written.
     """
     directory = Path(directory)
@@ -38,20 +41,26 @@ def write_report(
     (directory / "report.json").write_text(record + "\n", encoding="utf-8")
     progress("report.json")
     names = safe_names([study.name for study in studies])
-    for study, name in zip(studies, names, strict=True):
-        folder = directory if len(studies) == 1 else directory / name
+    folders = [directory if len(studies) == 1 and not own_folders else directory / name for name in names]
+    for study, folder in zip(studies, folders, strict=True):
         folder.mkdir(exist_ok=True)
         for written in _write_study(study, folder):
             progress(written)
     path = directory / "report.html"
-    path.write_text(page(excerpts, failures), encoding="utf-8")
+    path.write_text(page(excerpts, failures, folders), encoding="utf-8")
     progress("report.html")
     return path
 
 
 def count_files(studies: Sequence[Study]) -> int:
     """How many files `write_report` will write: the length of its progress bar."""
-    return 2 + sum(1 + 2 * len(study.pictured()) + _has_timeline(study) for study in studies)
+    return 2 + sum(_count_files(study) for study in studies)
+
+
+def _count_files(study: Study) -> int:
+    if study.fitted is not None:
+        return 1 + len(study.fitted.pictures()) + (study.fitted.pictured and study.fitted.before is not None)
+    return 1 + 2 * len(study.pictured()) + _has_timeline(study)
 
 
 def _has_timeline(study: Study) -> bool:
@@ -63,6 +72,9 @@ def _write_study(study: Study, folder: Path) -> Iterator[str]:
     save = np.savez_compressed if study.num_frames <= MAX_LISTED_FRAMES else np.savez
     save(folder / "report.npz", allow_pickle=False, **study_arrays(study))
     yield "report.npz"
+    if study.fitted is not None:
+        yield from _write_fitted(study, folder)
+        return
     frames = study.pictured()
     digits = len(str(study.num_frames))
     labels = safe_names([study.labels[frame] if study.labels else f"{frame:0{digits}d}" for frame in frames])
@@ -74,6 +86,13 @@ def _write_study(study: Study, folder: Path) -> Iterator[str]:
     if _has_timeline(study):
         draw_timeline(study.excerpt(), folder / "timeline.png")
         yield "timeline.png"
+
+
+def _write_fitted(study: Study, folder: Path) -> Iterator[str]:
+    yield from draw_fitted(study, folder)
+    if study.fitted is not None and study.fitted.pictured:
+        draw_floor_view(study, 0, folder / "floor.png")
+        yield "floor.png"
 
 
 def safe_names(names: Sequence[str]) -> list[str]:

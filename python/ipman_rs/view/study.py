@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .fitted import Fitted
 
 # Frames of a long sequence that are drawn and whose pressure samples are stored.
 MAX_KEY_FRAMES = 48
@@ -28,7 +31,8 @@ class Study:
     ``vertices`` (T, V, 3) in metres, or bodies that are posed when they are needed; ``numbers`` has a column (T, ...)
     for every quantity of ``ip.analyze``, plus ``com_cop_distance``, m; ``polygons`` the base of support of each frame,
     (K, 3), of a long sequence only those of the frames that are listed; ``pressure`` (K, S) at the samples of the
-    frames ``key_frames`` (K,); ``frames`` (T,) the frames' numbers, where these are some of a longer sequence.
+    frames ``key_frames`` (K,); ``frames`` (T,) the frames' numbers, where these are some of a longer sequence;
+    ``fitted`` of a body that was fitted to an image.
     """
 
     name: str
@@ -46,6 +50,7 @@ class Study:
     source: str = ""
     notes: tuple[str, ...] = field(default=())
     frames: np.ndarray | None = None
+    fitted: Fitted | None = None
 
     @property
     def num_frames(self) -> int:

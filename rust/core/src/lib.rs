@@ -43,6 +43,9 @@ pub mod weighted;
 /// How many threads, and the pool.
 pub mod threads;
 
+/// A body that touches or penetrates itself.
+pub mod collision;
+
 /// Linear blend skinning: from a body model's parameters to its vertices and joints.
 pub mod skinning;
 /// Many posed bodies over threads.

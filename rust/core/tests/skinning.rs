@@ -111,3 +111,32 @@ fn a_body_has_its_own_bits_and_a_broken_one_no_gradient() {
         assert_eq!(broken[5 * row..], clean[5 * row..]);
     }
 }
+
+/// Every column of the Jacobian is the derivative along one number, which dual numbers know.
+#[test]
+fn the_jacobian_has_the_derivatives() {
+    let skin = skin::<f64>();
+    let given = Given::<f64>::new(2, 3, 60);
+    let posing = Posing::new(&skin, 2, given.bodies(), &|| false).unwrap();
+    let (parameters, row) = (3 * JOINTS + WIDTHS[0], 3 * (VERTICES + JOINTS));
+    let mut jacobian = vec![0.0; 2 * posing.jacobian_width()];
+    posing.jacobian(&mut jacobian).unwrap();
+    for k in 0..parameters {
+        let mut along = Given::<f64>(given.zeros(), 2);
+        let (part, place) = if k < 3 * JOINTS { (0, k) } else { (1, k - 3 * JOINTS) };
+        let width = along.0[part].len() / 2;
+        for body in 0..2 {
+            along.0[part][body * width + place] = 1.0;
+        }
+        let (mut vertices, mut joints) = (vec![0.0; 6 * VERTICES], vec![0.0; 6 * JOINTS]);
+        posing.jvp(&along.bodies(), &mut vertices, &mut joints).unwrap();
+        for body in 0..2 {
+            let expected =
+                [&vertices[body * 3 * VERTICES..][..3 * VERTICES], &joints[body * 3 * JOINTS..][..3 * JOINTS]];
+            let found = &jacobian[(body * parameters + k) * row..][..row];
+            for (found, expected) in found.iter().zip(expected.concat()) {
+                assert!((found - expected).abs() < 1e-13, "{k}: {found} {expected}");
+            }
+        }
+    }
+}

@@ -3,6 +3,7 @@
 mod analysis;
 mod array;
 mod bodies;
+mod collision;
 mod error;
 mod evaluate;
 mod skinning;
@@ -17,6 +18,8 @@ use pyo3::prelude::*;
 mod _core {
     #[pymodule_export]
     use crate::analysis::analysis;
+    #[pymodule_export]
+    use crate::collision::Collision;
     #[pymodule_export]
     use crate::evaluate::{jvp, output_size, value, value_and_vjp, vjp, vjp_jvp};
     #[pymodule_export]

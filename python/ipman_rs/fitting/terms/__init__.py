@@ -13,6 +13,7 @@ from .pose_prior import PosePrior
 from .presented_contact import PresentedContact
 from .presented_pose import PresentedPose
 from .reprojection import Reprojection
+from .self_contact import SelfContact, SelfPenetration
 from .shape_prior import ShapePrior
 from .term import LeastSquares, Term
 from .vposer import VPoser
@@ -33,6 +34,8 @@ TERMS: dict[str, type[Term]] = {
     "stability": Stability,
     "ground": Ground,
     "balance": Balance,
+    "self_contact": SelfContact,
+    "self_penetration": SelfPenetration,
 }
 
 __all__ = ["TERMS", "LeastSquares", "Term"]

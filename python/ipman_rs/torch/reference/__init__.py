@@ -16,5 +16,6 @@ from .pressure import pressure as pressure
 from .quantities import FORMULAS as FORMULAS
 from .quantities import evaluate as evaluate
 from .sampling import sample_surface as sample_surface
+from .self_contact import self_contact_loss as self_contact_loss
 from .stability import stability_loss as stability_loss
 from .support import support_margin as support_margin

@@ -259,6 +259,13 @@
     $("method").textContent = body.method === "pcom" ? "(part-wise, pCoM)" : "(exact)";
     $("heat-top").textContent = `${body.top >= 3 ? "≥ " : ""}${+body.top.toPrecision(2)}`;
     $("notes").replaceChildren(...body.notes.map((note) => element("li", note)));
+    $("pictures-card").hidden = !body.pictures.length;
+    $("pictures").replaceChildren(...body.pictures.map(({ title, src }) => {
+      const figure = document.createElement("figure"), image = document.createElement("img");
+      Object.assign(image, { src, alt: title });
+      figure.append(element("figcaption", title), image);
+      return figure;
+    }));
     $("parts-choice").hidden = body.parts.length < 2;
     if (body.parts.length < 2) { look.byPart = false; document.querySelector("[name=skin]").checked = true; }
     Object.assign(look, { alpha: body.alpha, gamma: body.gamma, top: body.top });

@@ -42,7 +42,9 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
     fn held(&self, vertex: usize, body: &Body<f64>) -> Held {
         let (tile, place) = (vertex / W, vertex % W);
         let mut rest = std::array::from_fn(|axis| self.template[tile][axis].0[place].value());
-        for (directions, amounts) in [(&self.betas, &body.parameters.betas), (&self.expression, &body.parameters.expression)] {
+        for (directions, amounts) in
+            [(&self.betas, &body.parameters.betas), (&self.expression, &body.parameters.expression)]
+        {
             for (k, &amount) in amounts.iter().enumerate() {
                 add_scaled(&mut rest, amount, directions.surface.direction(vertex, k));
             }

@@ -1,0 +1,169 @@
+"""`ipman fit`: bodies for photos and keypoint files."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .errors import FileError
+from .options import FLOOR, SIZE
+
+if TYPE_CHECKING:
+    from ..view import Study
+    from .fit_inputs import Item
+    from .fit_run import Settings
+
+
+@click.command()
+@click.argument("inputs", nargs=-1, required=True, metavar="INPUT...", type=click.Path(path_type=Path))
+@click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Output folder.")
+@click.option(
+    "--preset", default="fast", show_default=True, metavar="NAME|FILE",
+    help="fast, balanced, ipman-o, ipman-o-star, smplify-x, smplify-xmc, or a YAML file of your own.",
+)  # fmt: skip
+@click.option(
+    "--body", "model", default="anny-lite", show_default=True, metavar="NAME|PATH",
+    help="Body model: anny-lite, anny, or an SMPL, SMPL+H or SMPL-X file (.pkl, .npz).",
+)  # fmt: skip
+@click.option("--focal", type=float, metavar="PX", help="Focal length in pixels. Default: the image's diagonal.")
+@click.option(
+    "--camera-pitch", "pitch", type=float, default=0.0, show_default=True, metavar="DEGREES",
+    help="How far the camera looks down; negative: up.",
+)  # fmt: skip
+@click.option(
+    "--ground", type=FLOOR, default="found", show_default=True, metavar="HEIGHT|found",
+    help="Height of the floor in metres above the camera (below it: negative); found: under the feet.",
+)  # fmt: skip
+@click.option("--height", type=float, metavar="M", help="Height of the person, where a preset weighs measured_shape.")
+@click.option("--mass", type=float, metavar="KG", help="Mass of the person, where a preset weighs measured_shape.")
+@click.option("--pose", metavar="NAME", help="The pose that was imitated: a named pose of `ipman demo`, such as tree.")
+@click.option("--image", type=click.Path(path_type=Path), metavar="PHOTO", help="Photo to draw under a keypoint file.")
+@click.option("--image-size", type=SIZE, metavar="WxH", help="Pixels of the image, where a keypoint file does not say.")
+@click.option("--person", type=int, metavar="N", help="Which person of a file, from 0. Default: the most visible.")
+@click.option("--obj", is_flag=True, help="Write meshes as .obj, too, not only as .glb.")
+@click.option(
+    "--pictures", type=click.IntRange(0), default=8, show_default=True, help="Draw the first N items (seconds each)."
+)
+@click.option("--resume", is_flag=True, help="Skip items that were finished with the same input and options.")
+def fit(
+    inputs: tuple[Path, ...], output: Path, image: Path | None, pictures: int, resume: bool, **options: Any
+) -> None:
+    """Fit a body to each photo or set of keypoints, with intuitive physics.
+
+    INPUT is a photo (.png .jpg; needs the extra photo), a keypoint file (.json of OpenPose, COCO, COCO-WholeBody or
+    MediaPipe), or a folder of them. Every person is fitted for themselves; of several in one image one is taken.
+    In OUTPUT every item gets a folder with its parameters (.npz, for `ipman analyze`), mesh (.glb), fit.json and
+    pictures; report.html and report.json tell of all.
+
+    \b
+    ipman fit photo.jpg -o out
+    ipman fit keypoints/ -o out --image-size 1920x1080 --resume
+    ipman fit person.json --image photo.png -o out --focal 1100 --camera-pitch 8
+    ipman fit yoga.json -o out --preset balanced --pose tree --height 1.7
+
+    Exit code: 0 when every item has a body, 1 when one has none (the others have), 2 for wrong usage.
+    """
+    _needs("torch", "roma", "yaml")
+    warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
+    from . import console
+    from .fit_inputs import Reading
+
+    reading = Reading(options.pop("person"), options.pop("image_size"), image)
+    items, failures = _items(inputs, reading)
+    settings = _settings(options)
+    studies: list[Study] = []
+    records: dict[str, dict[str, Any]] = {}
+    if items:
+        records = _run(items, settings, output, resume)
+        failures += [(item.source, item.failure) for item in items if item.failure is not None]
+        studies = _studies(items, records, settings, output, pictures)
+    for source, what in failures:
+        console.error(f"{source}: {what}")
+    if studies:
+        from .commands import write
+
+        page = write(studies, output, failures, own_folders=True)
+        console.print_fits(studies)
+        console.say(f"report: {page}")
+    sys.exit(1 if failures else 0)
+
+
+def _needs(*modules: str) -> None:
+    missing = [name for name in modules if importlib.util.find_spec(name) is None]
+    if missing:
+        raise click.ClickException(f"fitting needs {', '.join(missing)}: pip install 'ipman_rs[fit]'")
+
+
+def _items(inputs: tuple[Path, ...], reading: Any) -> tuple[list[Item], list[tuple[str, str]]]:
+    """The people in the inputs, under names of their own, and the files that have none."""
+    from ..view.report import safe_names
+    from . import fit_inputs
+
+    found: list[Item] = []
+    failures: list[tuple[str, str]] = []
+    paths: list[Path] = []
+    for path in inputs:
+        try:
+            paths += fit_inputs.expand([path])
+        except FileError as error:
+            failures.append((str(path), error.what))
+    if reading.photo is not None and len(paths) > 1:
+        raise click.UsageError(f"--image belongs to one keypoint file, got {len(paths)} inputs")
+    for path in paths:
+        try:
+            found += fit_inputs.items(path, reading)
+        except FileError as error:
+            failures.append((str(path), error.what))
+        except (OSError, ValueError) as error:
+            failures.append((str(path), str(error)))
+    for item, name in zip(found, safe_names([item.name for item in found]), strict=True):
+        item.name = name
+    return found, failures
+
+
+def _settings(options: dict[str, Any]) -> Settings:
+    from ..fitting import config
+    from .fit_run import Settings
+
+    try:
+        return Settings(config=config.load(options.pop("preset")), **options)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+
+
+def _run(items: list[Item], settings: Settings, output: Path, resume: bool) -> dict[str, dict[str, Any]]:
+    from .fit_run import run
+
+    try:
+        return run(items, settings, output, resume)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+    except OSError as error:
+        what = f"{output}: outputs cannot be written ({error.strerror or error}); choose another folder"
+        raise click.ClickException(what) from error
+
+
+def _studies(
+    items: list[Item], records: dict[str, dict[str, Any]], settings: Settings, output: Path, pictures: int
+) -> list[Study]:
+    """The fitted bodies, measured."""
+    import ipman_rs as ip
+
+    from ..fitting import photo
+    from . import console
+    from .fit_outputs import study_of
+
+    body = ip.load_body(settings.model)
+    fitted = [item for item in items if item.name in records]
+    studies = []
+    with console.progress("measuring", len(fitted)) as step:
+        for number, item in enumerate(fitted):
+            record = records[item.name]
+            studies.append(study_of(item, body, output / item.name, record, number < pictures, photo.read))
+            step.one()
+    return studies

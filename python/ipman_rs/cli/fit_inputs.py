@@ -1,0 +1,132 @@
+"""What `ipman fit` is given: files and folders of them, as items that are fitted each on its own."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .errors import FileError
+
+if TYPE_CHECKING:
+    from ..fitting.detections import Detections
+
+IMAGES = (".png", ".jpg", ".jpeg")
+KEYPOINTS = (".json",)
+ENDINGS = (*KEYPOINTS, *IMAGES)
+
+
+@dataclass
+class Item:
+    """One person to fit. `failure` says why there is no body; `photo` is what the report shows under it."""
+
+    name: str
+    path: Path
+    source: str
+    seen: Detections | None = None  # of one row; photos are looked at when their turn comes
+    photo: Path | None = None
+    notes: list[str] = field(default_factory=list)
+    flags: list[str] = field(default_factory=list)
+    failure: str | None = None
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The options that say how inputs are read."""
+
+    person: int | None = None
+    image_size: tuple[float, float] | None = None
+    photo: Path | None = None
+
+
+def expand(inputs: Iterable[Path]) -> list[Path]:
+    """The files, and those in the folders, by name. Raises FileError for a folder without any."""
+    files: list[Path] = []
+    for path in inputs:
+        if not path.is_dir():
+            files.append(path)
+            continue
+        inside = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in ENDINGS and entry.is_file())
+        if not inside:
+            raise FileError(path, f"no input in this folder; expected files ending in {' '.join(ENDINGS)}")
+        files += inside
+    return files
+
+
+def items(path: Path, reading: Reading) -> list[Item]:
+    """The people of one file: one an image, and none of a photo yet. Raises FileError."""
+    kind = path.suffix.lower()
+    if not path.is_file():
+        raise FileError(path, "there is no such file")
+    if kind in IMAGES:
+        return [Item(path.stem, path, str(path), photo=path)]
+    if kind not in KEYPOINTS:
+        raise FileError(path, f"unknown kind {kind or 'without ending'!r}; expected {' '.join(ENDINGS)}")
+    from ..fitting import keypoints
+
+    try:
+        found = keypoints.read(path, person=reading.person, image_size=_size(reading))
+    except ValueError as error:
+        raise FileError(path, _advice(str(error))) from error
+    if found.image_size is None:
+        raise FileError(path, "does not say how large its image is; give --image-size WIDTHxHEIGHT, or --image PHOTO")
+    people = [_one(found, row) for row in range(len(found))]
+    many = len(people) > 1
+    return [
+        Item(f"{path.stem}_{number}" if many else path.stem, path, one.sources[0], one, reading.photo, list(one.notes))
+        for number, one in enumerate(people)
+    ]
+
+
+def look(item: Item) -> None:
+    """Find the person in a photo. Raises FileError."""
+    from ..fitting import photo
+
+    try:
+        item.seen = photo.detect([item.path])
+    except (ValueError, ImportError) as error:
+        raise FileError(item.path, str(error)) from error
+    item.notes += item.seen.notes
+
+
+def _size(reading: Reading) -> tuple[float, float] | None:
+    if reading.image_size is not None or reading.photo is None:
+        return reading.image_size
+    from ..fitting import photo
+
+    height, width = photo.read(reading.photo).shape[:2]
+    return float(width), float(height)
+
+
+def _advice(what: str) -> str:
+    if "image_size" in what and "need it" in what:
+        return f"{what}; give --image-size WIDTHxHEIGHT, or --image PHOTO"
+    return what
+
+
+def _one(found: Detections, row: int) -> Detections:
+    from ..fitting.detections import Detections
+
+    def part(value: np.ndarray | None) -> np.ndarray | None:
+        return None if value is None else value[row : row + 1]
+
+    points, confidence = found.points[row : row + 1], found.confidence[row : row + 1]
+    others = (part(found.image_size), part(found.points_3d), part(found.confidence_3d))
+    notes = tuple(note for note in found.notes if len(found) == 1 or note.startswith(f"{found.sources[row]}:"))
+    return Detections(found.names, points, confidence, (found.sources[row],), *others, notes)
+
+
+def identity(item: Item, options: str) -> str:
+    """What a fit depends on, as a hash: the input's bytes, which person of it, and all options."""
+    digest = hashlib.sha256()
+    for part in (options.encode(), item.name.encode(), _bytes(item.path), _bytes(item.photo)):
+        digest.update(hashlib.sha256(part).digest())
+    return digest.hexdigest()
+
+
+def _bytes(path: Path | None) -> bytes:
+    return b"" if path is None else path.read_bytes()

@@ -1,0 +1,123 @@
+"""What `ipman fit` leaves of each item in its folder, parameters, mesh, how the fit went; and back to a study.
+
+`fit.json` is written last and says what the fit depended on: where it is and fits, the item is complete.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import ipman_rs as ip
+
+from .. import view
+from ..body import BodyModel, safe_npz
+from ..view.fitted import camera_of
+from . import mesh_files
+from .fit_inputs import Item
+
+if TYPE_CHECKING:
+    from ..fitting.result import Result
+
+RECORD = "fit.json"
+_BEFORE = "before_"
+
+
+def write_item(item: Item, result: Result, body: BodyModel, folder: Path, told: dict[str, Any], obj: bool) -> None:
+    """Write one fitted body. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / RECORD).unlink(missing_ok=True)  # incomplete from here on
+    arrays = result.arrays()
+    vertices = posed(body, arrays)
+    files = {f"{item.name}.npz": _npz(arrays), f"{item.name}.glb": mesh_files.glb(vertices, body.faces)}
+    if obj:
+        files[f"{item.name}.obj"] = mesh_files.obj(vertices, body.faces)
+    for name, content in files.items():
+        _replace(folder / name, content)
+    record = {"name": item.name, "source": item.source, **told, "files": sorted(files)}
+    _replace(folder / RECORD, (json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1) + "\n").encode())
+
+
+def complete(folder: Path, identity: str) -> dict[str, Any] | None:
+    """The record of a fit that was finished with the same input and options and has all its files, or None."""
+    try:
+        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        fits = record["identity"] == identity
+        there = all((folder / name).is_file() for name in record["files"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return record if fits and there else None
+
+
+def posed(body: BodyModel, arrays: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
+    """The vertices (V, 3) of stored parameters."""
+    from ..fitting.result import joints_of
+
+    pose = np.zeros((body.num_joints, 3))
+    for name, columns in joints_of(body).items():
+        pose[columns] = arrays[prefix + name].reshape(-1, 3)
+    return np.asarray(body(pose, arrays[f"{prefix}betas"][0], arrays[f"{prefix}transl"][0]).vertices)
+
+
+def study_of(
+    item: Item,
+    body: BodyModel,
+    folder: Path,
+    record: dict[str, Any],
+    pictured: bool,
+    pixels: Callable[[Path], np.ndarray],
+) -> view.Study:
+    """The analysed body of a finished item; `pixels` reads a photo."""
+    path = folder / f"{item.name}.npz"
+    arrays = {name: safe_npz.read(path, name) for name in safe_npz.names(path)}
+    vertices = posed(body, arrays)
+    normal = arrays.get("ground_normal", np.array([[0.0, 1.0, 0.0]]))[0]
+    height = arrays["ground_height"][0] if "ground_height" in arrays else (vertices @ normal).min()
+    ground = ip.Ground(normal, height)
+    before = None
+    if pictured and f"{_BEFORE}betas" in arrays:
+        before = view.study("Before the physics terms", posed(body, arrays, _BEFORE), body.template, ground)
+    fitted = view.Fitted(
+        camera=camera_of(*(arrays[name][0] for name in ("camera_rotation", "camera_translation", "focal", "center"))),
+        size=tuple(arrays["image_size"][0]),
+        seen=arrays["keypoints"][0],
+        projected=arrays["projected"][0],
+        photo=pixels(item.photo) if pictured and item.photo is not None else None,
+        before=before,
+        pictured=pictured,
+        record={key: value for key, value in record.items() if key not in ("name", "source")},
+    )
+    study = view.study(item.name, vertices, body.template, ground, source=item.source, notes=notes(record))
+    return replace(study, fitted=fitted)
+
+
+def notes(record: dict[str, Any]) -> list[str]:
+    """What the report says under a body's name."""
+    said = "converged" if record["converged"] else f"did not converge ({record['reason']})"
+    lines = [f"fit: preset {record['preset']}, {said} after {record['iterations']} iterations"]
+    errors = record["reprojection"]
+    lines += [f"reprojection: median {errors['median_px']:.1f} px, {errors['median_percent']:.1f} % of the height"]
+    for stage in record["stages"]:
+        terms = ", ".join(f"{name} {cost:.4g}" for name, cost in stage["terms"].items() if cost is not None)
+        lines.append(f"stage {stage['name']}, {stage['iterations']} iterations: {terms}")
+    return [*lines, *(f"look: {flag}" for flag in record["flags"]), *record["notes"]]
+
+
+def _npz(arrays: dict[str, np.ndarray]) -> bytes:
+    stream = io.BytesIO()
+    np.savez(stream, allow_pickle=False, **arrays)
+    return stream.getvalue()
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file so that it is there whole or not at all."""
+    partial = path.with_name(f".{path.name}.part")
+    partial.write_bytes(content)
+    os.replace(partial, path)

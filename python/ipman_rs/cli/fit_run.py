@@ -1,0 +1,146 @@
+"""Fit items in batches and keep their outputs, one item's failure being its own."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import torch
+
+import ipman_rs as ip
+import ipman_rs.torch as ipt
+
+from ..fitting import detected, start
+from ..fitting.config import Config, weighs
+from ..fitting.detections import join
+from ..fitting.fit import fit, on_the_ground
+from ..fitting.problem import Presented, Problem
+from ..fitting.result import Result, results
+from . import console
+from .errors import FileError
+from .fit_inputs import Item, identity, look
+from .fit_outputs import complete, write_item
+
+BATCH = 64  # items fitted together; after each batch its outputs are on the disk
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The options of one command that decide how bodies come out."""
+
+    config: Config
+    model: str
+    focal: float | None = None
+    pitch: float = 0.0
+    ground: float | None = None
+    height: float | None = None
+    mass: float | None = None
+    pose: str | None = None
+    obj: bool = False
+
+    def identity(self) -> str:
+        return json.dumps([ip.__version__, asdict(self)], default=str, sort_keys=True)
+
+
+def run(items: list[Item], settings: Settings, output: Path, resume: bool) -> dict[str, dict[str, Any]]:
+    """Fit the items and write them under `output`; the records of those that have a body, by name.
+
+    Items that fail say so in `failure`. Raises ValueError for options that fit no item.
+    """
+    _check(settings)
+    body = ipt.BodyModel(settings.model)
+    options = settings.identity()
+    records: dict[str, dict[str, Any]] = {}
+    hashes = {item.name: identity(item, options) for item in items}
+    if resume:
+        found = {item.name: complete(output / item.name, hashes[item.name]) for item in items}
+        records = {name: record for name, record in found.items() if record is not None}
+    waiting = [item for item in items if item.name not in records]
+    for batch in _batches(waiting):
+        for item, result in _fitted(batch, settings, body):
+            told = {**result.record(), "preset": settings.config.name, "model": body.body.name}
+            told |= {"flags": item.flags, "notes": item.notes, "identity": hashes[item.name]}
+            write_item(item, result, body.body, output / item.name, told, settings.obj)
+            records[item.name] = {"name": item.name, "source": item.source, **told}
+    return records
+
+
+def _check(settings: Settings) -> None:
+    config = settings.config
+    if settings.pose is None and weighs(config, "presented_pose", "presented_contact"):
+        raise ValueError(f"preset {config.name} imitates a pose: name it with --pose")
+    if settings.height is None and settings.mass is None and weighs(config, "measured_shape"):
+        raise ValueError(f"preset {config.name} knows the person's size: give --height or --mass, or both")
+
+
+def _batches(items: Iterable[Item]) -> Iterator[list[Item]]:
+    """Items whose points have the same names, up to `BATCH` together: what else is in a batch changes no bit of any."""
+    waiting: dict[tuple[str, ...], list[Item]] = {}
+    todo = list(items)
+    with console.progress("reading", len(todo)) as step:
+        for item in todo:
+            try:
+                if item.seen is None:
+                    look(item)
+                assert item.seen is not None
+                waiting.setdefault(item.seen.names, []).append(item)
+            except FileError as error:
+                item.failure = error.what
+            step.one()
+    for group in waiting.values():
+        for first in range(0, len(group), BATCH):
+            yield group[first : first + BATCH]
+
+
+def _fitted(batch: list[Item], settings: Settings, body: ipt.BodyModel) -> Iterator[tuple[Item, Result]]:
+    kept = [item for item in batch if not _refused(item, body)]
+    if not kept:
+        return
+    seen = join([item.seen for item in kept if item.seen is not None])
+    where = {"focal": settings.focal, "pitch": settings.pitch, "ground": settings.ground}
+    problem = detected.problem(body, seen, **where, height=settings.height, mass=settings.mass)
+    problem = _presented(problem, settings)
+    config = settings.config
+    with console.progress(f"fitting {len(kept)}", len(kept) * len(config.stages)) as step:
+        problem, variables = _started(problem, config)
+        done = {stage.name: number * len(kept) for number, stage in enumerate(config.stages)}
+        found = fit(problem, variables, config, lambda stage, ended: step.to(done[stage] + ended), trace=True)
+    for item, result in zip(kept, results(found, config, variables), strict=True):
+        if not result.finite:
+            item.failure = "the fit found no finite body; check focal length, image size and points"
+            continue
+        item.flags += result.doubts()
+        yield item, result
+
+
+def _refused(item: Item, body: ipt.BodyModel) -> bool:
+    """Whether too little is seen of an item; else its oddities become flags."""
+    assert item.seen is not None
+    names = detected.shared_names(body, item.seen)
+    seen = item.seen.select(names)
+    item.failure = detected.too_little(names, seen.confidence[0])
+    if item.failure is not None:
+        return True
+    assert seen.image_size is not None
+    item.flags += detected.oddities(names, seen.points[0], seen.confidence[0], seen.image_size[0])
+    return False
+
+
+def _presented(problem: Problem, settings: Settings) -> Problem:
+    """The problem with the pose that `--pose` names, if it names one."""
+    if settings.pose is None:
+        return problem
+    pose = torch.as_tensor(ip.body.poses.pose_of(problem.body.body, settings.pose), dtype=torch.float64)
+    return replace(problem, presented=Presented(pose[1:].expand(problem.num_bodies, -1, -1).clone()))
+
+
+def _started(problem: Problem, config: Config) -> tuple[Problem, dict[str, Any]]:
+    """The problem, its ground known where the camera moves around the body, and where the fit starts."""
+    options = start.options(config.start)
+    if config.start.get("search") == "camera":
+        problem = on_the_ground(problem, start.neutral(problem))
+        return problem, start.camera_around(problem, **options)
+    return problem, start.before_camera(problem, **options)

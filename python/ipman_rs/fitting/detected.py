@@ -1,0 +1,132 @@
+"""From what a detector saw to a problem: cameras from focal length and pitch, and what is odd about each person."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+import ipman_rs.torch as ipt
+from ipman_rs.checks import positive
+
+from .camera import Camera
+from .detections import Detections
+from .landmarks import Landmarks, known
+from .problem import Problem
+from .start import SEEN, level_camera
+
+FEWEST = 6  # points seen, below which a body is a guess
+FEET = (
+    "left_ankle",
+    "right_ankle",
+    "left_heel",
+    "right_heel",
+    "left_big_toe",
+    "right_big_toe",
+    "left_foot",
+    "right_foot",
+)
+
+
+def problem(
+    body: ipt.BodyModel,
+    detections: Detections,
+    *,
+    focal: float | None = None,
+    pitch: float = 0.0,
+    ground: float | None = None,
+    height: float | None = None,
+    mass: float | None = None,
+) -> Problem:
+    """The fit of each person of `detections`, a row each. ValueError without image sizes, or for numbers out of range.
+
+    `focal`: pixels, the image's diagonal if None. `pitch`: degrees by which the camera looks down, under 90 either way;
+    it stands at the world's origin. `ground`: height of the floor in the world (below the camera: negative), found by
+    the fit if None. `height` m and `mass` kg of the person.
+    """
+    if detections.image_size is None:
+        raise ValueError("image_size: expected width and height of the images, got none")
+    if not abs(pitch) < 90:
+        raise ValueError(f"pitch: expected more than -90 and less than 90 degrees, got {pitch}")
+    names = shared_names(body, detections)
+    seen = detections.select(names)
+    people = len(seen)
+    size = torch.from_numpy(np.asarray(detections.image_size, dtype=np.float64))
+
+    def each(name: str, value: float | None) -> Tensor | None:
+        return None if value is None else torch.full((people,), positive(name, value), dtype=torch.float64)
+
+    length = size.norm(dim=1) if focal is None else each("focal", focal)
+    assert length is not None
+    camera = Camera(
+        length[:, None].expand(people, 2).clone(),
+        size / 2,
+        level_camera(math.radians(pitch)).expand(people, 3, 3).clone(),
+        torch.zeros(people, 3, dtype=torch.float64),
+    )
+    return Problem(
+        body,
+        Landmarks(body, names),
+        camera,
+        None if ground is None else _floor(people, ground),
+        torch.from_numpy(seen.points),
+        torch.from_numpy(seen.confidence),
+        image_size=size,
+        height=each("height", height),
+        mass=each("mass", mass),
+    )
+
+
+def shared_names(body: ipt.BodyModel, detections: Detections) -> tuple[str, ...]:
+    """The detected points that the body has, too."""
+    there = set(known(body.body))
+    return tuple(name for name in detections.names if name in there)
+
+
+def _floor(people: int, height: float) -> ipt.Ground:
+    if not math.isfinite(height):
+        raise ValueError(f"ground: expected a height in metres, got {height}")
+    up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(people, 3)
+    return ipt.Ground(up, torch.full((people,), float(height), dtype=torch.float64))
+
+
+def too_little(names: Sequence[str], confidence: np.ndarray) -> str | None:
+    """Why a person with these confidences (K,) cannot be fitted, or None."""
+    count = int((confidence > SEEN).sum())
+    if count >= FEWEST:
+        return None
+    return (
+        f"only {count} of {len(names)} points were seen (confidence above {SEEN:g}); {FEWEST} are needed: "
+        "use an image that shows more of the person"
+    )
+
+
+def oddities(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, size: np.ndarray) -> list[str]:
+    """What a user should know of one person's points (K, 2): they may be wrong, or say little."""
+    where = {name: points[k] for k, name in enumerate(names) if confidence[k] > SEEN}
+    flags = []
+    hips, shoulders = _pair(where, "hip"), _pair(where, "shoulder")
+    if hips and shoulders:
+        down = (hips[0] + hips[1] - shoulders[0] - shoulders[1]) / 2
+        if down[1] < -abs(down[0]):
+            flags.append("upside-down: the shoulders are below the hips")
+        turns = [np.sign(left[0] - right[0]) for left, right in (hips, shoulders)]
+        crossed = min(abs(left[0] - right[0]) for left, right in (hips, shoulders)) > 0.1 * np.linalg.norm(down)
+        if crossed and turns[0] != turns[1]:
+            flags.append("left and right may be swapped: hips and shoulders face opposite ways")
+    if len(where) <= len(names) / 2:
+        flags.append(f"only {len(where)} of {len(names)} points were seen")
+    if not any(name in where for name in FEET):
+        flags.append("no foot was seen: the floor is a guess")
+    outside = sum(not ((point >= 0) & (point <= size)).all() for point in where.values())
+    if outside:
+        flags.append(f"{outside} points lie outside the image")
+    return flags
+
+
+def _pair(where: dict[str, np.ndarray], joint: str) -> list[np.ndarray]:
+    pair = [where.get(f"{side}_{joint}") for side in ("left", "right")]
+    return [point for point in pair if point is not None] if all(point is not None for point in pair) else []

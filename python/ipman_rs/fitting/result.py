@@ -1,0 +1,181 @@
+"""One fitted body out of a batch: its parameters as plain arrays, how its fit went, and how far it is to be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from ipman_rs.body import joints
+from ipman_rs.body.model import BodyModel
+from ipman_rs.plain import plain
+
+from .candidate import Candidate
+from .config import Config
+from .fit import CONVERGED, Fit, StageReport
+from .start import SEEN
+from .variables import BLOCKS, Variables
+
+Arrays = dict[str, NDArray[Any]]
+
+PHYSICS = ("stability", "balance", "ground")
+POOR = 5.0  # % of the person's height: a median error above it is flagged
+OFF = 0.05  # m: a body whose lowest point is further from the floor is flagged
+FAR = 99.0  # m from the camera: where the start gives up
+_LEFT = tuple(name for name in joints.SMPLH if name.startswith("left_") and name not in joints.BODY)
+_RIGHT = tuple(name for name in joints.SMPLH if name.startswith("right_") and name not in joints.BODY)
+# The names that the smplx package, and `ipman analyze`, give the pieces of a pose, by joints.
+_PIECES = {
+    "jaw_pose": ("jaw",),
+    "leye_pose": ("left_eye_smplhf",),
+    "reye_pose": ("right_eye_smplhf",),
+    "left_hand_pose": _LEFT,
+    "right_hand_pose": _RIGHT,
+}
+
+
+@dataclass(frozen=True)
+class Result:
+    """One fitted body, a candidate of one row; its variables before the physics terms (None: no stage has any); and how
+    each stage went, as plain values.
+    """
+
+    candidate: Candidate
+    before: Variables | None
+    stages: list[dict[str, Any]]
+    converged: bool
+
+    @property
+    def finite(self) -> bool:
+        return all(bool(self.candidate.variables[name].isfinite().all()) for name in BLOCKS)
+
+    def arrays(self) -> Arrays:
+        """What a parameter file holds, each with a leading axis of 1, but for names:
+
+        global_orient (1, 3), body_pose (1, 3n), betas (1, b), transl (1, 3) and hands, jaw and eyes where the body has
+        them; camera_rotation (1, 3, 3), camera_translation (1, 3), focal (1, 2), center (1, 2), image_size (1, 2);
+        ground_normal (1, 3), ground_height (1,); keypoints (1, K, 3), projected (1, K, 2), keypoint_names (K,);
+        model (). Parameters before the physics terms are named before_global_orient and so on.
+        """
+        problem, camera, body = self.candidate.problem, self.candidate.camera, self.candidate.problem.body.body
+        found = parameters(body, self.candidate.variables)
+        if self.before is not None:
+            found |= {f"before_{name}": value for name, value in parameters(body, self.before).items()}
+        found |= {
+            "camera_rotation": _array(camera.rotation),
+            "camera_translation": _array(camera.translation),
+            "focal": _array(camera.focal),
+            "center": _array(camera.center),
+            "projected": _array(self.candidate.projected),
+            "keypoint_names": np.array(problem.landmarks.names),
+            "model": np.array(body.name),
+        }
+        if problem.image_size is not None:
+            found["image_size"] = _array(problem.image_size)
+        if problem.points is not None and problem.confidence is not None:
+            found["keypoints"] = _array(torch.cat([problem.points, problem.confidence[..., None]], dim=-1))
+        if problem.ground is not None:
+            found["ground_normal"] = _array(problem.ground.normal.reshape(1, 3))
+            found["ground_height"] = _array(problem.ground.height.reshape(1))
+        return found
+
+    def record(self) -> dict[str, Any]:
+        """How the fit went: plain values for JSON. The reason is the last stage's that did not converge, if any."""
+        late = [stage for stage in self.stages if stage["reason"] not in CONVERGED] or self.stages
+        return {
+            "converged": self.converged,
+            "reason": late[-1]["reason"],
+            "iterations": sum(stage["iterations"] for stage in self.stages),
+            "reprojection": plain(self.reprojection()),
+            "stages": self.stages,
+        }
+
+    def reprojection(self) -> dict[str, float]:
+        """Errors of the points that were seen: their median in pixels, and in percent of the height of the whole fitted
+        body in the image."""
+        problem = self.candidate.problem
+        if problem.points is None or problem.confidence is None:
+            return {}
+        with torch.no_grad():
+            errors = (self.candidate.projected - problem.points).norm(dim=-1)[problem.confidence > SEEN]
+            image = self.candidate.camera.project(self.candidate.vertices.double())[0]
+        tall = max(float(image[:, 1].max() - image[:, 1].min()), 1e-9)
+        median = float(errors.median()) if len(errors) else float("nan")
+        return {"median_px": median, "median_percent": 100 * median / tall, "height_px": tall}
+
+    def doubts(self) -> list[str]:
+        """Why this body should be looked at before it is used."""
+        flags = []
+        errors = self.reprojection()
+        if errors and not errors["median_percent"] <= POOR:
+            flags.append(f"fits poorly: median error {errors['median_percent']:.1f} % of the person's height")
+        with torch.no_grad():
+            vertices = self.candidate.vertices.double()
+            depth = float(self.candidate.camera.see(vertices)[..., 2].mean())
+        if depth > FAR:
+            flags.append(f"{depth:.0f} m from the camera: check the focal length")
+        ground = self.candidate.problem.ground
+        if ground is not None:
+            height = float(ground.signed_height(vertices).min())
+            if abs(height) > OFF:
+                side = "above" if height > 0 else "below"
+                flags.append(f"its lowest point is {abs(height):.2f} m {side} the floor")
+        return flags
+
+
+def results(fit: Fit, config: Config, start: Variables) -> list[Result]:
+    """The bodies of a fit that began with `start`, one by one."""
+    before = _before_physics(fit, config, start)
+    converged = fit.converged
+    return [
+        Result(
+            Candidate(fit.problem.rows(torch.tensor([row])), _row(fit.variables, row)),
+            None if before is None else _row(before, row),
+            [_stage(stage, row) for stage in fit.stages],
+            bool(converged[row]),
+        )
+        for row in range(fit.problem.num_bodies)
+    ]
+
+
+def parameters(body: BodyModel, variables: Variables) -> Arrays:
+    """SMPL's names for the pose, shape and place of one body."""
+    pose = _array(torch.cat([variables["orient"][:, None], variables["pose"]], dim=1))[0]
+    found: Arrays = {name: pose[columns].reshape(1, -1) for name, columns in joints_of(body).items()}
+    return {**found, "betas": _array(variables["betas"]), "transl": _array(variables["transl"])}
+
+
+def joints_of(body: BodyModel) -> dict[str, list[int]]:
+    """The joints of each piece of a stored pose that the body has."""
+    column = {name: index for index, name in enumerate(body.joint_names)}
+    whole = joints.SMPL if set(joints.SMPL) <= set(column) else joints.BODY
+    pieces = {"global_orient": joints.BODY[:1], "body_pose": whole[1:], **_PIECES}
+    return {name: [column[joint] for joint in piece] for name, piece in pieces.items() if set(piece) <= set(column)}
+
+
+def _before_physics(fit: Fit, config: Config, start: Variables) -> Variables | None:
+    """Variables with which the first stage with physics terms began."""
+    for number, stage in enumerate(config.stages):
+        if any(stage.weights.get(term, 0) > 0 for term in PHYSICS):
+            return start if number == 0 else fit.stages[number - 1].variables
+    return None
+
+
+def _stage(stage: StageReport, row: int) -> dict[str, Any]:
+    terms = {name: plain(cost[row]) for name, cost in stage.terms.items()}
+    told = {"name": stage.name, "reason": stage.reasons[row], "iterations": stage.iterations[row], "terms": terms}
+    if stage.trace is not None:
+        told["trace"] = {name: plain(costs) for name, costs in stage.trace[row].items()}
+    return told
+
+
+def _row(variables: Variables, row: int) -> dict[str, Tensor]:
+    return {name: value[row : row + 1] for name, value in variables.items()}
+
+
+def _array(value: Tensor) -> NDArray[Any]:
+    return value.detach().numpy().copy()

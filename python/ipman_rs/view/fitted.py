@@ -1,0 +1,149 @@
+"""Pictures of a fitted body: over its photo, from the side, and before and after the physics terms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import colors
+from .camera import Camera
+from .picture import camera_on, draw_body, draw_picture, heat_top, new_page, save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .study import Study
+
+LONGEST = 1200  # pixels of the longer edge of the overlay
+_STRIP = 64  # pixels of its legend
+_NARROWEST = 760  # room for the legend
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a study of a fitted body knows more: its camera, its keypoints, the body before the physics terms.
+
+    `camera` in pixels of the photo, whose width and height are `size`; `photo` its pixels (h, w, 3) uint8; `seen`
+    (K, 3) x, y and confidence of the points that were detected, `projected` (K, 2) where the fitted body has them;
+    `before` a study of one frame; `record` is shown in `report.json`.
+    """
+
+    camera: Camera
+    size: tuple[float, float]
+    seen: np.ndarray
+    projected: np.ndarray
+    photo: np.ndarray | None = None
+    before: Study | None = None
+    pictured: bool = True
+    record: dict[str, Any] = field(default_factory=dict)
+
+    def pictures(self) -> tuple[tuple[str, str], ...]:
+        """File names of the pictures that the page shows, and their titles. The side view is half of the pair."""
+        if not self.pictured:
+            return ()
+        over = "Over the photo" if self.photo is not None else "Over the keypoints"
+        side = ("side.png", "From the side")
+        if self.before is not None:
+            side = ("before_after.png", "Before and after the physics terms, from the side")
+        return ("overlay.png", over), side, ("floor.png", "The floor from above")
+
+
+def camera_of(rotation: np.ndarray, translation: np.ndarray, focal: np.ndarray, center: np.ndarray) -> Camera:
+    """The picture's camera of extrinsics R, t (x right, y down, z forward) and pixels."""
+    axes = rotation * np.array([[1.0], [-1.0], [-1.0]])
+    (fx, fy), (cx, cy) = focal, center
+    return Camera(-rotation.T @ translation, axes, (float(fx), float(fy)), (float(cx), float(cy)))
+
+
+def draw_fitted(study: Study, folder: Path) -> Iterator[str]:
+    """Write the pictures that only fitted bodies have; yields their names."""
+    fitted = study.fitted
+    if fitted is None or not fitted.pictured:
+        return
+    draw_overlay(study, folder / "overlay.png")
+    yield "overlay.png"
+    bodies = [study.vertices[0]] if fitted.before is None else [fitted.before.vertices[0], study.vertices[0]]
+    bodies = [np.asarray(body, dtype=np.float64) for body in bodies]
+    camera = camera_on(bodies, study, turn=90.0, tilt=4.0)
+    after = study if fitted.before is None else replace(study, name="After the physics terms")
+    draw_picture(after, 0, folder / "side.png", camera)
+    yield "side.png"
+    if fitted.before is not None:
+        write_beside(fitted.before, folder / "side.png", camera, folder / "before_after.png")
+        yield "before_after.png"
+
+
+def draw_overlay(study: Study, path: Path) -> None:
+    """The body in the photo, or on white, with the points that were detected and those that were fitted."""
+    fitted = study.fitted
+    assert fitted is not None
+    scale = LONGEST / max(fitted.size)
+    width, height = (max(round(side * scale), 1) for side in fitted.size)
+    page_width = max(width, _NARROWEST)
+    figure, page = new_page(page_width, height + _STRIP)
+    left = (page_width - width) / 2
+    axes = figure.add_axes(
+        (left / page_width, _STRIP / (height + _STRIP), width / page_width, height / (height + _STRIP))
+    )
+    axes.set(xticks=[], yticks=[])
+    for side in axes.spines.values():
+        side.set_color(colors.GRID)
+    extent = (0, width, height, 0)
+    if fitted.photo is not None:
+        axes.imshow(fitted.photo, extent=extent, zorder=0, interpolation="bilinear", aspect="auto")
+    body = np.asarray(study.vertices[0], dtype=np.float64)
+    fx, fy = np.broadcast_to(fitted.camera.focal, 2) * scale
+    cx, cy = np.asarray(fitted.camera.center) * scale
+    camera = replace(fitted.camera, focal=(fx, fy), center=(cx, cy))
+    if _in_front(camera, body):
+        opacity = 0.72 if fitted.photo is not None else 1.0
+        draw_body(axes, camera, study, body, heat_top(study), (width, height), opacity)
+    _draw_points(axes, fitted, scale)
+    axes.set(xlim=(0, width), ylim=(height, 0))
+    _write_strip(page, fitted, height, page_width)
+    save(figure, path)
+
+
+def _in_front(camera: Camera, body: np.ndarray) -> bool:
+    depth = (camera.eye - body) @ camera.axes[2]
+    return bool(np.isfinite(body).all() and (depth > 1e-3).all())
+
+
+def _draw_points(axes: Axes, fitted: Fitted, scale: float) -> None:
+    """Detected points as rings, the surer the stronger, each with a line to its fitted point."""
+    for (x, y, confidence), (u, v) in zip(fitted.seen, fitted.projected, strict=True):
+        if confidence <= 0:
+            continue
+        ends = np.array([[x, y], [u, v]]) * scale
+        axes.plot(*ends.T, color="white", linewidth=3.2, alpha=0.8, zorder=4)
+        axes.plot(*ends.T, color=colors.INK, linewidth=1.4, zorder=4.1)
+        ring = {"markerfacecolor": "none", "markeredgecolor": colors.COP, "markeredgewidth": 2.4}
+        axes.plot(*ends[0], "o", markersize=9, alpha=0.25 + 0.75 * float(confidence), zorder=4.2, **ring)
+        axes.plot(*ends[1], "o", markersize=4.5, color=colors.COM, zorder=4.3)
+
+
+def _write_strip(page: Axes, fitted: Fitted, top: int, width: int) -> None:
+    y = top + _STRIP / 2
+    page.plot(30, y, "o", markersize=9, markerfacecolor="none", markeredgecolor=colors.COP, markeredgewidth=2.4)
+    page.text(44, y, "detected", size=13, color=colors.INK, va="center")
+    page.plot(150, y, "o", markersize=5, color=colors.COM)
+    page.text(162, y, "fitted", size=13, color=colors.INK, va="center")
+    error = fitted.record.get("reprojection", {})
+    if error:
+        text = f"median {error['median_px']:.1f} px, {error['median_percent']:.1f} % of the person's height"
+        page.text(width - 24, y, text, size=13, color=colors.MUTED, va="center", ha="right")
+
+
+def write_beside(before: Study, after: Path, camera: Camera, path: Path) -> None:
+    """The picture `after` with another body, seen by the same camera, on its left."""
+    from matplotlib.image import imread, imsave
+
+    stream = BytesIO()
+    draw_picture(before, 0, stream, camera)
+    stream.seek(0)
+    imsave(path, np.hstack([imread(stream), imread(after)]))

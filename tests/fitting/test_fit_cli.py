@@ -1,0 +1,270 @@
+"""`ipman fit` on keypoints of bodies whose poses are known, and on inputs that are not what they should be."""
+
+from __future__ import annotations
+
+import json
+import math
+from types import SimpleNamespace
+
+import keypoint_files as files
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import ipman_rs as ip
+from ipman_rs.cli import main
+
+
+@pytest.fixture(scope="module")
+def standing():
+    return files.seen("standing")
+
+
+@pytest.fixture
+def fit(tmp_path):
+    """`fit(path, ...)` into tmp_path/out with a preset of few iterations: exit code, stdout, stderr, and the report."""
+    (tmp_path / "quick.yaml").write_text(files.QUICK)
+    out = tmp_path / "out"
+
+    def call(*arguments, preset=tmp_path / "quick.yaml", pictures=0):
+        words = ["fit", *map(str, arguments), "-o", str(out), "--preset", str(preset), "--pictures", str(pictures)]
+        result = CliRunner().invoke(main, words)
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        page = out / "report.json"
+        report = json.loads(page.read_text()) if page.is_file() else {"bodies": [], "failures": []}
+        flags = {body["name"]: body["fit"]["flags"] for body in report["bodies"]}
+        return SimpleNamespace(
+            code=result.exit_code, out=result.stdout, err=result.stderr, folder=out, report=report, flags=flags
+        )
+
+    return call
+
+
+def arrays(path):
+    with np.load(path, allow_pickle=False) as stored:
+        return dict(stored)
+
+
+def test_a_standing_body(fit, tmp_path, standing):
+    said = fit(files.write(tmp_path / "anna.json", standing), preset="fast", pictures=1)
+    assert said.code == 0, said.err
+    assert sorted(path.name for path in (said.folder / "anna").iterdir()) == [
+        "anna.glb", "anna.npz", "before_after.png", "fit.json", "floor.png", "overlay.png", "report.npz", "side.png",
+    ]  # fmt: skip
+    (body,) = said.report["bodies"]
+    # The points are the body's own, but priors pull at them.
+    assert body["fit"]["reprojection"]["median_percent"] < 1.0
+    assert body["fit"]["flags"] == []
+    assert [stage["name"] for stage in body["fit"]["stages"]] == ["pose", "physics"]
+    frame = body["frames"][0]
+    assert frame["inside"]
+    assert abs(frame["lowest"]) < 0.02
+    page = (said.folder / "report.html").read_text()
+    assert page.count("data:image/jpeg;base64,") == 3
+
+
+def test_terms_by_iteration_end_with_the_terms(fit, tmp_path, standing):
+    fit(files.write(tmp_path / "anna.json", standing))
+    record = json.loads((tmp_path / "out" / "anna" / "fit.json").read_text())
+    for stage in record["stages"]:
+        assert {name: costs[-1] for name, costs in stage["trace"].items()} == pytest.approx(stage["terms"], rel=1e-12)
+        total = np.sum(list(stage["trace"].values()), axis=0)
+        assert (np.diff(total) < 0).all()
+
+
+def test_parameters_are_those_of_the_mesh(fit, tmp_path, standing):
+    import trimesh
+
+    folder = fit(files.write(tmp_path / "anna.json", standing), "--obj").folder / "anna"
+    stored = arrays(folder / "anna.npz")
+    assert stored["global_orient"].shape == (1, 3)
+    assert stored["body_pose"].shape == (1, 69)
+    body = ip.load_body(str(stored["model"]))
+    pose = np.concatenate([stored["global_orient"], stored["body_pose"]], axis=1).reshape(-1, 3)
+    vertices = body(pose, stored["betas"][0], stored["transl"][0]).vertices
+    for ending in ("obj", "glb"):
+        mesh = trimesh.load(folder / f"anna.{ending}", process=False, force="mesh")
+        # .obj is written with 8 digits, .glb in single precision
+        np.testing.assert_allclose(mesh.vertices, vertices, atol=1e-6)
+    points = vertices @ stored["camera_rotation"][0].T + stored["camera_translation"][0]
+    assert (points[:, 2] > 1).all()
+    pixels = stored["focal"][0] * points[:, :2] / points[:, 2:] + stored["center"][0]
+    shown = stored["keypoints"][0]
+    assert (pixels.min(axis=0) - 20 < shown[:, :2].min(axis=0)).all()
+    assert (pixels.max(axis=0) + 20 > shown[:, :2].max(axis=0)).all()
+
+
+def test_analyze_reads_the_parameters(fit, tmp_path, standing):
+    said = fit(files.write(tmp_path / "anna.json", standing))
+    result = CliRunner().invoke(main, ["analyze", str(said.folder / "anna" / "anna.npz"), "--json"])
+    assert result.exit_code == 0, result.stderr
+    (again,) = json.loads(result.stdout)["bodies"]
+    assert again["template"]["vertices"] == 1229
+    assert again["frames"][0]["volume"] == pytest.approx(said.report["bodies"][0]["frames"][0]["volume"], rel=1e-5)
+
+
+def test_bad_items_leave_the_others_as_they_are(fit, tmp_path, standing):
+    alone = fit(files.write(tmp_path / "good.json", standing))
+    expected = (alone.folder / "good" / "good.npz").read_bytes()
+    folder = tmp_path / "inputs"
+    folder.mkdir()
+    files.write(folder / "good.json", standing)
+    files.write(folder / "nan.json", np.where(np.arange(33)[:, None] == 3, np.nan, standing))
+    files.write(folder / "zero.json", standing * [1, 1, 1, 0])
+    files.write(folder / "nobody.json", np.zeros((0, 4)))
+    files.write(folder / "few.json", np.where(np.arange(33)[:, None] < 29, standing * [1, 1, 1, 0], standing))
+    (folder / "corrupt.json").write_text('{"landmarks": [[0.1,')
+    (folder / "other.json").write_text("[1, 2]")
+    (folder / "pixel.png").write_bytes(one_pixel())
+    files.write(folder / "turned.json", np.column_stack([standing[:, 0], 1 - standing[:, 1], standing[:, 2:]]))
+
+    said = fit(folder)
+    assert said.code == 1
+    assert (said.folder / "good" / "good.npz").read_bytes() == expected
+    failures = {entry["file"].rsplit("/", 1)[1].split(".")[0]: entry["error"] for entry in said.report["failures"]}
+    assert sorted(failures) == ["corrupt", "few", "nan", "nobody", "other", "pixel", "zero"]
+    assert "expected finite numbers" in failures["nan"]
+    assert "confidence above 0" in failures["zero"]
+    assert "expected a person" in failures["nobody"]
+    assert "only 4 of" in failures["few"]
+    assert "expected JSON" in failures["corrupt"]
+    assert "one of the formats" in failures["other"]
+    assert "at least 32" in failures["pixel"] or "ipman_rs[photo]" in failures["pixel"]
+    assert any("upside-down" in flag for flag in said.flags["turned"])
+    for name in failures:
+        assert name in said.err
+
+
+def one_pixel() -> bytes:
+    import io
+
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.new("RGB", (1, 1)).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def test_when_all_fail_there_is_no_report(fit, tmp_path):
+    (tmp_path / "corrupt.json").write_text("{")
+    said = fit(tmp_path / "corrupt.json", tmp_path / "absent.json")
+    assert said.code == 1
+    assert "expected JSON" in said.err
+    assert "there is no such file" in said.err
+    assert not said.report["bodies"]
+
+
+def test_left_and_right_swapped(fit, tmp_path, standing):
+    swapped = standing.copy()
+    swapped[[11, 12]] = standing[[12, 11]]  # the shoulders alone
+    said = fit(files.write(tmp_path / "swapped.json", swapped))
+    assert any("swapped" in flag for flag in said.flags["swapped"])
+
+
+def test_half_of_the_points(fit, tmp_path, standing):
+    half = standing.copy()
+    half[23:, 3] = 0  # nothing below the hips
+    said = fit(files.write(tmp_path / "half.json", half))
+    assert said.code == 0
+    assert any("no foot was seen" in flag for flag in said.flags["half"])
+
+
+@pytest.mark.parametrize("option", [("--ground", "3"), ("--focal", "1e9")])
+def test_scenes_that_cannot_be(fit, tmp_path, standing, option):
+    """A floor above the body, and a camera kilometres away: a body, finite, and a word of warning."""
+    said = fit(files.write(tmp_path / "anna.json", standing), *option)
+    assert said.code == 0, said.err
+    assert said.flags["anna"]
+    stored = arrays(said.folder / "anna" / "anna.npz")
+    assert all(np.isfinite(value).all() for value in stored.values() if value.dtype.kind == "f")
+
+
+def test_image_of_one_pixel(fit, tmp_path, standing):
+    said = fit(files.write(tmp_path / "tiny.json", standing, (1, 1)), pictures=1)
+    assert said.code == 0
+    assert (said.folder / "tiny" / "overlay.png").is_file()
+
+
+def test_resume(fit, tmp_path, standing):
+    files.write(tmp_path / "a.json", standing)
+    files.write(tmp_path / "b.json", files.seen("tree"))
+    inputs = (tmp_path / "a.json", tmp_path / "b.json", "--resume")
+    first = fit(*inputs)
+    kept = {name: first.folder / name / f"{name}.npz" for name in "ab"}
+    content = {name: path.read_bytes() for name, path in kept.items()}
+    stamps = {name: path.stat().st_mtime_ns for name, path in kept.items()}
+
+    assert {name: body["fit"]["stages"] for name, body in bodies(fit(*inputs)).items()} == {
+        name: body["fit"]["stages"] for name, body in bodies(first).items()
+    }
+    assert {name: path.stat().st_mtime_ns for name, path in kept.items()} == stamps
+
+    (first.folder / "b" / "b.glb").unlink()
+    fit(*inputs)
+    assert kept["a"].stat().st_mtime_ns == stamps["a"]
+    assert kept["b"].stat().st_mtime_ns != stamps["b"]
+    assert kept["b"].read_bytes() == content["b"]
+    assert (first.folder / "b" / "b.glb").is_file()
+
+    fit(*inputs, "--focal", "900")  # other options: nothing is kept
+    assert kept["a"].stat().st_mtime_ns != stamps["a"]
+
+
+def bodies(said):
+    return {body["name"]: body for body in said.report["bodies"]}
+
+
+def test_equal_names_get_folders_of_their_own(fit, tmp_path, standing):
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        files.write(tmp_path / name / "anna.json", standing)
+    said = fit(tmp_path / "one", tmp_path / "two" / "anna.json")
+    assert [body["name"] for body in said.report["bodies"]] == ["anna", "anna_2"]
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--preset", "nonsense"), "expected one of"),
+        (("--preset", "balanced"), "name it with --pose"),
+        (("--preset", "balanced", "--pose", "standing"), "give --height or --mass"),
+        (("--body", "nobody"), "nobody"),
+        (("--camera-pitch", "95"), "pitch"),
+        (("--focal", "-1"), "focal"),
+        (("--focal", "nan"), "focal"),
+        (("--height", "0"), "height"),
+        (("--ground", "floor"), "neither a height in metres nor found"),
+        (("--image-size", "wide"), "1920x1080"),
+        (("--image", "absent.png"), "absent.png"),
+        (("--pose", "nonsense"), "no pose 'nonsense'"),
+    ],
+)
+def test_wrong_usage(tmp_path, standing, options, says):
+    path = files.write(tmp_path / "anna.json", standing)
+    words = ["fit", str(path), "-o", str(tmp_path / "out"), *options]
+    result = CliRunner().invoke(main, words)
+    assert result.exit_code == (1 if "--image" in options else 2), result.output
+    assert says in result.stderr
+
+
+def test_a_file_without_image_size(fit, tmp_path, standing):
+    people = {"people": [{"pose_keypoints_2d": np.tile([100.0, 100.0, 1.0], 25).tolist()}]}
+    (tmp_path / "open.json").write_text(json.dumps(people))
+    said = fit(tmp_path / "open.json")
+    assert said.code == 1
+    assert "--image-size" in said.err
+
+
+def test_without_torch(tmp_path, standing, monkeypatch):
+    from ipman_rs.cli import fit as command
+
+    monkeypatch.setattr(command.importlib.util, "find_spec", lambda name: None if name == "torch" else object())
+    result = CliRunner().invoke(main, ["fit", "x.json", "-o", str(tmp_path)])
+    assert result.exit_code == 1
+    assert "pip install 'ipman_rs[fit]'" in result.stderr
+
+
+def test_focal_length_is_the_diagonal(fit, tmp_path, standing):
+    said = fit(files.write(tmp_path / "anna.json", standing))
+    assert arrays(said.folder / "anna" / "anna.npz")["focal"][0] == pytest.approx([math.hypot(*files.SIZE)] * 2)
