@@ -12,9 +12,11 @@ torch = pytest.importorskip("torch", reason="torch is an extra")
 from fit_terms_cases import body_model  # noqa: E402
 
 from ipman_rs.fitting import recorded, sequence, start  # noqa: E402
+from ipman_rs.fitting.camera import Camera  # noqa: E402
 from ipman_rs.fitting.candidate import Candidate  # noqa: E402
 from ipman_rs.fitting.config import load  # noqa: E402
 from ipman_rs.fitting.markers import Tracks  # noqa: E402
+from ipman_rs.fitting.rotations import vector  # noqa: E402
 from ipman_rs.fitting.solvers import Look  # noqa: E402
 from ipman_rs.fitting.solvers.arrow import Arrow, solve  # noqa: E402
 from ipman_rs.fitting.terms.smoothness import Smoothness  # noqa: E402
@@ -227,3 +229,32 @@ def test_key_frames_come_first():
     assert steps == [[(7, 4)], [(1, 4)], [(0, 1), (2, 1), (3, 4), (5, 4), (6, 7), (8, 7), (9, 7)]]
     assert list(sequence.rounds(0, 3, 1)) == [[(1, 0)], [(2, 1)]]
     assert list(sequence.rounds(0, 1, 1)) == []
+
+
+def test_a_film_with_a_ground_that_is_found():
+    """2D points, terms that look at the mesh, and a free focal length."""
+    frames = 3
+    known, truth = recording(frames, noise=0)
+    truth["orient"][:, 1] -= 2.8  # faces the camera
+    truth["transl"][:, 0] *= 0.2
+    truth["transl"][:, 2] = -4.0
+    truth["transl"][:, 1] = -1.0
+    size = torch.full((frames, 2), 640.0, dtype=torch.float64)
+    camera = Camera(size * 1.4, size / 2, start.level_camera().repeat(frames, 1, 1), truth["transl"] * 0)
+    truth |= {"camera_orient": vector(camera.rotation), "camera_transl": camera.translation}
+    film = replace(known, camera=camera, ground=None, points_3d=None, confidence_3d=None, image_size=size)
+    points = Candidate(film, truth).projected
+    film = replace(film, points=points, confidence=torch.ones_like(points[..., 0]))
+    config = load("fast")
+    stages = tuple(replace(stage, free=(*stage.free, "log_focal")) for stage in config.stages)
+    found = sequence.fit_sequence(film, start.before_camera(film), replace(config, stages=stages), smoothness=1.0)
+    heights = found.problem.ground.height
+    assert torch.equal(heights, heights[:1].expand(frames))
+    assert found.problem.static.all()
+    lowest = found.candidate.vertices[..., 1].amin(dim=1)
+    assert (lowest - heights).abs().max() < 0.03
+    focal = found.variables["log_focal"]
+    assert torch.equal(focal, focal[:1].expand(frames, 2))
+    assert focal.any()
+    away = (found.candidate.projected - points).norm(dim=-1)
+    assert away.median() < 4.0  # pixels, of a person of some 370

@@ -180,8 +180,10 @@ class Together:
         with torch.no_grad():
             costs = self.objective.costs(self.objective.candidate(rows))
         reasons = [outcome.reason if sound else "not finite" for sound in self.sound]
-        ended, variables = {name: cost.numpy() for name, cost in costs.items()}, unpack(rows, self.free, self.variables)
-        return variables, StageReport(self.stage.name, reasons, [outcome.iterations] * self.frames, ended, variables)
+        iterations = [outcome.iterations] * self.frames
+        ended = {name: cost.numpy() for name, cost in costs.items()}
+        variables = unpack(rows, self.free, self.variables)
+        return variables, StageReport(self.stage.name, reasons, iterations, ended, variables)
 
     def rows(self, point: np.ndarray) -> np.ndarray:
         """(T, P), the shared numbers in every row."""
