@@ -2,8 +2,10 @@
 //!
 //! A small turn φ of joint j, about its place c_j, moves what hangs on it:
 //!
-//!     δ vertex = φ × Σ_i w_i (y_i − c_j) over the joints i that j carries, y_i = turned_i · rest + offset_i
-//!     δ joint  = φ × (c − c_j)
+//! ```text
+//! δ vertex = φ × Σ_i w_i (y_i − c_j) over the joints i that j carries, y_i = turned_i · rest + offset_i
+//! δ joint  = φ × (c − c_j)
+//! ```
 //!
 //! and φ = (world rotation of j's parent) · vee(dR Rᵀ) for a change dR of j's own rotation R. Double precision.
 
