@@ -156,6 +156,7 @@ def _write_csv(found: Found, path: Path) -> None:
 
 def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:
     """Differences against the baseline with their intervals."""
+    import matplotlib
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 1 + 1.6 * len(blocks)), layout="constrained")
@@ -174,4 +175,5 @@ def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:
     for key, axis in zip(DIFFERENCES, axes[-1], strict=True):
         unit = "points" if "BoSE" in key else "mm"
         axis.set_xlabel(f"{key} against the baseline, {unit}", fontsize=9)
-    figure.savefig(path, metadata={"Date": None})
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}):
+        figure.savefig(path, metadata={"Date": None})
