@@ -16,7 +16,7 @@ from ..fit import Fit
 from .settings import Task
 from .truth import Truth
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,7 +65,8 @@ def figures(fit: Fit, task: Task, truth: Truth) -> Figures:
         pa_mpjpe(skeleton, true_skeleton),
         pve(vertices, true_vertices, skeleton[:, 0], true_skeleton[:, 0]),
         pve(world, truth.surface),
-        *margins,
+        margins[0],
+        margins[1],
         heights.amin(dim=1).numpy(),
         (resting.amax(dim=1) - resting.amin(dim=1)).double().numpy() / truth.height,
         fit.converged.astype(float),

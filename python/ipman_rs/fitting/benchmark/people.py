@@ -22,7 +22,7 @@ from scipy.sparse import csr_array, diags_array
 
 from ipman_rs.body import BodyModel, load_body
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 Draw = np.random.Generator
 
 BETAS, LARGEST_BETA = 0.7, 1.5
@@ -109,7 +109,7 @@ def reweighted(model: BodyModel, draw: Draw) -> Array:
     for _ in range(draw.integers(PASSES + 1)):
         weights = neighbours @ weights
     weights = weights ** draw.uniform(*POWERS)
-    return weights / weights.sum(axis=1, keepdims=True)
+    return weights / np.sum(weights, axis=1, keepdims=True)
 
 
 def neighbourhood(model: BodyModel) -> csr_array:
@@ -118,4 +118,4 @@ def neighbourhood(model: BodyModel) -> csr_array:
     edges = np.concatenate([edges, edges[:, ::-1], np.tile(np.arange(model.num_vertices), (2, 1)).T])
     linked = csr_array((np.ones(len(edges)), edges.T), shape=(model.num_vertices,) * 2)
     linked.data[:] = 1.0  # an edge counts once, though two faces have it
-    return diags_array(1 / linked.sum(axis=1)) @ linked
+    return diags_array(1 / (linked @ np.ones(model.num_vertices))) @ linked

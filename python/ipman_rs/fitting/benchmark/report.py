@@ -20,7 +20,7 @@ from .measure import Figures
 from .run import Benchmark, Block, Result
 from .truth import Truth, floors
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 Found = Sequence[tuple[Block, Truth, Sequence[Result]]]
 
 NAME = "fitting_benchmark"
@@ -67,6 +67,7 @@ def columns(figures: Figures, baseline: Figures) -> dict[str, Array]:
 
 def _record(block: Block, truth: Truth, results: Sequence[Result]) -> dict[str, Any]:
     """Means and intervals, whole and by family."""
+    families = list(dict.fromkeys(truth.family.tolist()))
     by_name = {result.row.name: columns(result.figures, results[0].figures) for result in results}
     baseline, bare = by_name[results[0].row.name], by_name["ours without physics"]
     rows = []
@@ -84,17 +85,18 @@ def _record(block: Block, truth: Truth, results: Sequence[Result]) -> dict[str, 
                 "against baseline": _differences(own, baseline),
                 "against ours without physics": _differences(own, bare),
                 "families": {
-                    family: {key: float(own[key][truth.family == family].mean()) for key in ("PVE", *DIFFERENCES)}
-                    | {"difference": paired(*(each["PVE"][truth.family == family] for each in (own, baseline)))}
-                    for family in dict.fromkeys(truth.family.tolist())
+                    family: {key: float(own[key][truth.family == family].mean()) for key in DIFFERENCES}
+                    | {
+                        "difference": paired(
+                            own["PVE"][truth.family == family], baseline["PVE"][truth.family == family]
+                        )
+                    }
+                    for family in families
                 },
             }
         )
     true = {f"BoSE {cm} cm": float(100 * (margin >= 0).mean()) for cm, margin in _margins(truth).items()}
-    true_of = {
-        family: float(100 * (truth.margin_3[truth.family == family] >= 0).mean())
-        for family in dict.fromkeys(truth.family.tolist())
-    }
+    true_of = {family: float(100 * (truth.margin_3[truth.family == family] >= 0).mean()) for family in families}
     return {
         "name": block.name,
         "kind": block.kind,

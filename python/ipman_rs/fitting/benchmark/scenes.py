@@ -20,7 +20,7 @@ from ipman_rs.body import BodyModel, load_body, poses
 
 from .people import Draw, person
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 FAMILIES: dict[str, tuple[str, ...]] = {
     "standing": ("standing", "a_pose", "t_pose", "walking"),
@@ -130,7 +130,7 @@ def to_rest(vertices: Array, com: Array) -> Rotation | None:
 def over(point: Array, triangle: Array, normal: Array) -> bool:
     """Whether a point lies over a triangle, seen along its normal."""
     sides = [normal @ np.cross(triangle[(i + 1) % 3] - triangle[i], point - triangle[i]) for i in range(3)]
-    return min(sides) >= 0 or max(sides) <= 0
+    return bool(min(sides) >= 0 or max(sides) <= 0)
 
 
 def disturbed(scene: Scene, kind: str, draw: Draw) -> Scene:

@@ -29,7 +29,7 @@ from ..landmarks import Landmarks, known
 from ..problem import Presented, Problem
 from .truth import FITTED, Truth
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 SIZE = 1000.0  # pixels, width and height of the image
 NOISE, OUTLIERS, FAR, DROPPED = 0.01, 1 / 30, 0.05, 0.1
@@ -101,7 +101,7 @@ def cameras(truth: Truth, draw: np.random.Generator) -> Camera:
     place = middle + distance[:, None] * np.stack([np.sin(heading), np.zeros(count), np.cos(heading)], axis=1)
     place[:, 1] = draw.uniform(*CAMERA_HEIGHT, count)
     rotation = _looking(middle - place, np.radians(ROLL) * draw.standard_normal(count))
-    focal = SIZE * np.exp(draw.uniform(*np.log(FOCAL), count))
+    focal = SIZE * np.exp(draw.uniform(math.log(FOCAL[0]), math.log(FOCAL[1]), count))
     translation = -(rotation * place[:, None]).sum(axis=2)
     arrays = (np.stack([focal, focal], axis=1), np.full((count, 2), SIZE / 2), rotation, translation)
     return Camera(*map(torch.from_numpy, arrays))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from trimesh.triangles import closest_point, points_to_barycentric
 
 import ipman_rs as ip
@@ -20,7 +20,7 @@ from ipman_rs.body import BodyModel, load_body
 from ..landmarks import Landmarks, known
 from .scenes import Scene
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 FITTED = "anny-lite"  # the body that is fitted
 NEAREST = 8  # vertices whose faces are tried for the nearest point
@@ -92,7 +92,7 @@ def correspondence() -> tuple[NDArray[np.int64], Array]:
     """Vertices of `anny` (V, 3) and their weights (V, 3): the points of its resting mean surface that are nearest to
     the fitted body's vertices."""
     full, lite = load_body("anny"), load_body(FITTED)
-    near = cKDTree(full.v_template).query(lite.v_template, NEAREST)[1]
+    near = np.asarray(KDTree(full.v_template).query(lite.v_template, NEAREST)[1])
     corners, weights = [], []
     for point, vertices in zip(lite.v_template, near, strict=True):
         faces = full.faces[np.isin(full.faces, vertices).any(axis=1)]
