@@ -180,6 +180,7 @@ def test_physics_is_the_cores():
     pull, push = ipt.ground_loss(body.vertices, template, floor)
     torch.testing.assert_close(Stability(problem).cost(body), stability, rtol=1e-12, atol=0)
     torch.testing.assert_close(Ground(problem).cost(body), pull + push, rtol=1e-12, atol=0)
+    torch.testing.assert_close(Ground(problem, pull=0.3).cost(body), 0.3 * pull + push, rtol=1e-12, atol=0)
     balance = ipt.balance_cost(body.vertices, template, floor)
     torch.testing.assert_close(Balance(problem).cost(body), balance, rtol=1e-9, atol=1e-12)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 
 def pve(estimated: ArrayLike, true: ArrayLike, root: ArrayLike | None = None, true_root: ArrayLike | None = None):

@@ -46,9 +46,9 @@ def figures(fit: Fit, task: Task, truth: Truth) -> Figures:
         surface, joints = posed.vertices.double(), posed.joints.double()
         ground = fit.problem.ground
         assert ground is not None
-        margin_10, margin_3 = (
+        margins = [
             ipt.support_margin(surface, body.template, ground, threshold, "exact").numpy() for threshold in (0.10, 0.03)
-        )
+        ]
         heights = ground.signed_height(surface)
         resting = body(betas=fit.variables["betas"].to(body.dtype)).vertices[..., 1]
     seen = surface.numpy(), joints.numpy(), truth.surface, truth.joints
@@ -65,8 +65,8 @@ def figures(fit: Fit, task: Task, truth: Truth) -> Figures:
         pa_mpjpe(skeleton, true_skeleton),
         pve(vertices, true_vertices, skeleton[:, 0], true_skeleton[:, 0]),
         pve(world, truth.surface),
-        margin_10,
-        margin_3,
+        margins[0],
+        margins[1],
         heights.amin(dim=1).numpy(),
         (resting.amax(dim=1) - resting.amin(dim=1)).double().numpy() / truth.height,
         fit.converged.astype(float),

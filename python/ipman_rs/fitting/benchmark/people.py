@@ -108,8 +108,8 @@ def reweighted(model: BodyModel, draw: Draw) -> Array:
     weights = model.weights
     for _ in range(draw.integers(PASSES + 1)):
         weights = neighbours @ weights
-    weights = np.asarray(weights) ** draw.uniform(*POWERS)
-    return weights / weights.sum(axis=1, keepdims=True)
+    weights = weights ** draw.uniform(*POWERS)
+    return weights / np.sum(weights, axis=1, keepdims=True)
 
 
 def neighbourhood(model: BodyModel) -> csr_array:
@@ -118,4 +118,4 @@ def neighbourhood(model: BodyModel) -> csr_array:
     edges = np.concatenate([edges, edges[:, ::-1], np.tile(np.arange(model.num_vertices), (2, 1)).T])
     linked = csr_array((np.ones(len(edges)), edges.T), shape=(model.num_vertices,) * 2)
     linked.data[:] = 1.0  # an edge counts once, though two faces have it
-    return diags_array(1 / linked.sum(axis=1)) @ linked
+    return diags_array(1 / (linked @ np.ones(model.num_vertices))) @ linked

@@ -67,6 +67,7 @@ def columns(figures: Figures, baseline: Figures) -> dict[str, Array]:
 
 def _record(block: Block, truth: Truth, results: Sequence[Result]) -> dict[str, Any]:
     """Means and intervals, whole and by family."""
+    families = list(dict.fromkeys(truth.family.tolist()))
     by_name = {result.row.name: columns(result.figures, results[0].figures) for result in results}
     baseline, bare = by_name[results[0].row.name], by_name["ours without physics"]
     rows = []
@@ -84,21 +85,18 @@ def _record(block: Block, truth: Truth, results: Sequence[Result]) -> dict[str, 
                 "against baseline": _differences(own, baseline),
                 "against ours without physics": _differences(own, bare),
                 "families": {
-                    family: {key: float(own[key][truth.family == family].mean()) for key in ("PVE", *DIFFERENCES)}
+                    family: {key: float(own[key][truth.family == family].mean()) for key in DIFFERENCES}
                     | {
                         "difference": paired(
                             own["PVE"][truth.family == family], baseline["PVE"][truth.family == family]
                         )
                     }
-                    for family in dict.fromkeys(truth.family.tolist())
+                    for family in families
                 },
             }
         )
     true = {f"BoSE {cm} cm": float(100 * (margin >= 0).mean()) for cm, margin in _margins(truth).items()}
-    true_of = {
-        family: float(100 * (truth.margin_3[truth.family == family] >= 0).mean())
-        for family in dict.fromkeys(truth.family.tolist())
-    }
+    true_of = {family: float(100 * (truth.margin_3[truth.family == family] >= 0).mean()) for family in families}
     return {
         "name": block.name,
         "kind": block.kind,
@@ -160,6 +158,7 @@ def _write_csv(found: Found, path: Path) -> None:
 
 def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:
     """Differences against the baseline with their intervals."""
+    import matplotlib
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 1 + 1.6 * len(blocks)), layout="constrained")
@@ -178,4 +177,5 @@ def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:
     for key, axis in zip(DIFFERENCES, axes[-1], strict=True):
         unit = "points" if "BoSE" in key else "mm"
         axis.set_xlabel(f"{key} against the baseline, {unit}", fontsize=9)
-    figure.savefig(path, metadata={"Date": None})
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}):
+        figure.savefig(path, metadata={"Date": None})

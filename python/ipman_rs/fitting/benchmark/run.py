@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -110,8 +111,8 @@ class Benchmark:
         found = fit(task.problem, task.starts, preset)
         seconds = (time.process_time() - begun) / task.problem.num_bodies
         reasons = np.array([stage.reasons for stage in found.stages])
-        variables = {name: value.numpy() for name, value in found.variables.items()}
-        np.savez(place, allow_pickle=False, seconds=seconds, reasons=reasons, **variables)
+        variables: dict[str, Any] = {name: value.numpy() for name, value in found.variables.items()}
+        np.savez(place, seconds=seconds, reasons=reasons, **variables)
 
     def place(self, block: Block, preset: Config) -> Path:
         """The file of a fit: named by all that decides it."""
