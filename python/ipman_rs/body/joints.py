@@ -16,5 +16,7 @@ SMPL = (*BODY, "left_hand", "right_hand")
 SMPLH = (*BODY, *_fingers("left"), *_fingers("right"))
 SMPLX = (*BODY, "jaw", "left_eye_smplhf", "right_eye_smplhf", *_fingers("left"), *_fingers("right"))
 
+LEFT_HAND, RIGHT_HAND = tuple(_fingers("left")), tuple(_fingers("right"))
+
 BY_COUNT = {len(names): names for names in (SMPL, SMPLH, SMPLX)}
 SMPL_PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21)

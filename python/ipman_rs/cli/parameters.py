@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..body import safe_npz
-from ..body.joints import BODY, SMPL, SMPLH, SMPLX
+from ..body.joints import BODY, LEFT_HAND, RIGHT_HAND, SMPL, SMPLH, SMPLX
 from ..body.sequence import Index, PosedSequence, rows_of
 from .errors import FileError
 from .meshes import join_seams
@@ -20,17 +20,15 @@ _EXPECTED = (
     "pose/betas/transl"
 )
 _FRAME_RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
-_LEFT = tuple(name for name in SMPLH if name.startswith("left_") and name not in BODY)
-_RIGHT = tuple(name for name in SMPLH if name.startswith("right_") and name not in BODY)
 # Arrays that hold a piece of the pose, and the joints of that piece by its number of columns / 3.
 _PIECES: dict[str, tuple[tuple[str, ...], ...]] = {
     "global_orient": (BODY[:1],),
     "root_orient": (BODY[:1],),
     "body_pose": (BODY[1:], SMPL[1:]),
     "pose_body": (BODY[1:], SMPL[1:]),
-    "left_hand_pose": (_LEFT,),
-    "right_hand_pose": (_RIGHT,),
-    "pose_hand": ((*_LEFT, *_RIGHT),),
+    "left_hand_pose": (LEFT_HAND,),
+    "right_hand_pose": (RIGHT_HAND,),
+    "pose_hand": ((*LEFT_HAND, *RIGHT_HAND),),
     "jaw_pose": (("jaw",),),
     "pose_jaw": (("jaw",),),
     "leye_pose": (SMPLX[23:24],),
@@ -197,7 +195,7 @@ class _Pose:
 
 
 def _kind(joints: list[str]) -> str:
-    fingers = [name for name in joints if name in _LEFT or name in _RIGHT]
+    fingers = [name for name in joints if name in LEFT_HAND or name in RIGHT_HAND]
     others = [name.replace("_", " ") for name in joints if name not in fingers]
     return " or ".join((["fingers"] if fingers else []) + others)
 

@@ -24,14 +24,12 @@ class Camera:
         return self.image(self.see(points))
 
     def see(self, points: Tensor) -> Tensor:
-        """World points (B, N, 3) in the camera's frame. Summed by hand, so that no batch size changes a bit."""
-        x, y, z = points.unbind(-1)
-        rows = self.rotation[:, None]
-        seen = [rows[..., i, 0] * x + rows[..., i, 1] * y + rows[..., i, 2] * z for i in range(3)]
-        return torch.stack(seen, dim=-1) + self.translation[:, None]
+        """World points (B, N, 3) in the camera's frame."""
+        return self.turn(points[:, None])[:, 0] + self.translation[:, None]
 
     def turn(self, vectors: Tensor) -> Tensor:
-        """Directions (B, P, N, 3) of the world in the camera's axes."""
+        """Directions (B, P, N, 3) of the world in the camera's axes. Summed by hand, so that no batch size changes a
+        bit."""
         x, y, z = vectors.unbind(-1)
         rows = self.rotation[:, None, None]
         return torch.stack([rows[..., i, 0] * x + rows[..., i, 1] * y + rows[..., i, 2] * z for i in range(3)], dim=-1)

@@ -17,10 +17,10 @@ from .candidate import Candidate
 from .config import Config, Stage
 from .objective import Objective
 from .problem import Problem
-from .solvers import SOLVERS, Look, Options, Outcome, minimise
+from .solvers import SOLVERS, Look, Outcome, minimise
+from .solvers.outcome import CONVERGED
 from .variables import Variables, pack, unpack
 
-CONVERGED = ("gradient", "decrease")  # reasons
 CHUNK = 64  # bodies side by side: beyond, nothing gets faster and the Jacobian of the landmarks gets large
 
 
@@ -171,6 +171,3 @@ class _Shrinking:
         names = self.whole.weights if columns else ()
         costs = {name: torch.stack([column[name] for column in columns]).numpy() for name in names}
         return [{name: cost[:length, body] for name, cost in costs.items()} for body, length in enumerate(lengths)]
-
-
-__all__ = ["Fit", "Options", "StageReport", "fit", "run_stage"]

@@ -56,19 +56,22 @@ class Objective:
 
     def costs(self, candidate: Candidate) -> dict[str, Tensor]:
         """The weighted cost (B,) of each term."""
-        return {name: weight * self.terms[name].cost(candidate).double() for name, weight in self.weights.items()}
+        return {name: self._cost(name, candidate) for name in self.weights}
 
     def looks(self, points: np.ndarray) -> list[Look]:
         """Value and gradient at the points (B, P)."""
-        value, gradient = self._sum(points, list(self.weights))
-        return [Look(float(v), g) for v, g in zip(value, gradient, strict=True)]
+        rows = torch.from_numpy(points).requires_grad_()
+        total = sum(self.costs(self.candidate(rows)).values(), torch.zeros(len(points), dtype=torch.float64))
+        return [Look(float(v), g) for v, g in zip(*_with_gradient(total, rows), strict=True)]
 
     def models(self, points: np.ndarray) -> list[Look]:
         """With a model of the Hessian: 2 JᵀJ of the least squares, and for every other term, a cost c ≥ 0 seen as the
         square of √c, the gradient's ggᵀ / 2c."""
         squares = [name for name, term in self.terms.items() if isinstance(term, LeastSquares) and not term.needs_mesh]
         residuals, jacobians = self._jacobian(points, squares)
-        others = [self._sum(points, [name]) for name in self.weights if name not in squares]
+        rows = torch.from_numpy(points).requires_grad_()
+        candidate = self.candidate(rows)  # one for all terms: its mesh is posed once
+        others = [_with_gradient(self._cost(name, candidate), rows) for name in self.weights if name not in squares]
         looks = []
         for body in range(len(points)):
             r, j = residuals[body], jacobians[body]
@@ -81,17 +84,9 @@ class Objective:
             looks.append(Look(value, gradient, hessian))
         return looks
 
-    def _sum(self, points: np.ndarray, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-        """Value (B,) and gradient (B, P) of some terms together."""
-        rows = torch.from_numpy(points).requires_grad_()
-        candidate = self.candidate(rows)
-        total = torch.zeros(len(points), dtype=torch.float64)
-        for name in names:
-            total = total + self.weights[name] * self.terms[name].cost(candidate).double()
-        if not total.requires_grad:
-            return total.numpy(), np.zeros_like(points)
-        (gradient,) = torch.autograd.grad(total.sum(), rows)
-        return total.detach().numpy(), gradient.numpy()
+    def _cost(self, name: str, candidate: Candidate) -> Tensor:
+        """The weighted cost (B,) of one term."""
+        return self.weights[name] * self.terms[name].cost(candidate).double()
 
     def _jacobian(self, points: np.ndarray, names: Sequence[str]) -> tuple[Tensor, Tensor]:
         """Weighted residuals (B, R) and their Jacobians (B, P, R)."""
@@ -134,3 +129,11 @@ class Objective:
             value, slope = forward_ad.unpack_dual(torch.cat(residuals, dim=1))
         slope = torch.zeros_like(value) if slope is None else slope
         return value[::size], slope.reshape(bodies, size, -1)
+
+
+def _with_gradient(costs: Tensor, rows: Tensor) -> tuple[np.ndarray, np.ndarray]:
+    """Costs (B,) and their gradients by the rows (B, P); the graph stays for the other terms of its candidate."""
+    if not costs.requires_grad:
+        return costs.numpy(), np.zeros(rows.shape)
+    (gradient,) = torch.autograd.grad(costs.sum(), rows, retain_graph=True)
+    return costs.detach().numpy(), gradient.numpy()

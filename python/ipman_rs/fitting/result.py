@@ -16,7 +16,8 @@ from ipman_rs.plain import plain
 
 from .candidate import Candidate
 from .config import Config
-from .fit import CONVERGED, Fit, StageReport
+from .fit import Fit, StageReport
+from .solvers.outcome import CONVERGED
 from .start import SEEN
 from .variables import BLOCKS, Variables
 
@@ -26,15 +27,13 @@ PHYSICS = ("stability", "balance", "ground")
 POOR = 5.0  # % of the person's height: a median error above it is flagged
 OFF = 0.05  # m: a body whose lowest point is further from the floor is flagged
 FAR = 99.0  # m from the camera: where the start gives up
-_LEFT = tuple(name for name in joints.SMPLH if name.startswith("left_") and name not in joints.BODY)
-_RIGHT = tuple(name for name in joints.SMPLH if name.startswith("right_") and name not in joints.BODY)
 # The names that the smplx package, and `ipman analyze`, give the pieces of a pose, by joints.
 _PIECES = {
     "jaw_pose": ("jaw",),
     "leye_pose": ("left_eye_smplhf",),
     "reye_pose": ("right_eye_smplhf",),
-    "left_hand_pose": _LEFT,
-    "right_hand_pose": _RIGHT,
+    "left_hand_pose": joints.LEFT_HAND,
+    "right_hand_pose": joints.RIGHT_HAND,
 }
 
 

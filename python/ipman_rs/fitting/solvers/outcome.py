@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 
+CONVERGED = ("gradient", "decrease")  # reasons of an outcome
+
 
 @dataclass(frozen=True)
 class Options:
@@ -46,4 +48,4 @@ class Outcome:
 
     @property
     def converged(self) -> bool:
-        return self.reason in ("gradient", "decrease")
+        return self.reason in CONVERGED
