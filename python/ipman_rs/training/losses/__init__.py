@@ -1,0 +1,19 @@
+"""The terms of training, one a file, and their sum with the weights of SPIN and of the paper."""
+
+from .body_parameters import betas_loss, pose_loss
+from .joints_3d import joints_3d_loss
+from .keypoints_2d import keypoints_2d_loss
+from .physics import Physics
+from .positive_scale import positive_scale_loss
+from .total import Loss, Weights
+
+__all__ = [
+    "Loss",
+    "Physics",
+    "Weights",
+    "betas_loss",
+    "joints_3d_loss",
+    "keypoints_2d_loss",
+    "pose_loss",
+    "positive_scale_loss",
+]

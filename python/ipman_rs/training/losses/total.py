@@ -1,0 +1,58 @@
+"""All terms together: 60 · (5 L_2D + 5 L_3D + L_pose + 0.001 L_betas + L_scale + Σ λ L_physics), SPIN's weights.
+
+The paper's λ of its terms stand inside the bracket, so they count sixty times.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from torch import Tensor, nn
+
+from ..batch import Batch
+from ..model import Estimate
+from ..posing import Posed, Posing
+from ..projection import project
+from .body_parameters import betas_loss, pose_loss
+from .joints_3d import joints_3d_loss
+from .keypoints_2d import keypoints_2d_loss
+from .physics import Physics
+from .positive_scale import positive_scale_loss
+
+
+@dataclass(frozen=True)
+class Weights:
+    keypoints_2d: float = 5.0
+    joints_3d: float = 5.0
+    pose: float = 1.0
+    betas: float = 0.001
+    scale: float = 1.0
+    all: float = 60.0
+
+
+class Loss(nn.Module):
+    """The training loss of an estimate; physics: None leaves its terms out (HMR*)."""
+
+    def __init__(self, posing: Posing, physics: Physics | None = None, weights: Weights | None = None) -> None:
+        super().__init__()
+        self.posing, self.physics, self.weights = posing, physics, weights or Weights()
+
+    def forward(self, estimate: Estimate, batch: Batch) -> tuple[Tensor, dict[str, Tensor]]:
+        """The weighted sum, and the unweighted terms, detached."""
+        posed = self.posing(estimate)
+        terms = self._data_terms(estimate, posed, batch)
+        total = sum(getattr(self.weights, name) * value for name, value in terms.items())
+        terms = {name: value.detach() for name, value in terms.items()}
+        if self.physics is not None:
+            physics, found = self.physics(posed, batch)
+            total, terms = total + physics, terms | found
+        return self.weights.all * total, terms
+
+    def _data_terms(self, estimate: Estimate, posed: Posed, batch: Batch) -> dict[str, Tensor]:
+        return {
+            "keypoints_2d": keypoints_2d_loss(project(posed.keypoints, estimate.camera), batch.keypoints),
+            "joints_3d": joints_3d_loss(posed.joints, batch.joints),
+            "pose": pose_loss(estimate.rotations, batch.pose, batch.has_body),
+            "betas": betas_loss(estimate.betas, batch.betas, batch.has_body),
+            "scale": positive_scale_loss(estimate.camera),
+        }

@@ -1,0 +1,9 @@
+"""HMR: an encoder, and a regressor that starts at mean parameters and corrects them in rounds."""
+
+from .backbones import backbone
+from .hmr import HMR
+from .mean_parameters import MeanParameters
+from .regressor import Estimate, Regressor
+from .spin_checkpoint import load_spin
+
+__all__ = ["HMR", "Estimate", "MeanParameters", "Regressor", "backbone", "load_spin"]
