@@ -1,8 +1,8 @@
 """Static people of the embedded body `anny-lite` on the floor y = 0.
 
 Named poses (`ipman_rs.body.poses`), mirrored or not, with every joint perturbed, are laid on the floor as in
-`fitting.benchmark.scenes`: they rest on a facet of their hull over which the exact centre of mass lies, and what touches
-within 1 cm supports it. Others are drawn again.
+`fitting.benchmark.scenes`: they rest on a facet of their hull over which the exact centre of mass lies, and what
+touches within 1 cm supports it. Others are drawn again.
 """
 
 from __future__ import annotations

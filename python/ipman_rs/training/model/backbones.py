@@ -14,8 +14,8 @@ PREFIX = "timm/"
 def backbone(name: str = "resnet50", pretrained: bool = False) -> tuple[nn.Module, int]:
     """An encoder and its number of features.
 
-    name: "small" (a network of this project, for CPUs), a classifier of torchvision such as "resnet50", or "timm/" and a
-    model of timm. pretrained: with the weights that torchvision or timm download.
+    name: "small" (a network of this project, for CPUs), a classifier of torchvision such as "resnet50", or "timm/" and
+    a model of timm. pretrained: with the weights that torchvision or timm download.
 
     Raises:
         ValueError: there is no such model, or pretrained weights of "small" are asked for.

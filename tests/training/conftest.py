@@ -1,0 +1,29 @@
+"""What the tests of training share. All of it needs the extra `train`."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+pytest.importorskip("PIL", reason="pillow is not installed")
+
+from ipman_rs.training.lifting import bodies, views
+
+
+@pytest.fixture(autouse=True)
+def _one_thread():
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.fixture(scope="session")
+def static():
+    """28 static people, four of each family."""
+    return bodies.draw_bodies(28, seed=7)
+
+
+@pytest.fixture(scope="session")
+def posing():
+    return views.posing()

@@ -1,0 +1,134 @@
+"""Figures of bodies whose answer is known, intervals, the frozen settings, and a tiny run of the benchmark."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+import torch
+from click.testing import CliRunner
+
+from ipman_rs.cli import main
+from ipman_rs.training.benchmark import report
+from ipman_rs.training.benchmark.intervals import paired_over_seeds
+from ipman_rs.training.benchmark.measure import figures
+from ipman_rs.training.benchmark.rows import BASELINE, CONTROL, OURS, settings
+from ipman_rs.training.lifting import views
+from ipman_rs.training.model import Estimate
+
+
+@pytest.fixture(scope="module")
+def truth(static):
+    return views.views(static, seed=1)
+
+
+def exact(truth, pose=None) -> Estimate:
+    pose = truth.pose if pose is None else pose
+    return Estimate(torch.cat([pose[..., 0], pose[..., 1]], dim=-1), truth.betas, torch.zeros(len(truth), 3))
+
+
+def test_the_truth_has_no_error(truth, posing):
+    found = figures(exact(truth), truth, posing)
+    for name in ("mpjpe", "pa_mpjpe", "pve", "lowest", "tilt"):
+        assert np.abs(getattr(found, name)).max() < 2e-6
+    assert found.strict.mean() > 0.9  # the support at 2.5 cm is wider than that at 1 cm, but for samples
+    assert found.bose.mean() > 0.9
+
+
+def test_a_lean_is_a_tilt(truth, posing):
+    """Leaning by 10 degrees: the tilt is that, about the vertical it is none; the aligned error stays zero."""
+    for axis, tilt in ((0, 10.0), (1, 0.0)):
+        turn = torch.linalg.matrix_exp(
+            math.radians(10) * torch.linalg.cross(torch.eye(3), torch.eye(3)[axis].expand(3, 3)).T
+        )
+        pose = truth.pose.clone()
+        pose[:, 0] = truth.camera @ turn @ truth.camera.transpose(1, 2) @ pose[:, 0]
+        found = figures(exact(truth, pose), truth, posing)
+        np.testing.assert_allclose(np.degrees(found.tilt), tilt, atol=2e-3)
+        assert found.pa_mpjpe.max() < 1e-5
+        assert found.mpjpe.min() > 0.01
+        if axis == 1:
+            assert np.abs(found.lowest).max() < 1e-5
+            np.testing.assert_allclose(found.bose, figures(exact(truth), truth, posing).bose)
+
+
+def test_sinking_does_not_pass_the_strict_figure(truth, posing):
+    """Bodies are judged on the floor: moving the pelvis changes height and BoSE, and not the strict figure."""
+    lower = dataclasses.replace(truth, pelvis=truth.pelvis - torch.tensor([0.0, 0.08, 0.0]))
+    usual, sunk = figures(exact(truth), truth, posing), figures(exact(truth), lower, posing)
+    np.testing.assert_allclose(sunk.lowest, -0.08, atol=1e-5)
+    assert np.array_equal(usual.strict, sunk.strict)
+
+
+def test_intervals_hold_the_mean_and_tell_a_difference():
+    draw = np.random.default_rng(0)
+    baseline = draw.normal(size=(3, 200))
+    same = paired_over_seeds(baseline + draw.normal(scale=0.5, size=(3, 200)), baseline)
+    assert same.low < 0 < same.high
+    better = paired_over_seeds(baseline - 1 + draw.normal(scale=0.5, size=(3, 200)), baseline)
+    assert better.high < 0
+    # Seeds that differ as wholes widen it; bodies alone would not.
+    apart = paired_over_seeds(baseline + np.array([[-1.0], [0.0], [1.0]]), baseline)
+    assert apart.high - apart.low > 1
+    with pytest.raises(ValueError, match=r"\(seeds, bodies\) of one shape, got \(3, 200\) and \(200,\)"):
+        paired_over_seeds(baseline, baseline[0])
+
+
+def test_the_settings_have_all_rows():
+    rows = {row.name: row for row in settings().rows}
+    assert settings().rows[0].name == BASELINE
+    assert rows[BASELINE].preset is None
+    assert rows[CONTROL] == dataclasses.replace(rows[OURS], name=CONTROL, shuffled=True)
+    template = views.posing().body.template
+    for row in settings().rows[1:]:
+        physics = row.physics(template)
+        assert physics is not None
+        assert sum(weight > 0 for weight in physics.loss.weights.values()) >= 1
+    assert rows["both, λ of the paper"].weights == {}
+    assert rows["balanced"].weights == {}
+
+
+def test_command(tmp_path):
+    arguments = ["benchmark", "train", "-o", str(tmp_path), "-n", "14", "--people", "14", "--seeds", "2"]
+    arguments += ["--split", "tune", "--part", "0.001", "--tilt", "0", "--tilt", "8"]
+    first = CliRunner().invoke(main, arguments)
+    assert first.exit_code == 0, first.output
+    record = json.loads((tmp_path / "training_benchmark.json").read_text())
+    assert [block["tilt"] for block in record["blocks"]] == [0, 8]
+    rows = record["blocks"][1]["rows"]
+    assert [row["name"] for row in rows] == [row.name for row in settings().rows]
+    assert rows[0]["against baseline"]["PVE"] == [0, 0, 0]
+    with (tmp_path / "training_benchmark.csv").open() as file:
+        lines = list(csv.DictReader(file))
+    assert len(lines) == 2 * 2 * 14 * len(rows)
+    ours = [float(line["PVE"]) for line in lines if line["labels"] == "8" and line["row"] == OURS]
+    named = next(row for row in rows if row["name"] == OURS)
+    assert np.mean(ours) == pytest.approx(named["mean"]["PVE"], abs=1e-3)
+    page = (tmp_path / "training_benchmark.md").read_text()
+    assert "## Labels that lean by 8°" in page
+    kept = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir() if path.suffix in (".npz", ".pt")}
+    assert len(kept) == 2 + 4 + 4 * len(rows)
+    again = CliRunner().invoke(main, arguments)
+    assert again.exit_code == 0
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept  # nothing was done twice
+    assert (tmp_path / "training_benchmark.md").read_text() == page
+
+
+def test_verdicts_say_what_the_figures_say():
+    """Of blocks made up for it."""
+
+    def row(name, pve, bose, seeds, hover=(0, -1, 1)):
+        difference = {"PVE": pve, "BoSE": bose, "hover": hover, "penetration": (0, -1, 1)}
+        return {"name": name, "mean": {"PVE": 100.0}, "against baseline": difference, "seeds": {"BoSE": seeds}}
+
+    zero = (0.0, 0.0, 0.0)
+    clean = {"tilt": 0, "rows": [row(BASELINE, zero, zero, [0]), row(OURS, (2.1, 1, 3), zero, [0], (2, 1, 3)),
+                                 row(CONTROL, zero, zero, [0])]}  # fmt: skip
+    assert [holds for _, holds, _ in report.verdicts([clean])] == [False, False, True]
+    tilted = {"tilt": 8.0, "rows": [row(BASELINE, zero, zero, [0]), row(OURS, (-1, -2, 0), (5, 4, 6), [4.1, 6]),
+                                    row(CONTROL, zero, (1.0, 0.2, 2), [0])]}  # fmt: skip
+    assert [holds for _, holds, _ in report.verdicts([tilted])] == [True, True, False]
