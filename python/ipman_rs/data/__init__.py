@@ -29,6 +29,7 @@ DATASETS = {  # name -> module with NAME, open(path, split=None, **options) and 
     "mpi-inf-3dhp": "mpi_inf_3dhp",
     "mpii": "mpii",
     "opensim": "opensim",
+    "rendered": "rendered",
     "rich": "rich",
 }
 

@@ -17,13 +17,13 @@ from ipman_rs.fitting.benchmark.scenes import FAMILIES
 from .cameras import Camera, draw_camera
 from .figures import draw_figure, keypoint_names, keypoints
 from .film import draw_film
+from .layout import SPLITS, key_of
 from .renderer import Solid, render
 from .surroundings import draw_surroundings
 from .wardrobe import draw_clothes
 
 Array = NDArray[np.floating]
 
-SPLITS = ("train", "val", "test")
 DEPTH_OF_JOINTS, DEPTH_OF_SKIN = 0.15, 0.02  # m that a seen point may lie behind the skin that is in front of it
 
 
@@ -78,7 +78,7 @@ def draw_sample(settings: Settings, split: str, index: int) -> Sample:
     }
     stored = {name: np.asarray(value, np.float32) for name, value in arrays.items()}
     stored["visible"] = inside & seen(solid, camera, points, len(joints))
-    key = f"{split}-{index:08d}"
+    key = key_of(split, index)
     record = {
         "name": key, "split": split, "seed": seed, "body": settings.body, "family": figure.family,
         "pose": figure.pose_name, "kind": figure.kind, "static": figure.kind == "static", "surroundings": around.kind,

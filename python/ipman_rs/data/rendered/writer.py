@@ -1,9 +1,5 @@
-"""Writing images in shards: WebDataset's layout, a .tar file with the files of a sample one after the other.
-
-    index.json  train-000000.tar  train-000001.tar  val-000000.tar  ...
-
-A shard has its name only once it is whole, and is never written again: a run that was killed goes on behind it.
-"""
+"""Writing images in shards. A shard has its name only once it is whole, and is never written again: a run that was
+killed goes on behind it."""
 
 from __future__ import annotations
 
@@ -15,35 +11,15 @@ import tarfile
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from .figures import keypoint_names
-from .samples import SPLITS, Settings, draw_sample, files
+from .layout import FORMAT, INDEX, SPLITS, Shard, plan, read_index
+from .samples import Settings, draw_sample, files
 
-INDEX = "index.json"
-VERSION = 1
 AT_ONCE = 8  # images that a worker is asked for at a time
-
-
-@dataclass(frozen=True)
-class Shard:
-    """The samples `first` to `first` + `count` of a split."""
-
-    name: str
-    split: str
-    first: int
-    count: int
-
-
-def plan(counts: dict[str, int], shard_size: int) -> list[Shard]:
-    """The shards of so many images of each split."""
-    return [
-        Shard(f"{split}-{number:06d}.tar", split, first, min(shard_size, counts[split] - first))
-        for split in SPLITS
-        for number, first in enumerate(range(0, counts.get(split, 0), shard_size))
-    ]
 
 
 def write(
@@ -81,8 +57,7 @@ def write(
 
 def index_of(settings: Settings, counts: dict[str, int], shards: list[Shard]) -> dict[str, Any]:
     return {
-        "format": "ipman_rs rendered images",
-        "version": VERSION,
+        "format": FORMAT,
         "settings": asdict(settings),
         "counts": {split: counts.get(split, 0) for split in SPLITS},
         "keypoint_names": list(keypoint_names(settings.body)),
@@ -98,7 +73,9 @@ def begin(folder: Path, index: dict[str, Any]) -> None:
     if not path.exists():
         others = sorted(each.name for each in folder.iterdir()) if folder.exists() else []
         if others:
-            raise ValueError(f"{folder}: expected an empty folder or one of rendered images, got {others[0]}; name another")
+            raise ValueError(
+                f"{folder}: expected an empty folder or one of rendered images, got {others[0]}; name another"
+            )
         folder.mkdir(parents=True, exist_ok=True)
         part = folder / f".{INDEX}.part"
         part.write_text(json.dumps(index, indent=1))
@@ -116,23 +93,6 @@ def begin(folder: Path, index: dict[str, Any]) -> None:
 def _short(value: Any) -> str:
     text = json.dumps(value)
     return text if len(text) < 160 else f"{text[:160]}…"
-
-
-def read_index(folder: Path) -> dict[str, Any]:
-    """The index of a folder. ValueError, saying what is wrong, if it has none."""
-    path = folder / INDEX
-    if not path.is_file():
-        raise ValueError(f"{folder}: no {INDEX}; expected a folder that `ipman data render` wrote")
-    try:
-        index = json.loads(path.read_text(encoding="utf-8"))
-        version = index["version"]
-        shards = [Shard(**shard) for shard in index["shards"]]
-        known = {"settings", "counts", "keypoint_names"} <= set(index) and all(shard.count > 0 for shard in shards)
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise ValueError(f"{path}: no index of rendered images ({error})") from None
-    if version != VERSION or not known:
-        raise ValueError(f"{path}: expected version {VERSION} of the index of rendered images, got {version}")
-    return index
 
 
 def packed(settings: Settings, shards: Iterable[Shard], workers: int) -> Iterator[tuple[str, dict[str, bytes]]]:
