@@ -68,7 +68,7 @@ def draw_camera(draw: np.random.Generator, vertices: Array, size: int) -> Camera
 
 
 def looking(turn: float, down: float, roll: float) -> Array:
-    """World to camera: at zero it looks along the world's -z; turned about the vertical, then looking down, then rolled."""
+    """World to camera, in degrees: looking along the world's -z, turned about the vertical, then down, then rolled."""
     upright = Rotation.from_euler("YXZ", [turn, -down, roll], degrees=True).as_matrix().T
     return np.diag([1.0, -1.0, -1.0]) @ upright
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.floating]
 
@@ -16,8 +16,10 @@ CELLS = 64  # of the lattice of noise, which repeats after that many
 
 @dataclass(frozen=True)
 class Pattern:
-    """`kind` on a plane of coordinates (N, 2) m: two colours (3,) in linear light, float32, `cell` m, turned by `angle`; `grain`
-    is the strength of noise over it."""
+    """`kind` on a plane of coordinates (N, 2) m, in cells of `cell` m that are turned by `angle`.
+
+    first, second: colours (3,) in linear light, float32; `grain` is the strength of noise over them.
+    """
 
     kind: str
     first: Array
@@ -99,7 +101,12 @@ def draw_pattern(
     lattice = draw.uniform(-1, 1, (CELLS, CELLS)).astype(np.float32)
     kind = kinds[draw.integers(len(kinds))]
     size, angle, grain = draw.uniform(*cell), draw.uniform(0, np.pi), draw.uniform(0.02, 0.12)
-    return Pattern(kind, np.float32(first), np.float32(second), float(size), float(angle), float(grain), lattice)
+    return Pattern(kind, single(first), single(second), float(size), float(angle), float(grain), lattice)
+
+
+def single(values: ArrayLike) -> Array:
+    """In single precision, which is enough for colours and twice as fast."""
+    return np.asarray(values, np.float32)
 
 
 def linear(hue: float, saturation: float, value: float) -> Array:

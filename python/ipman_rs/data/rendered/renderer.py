@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ipman_rs.view.geometry import vertex_normals
 
 from .cameras import Camera
+from .patterns import single
 from .surroundings import Surroundings
 from .wardrobe import Clothes
 
@@ -19,6 +20,7 @@ Array = NDArray[np.floating]
 SAMPLES = 2  # rays a pixel along each side
 OFF = 4e-3  # m that a ray starts off the surface, not to meet it again
 CONTACT, SPREAD = 0.08, 0.6  # m and 1: the body darkens the floor that is about this close below it, and beside it
+UP = single([0, 1, 0])
 SUN = 0.03  # radius of the sun's disc, 1 m away: how soft shadows are
 
 
@@ -47,14 +49,14 @@ class Solid:
     def met(self, starts: Array, ways: Array) -> tuple[NDArray[np.integer], Array, Array]:
         """The face (N,) that each ray meets first, -1 for none; the point's weights (N, 3); the distance (N,) m."""
         starts = np.broadcast_to(starts, ways.shape)
-        found = self.scene.run(np.float32(starts), np.float32(ways), query="INTERSECT", output=True)
+        found = self.scene.run(single(starts), single(ways), query="INTERSECT", output=True)
         u, v = found["u"].astype(float), found["v"].astype(float)
         distance = np.where(found["primID"] >= 0, found["tfar"].astype(float), np.inf)
         return found["primID"], np.stack([1 - u - v, u, v], axis=1), distance
 
     def hides(self, starts: Array, ways: Array) -> NDArray[np.bool_]:
         """Which rays (N,) meet it."""
-        return self.scene.run(np.float32(starts), np.float32(ways), query="OCCLUDED") >= 0
+        return self.scene.run(single(starts), single(ways), query="OCCLUDED") >= 0
 
 
 def render(solid: Solid, resting: Array, clothes: Clothes, body: str, around: Surroundings, camera: Camera) -> Picture:
@@ -95,7 +97,7 @@ def skin(
     corners = solid.faces[face]
     points, normals, places = (blend(values, corners, weights) for values in (solid.vertices, solid.normals, resting))
     normals /= np.sqrt((normals**2).sum(axis=1, keepdims=True))
-    lit = ~solid.hides(points + OFF * normals, around.light.towards + SUN * scatter)
+    lit = single(~solid.hides(points + OFF * normals, around.light.towards + SUN * scatter))
     return clothes(places, body) * around.light.on(normals, lit, np.ones(len(points)))
 
 
@@ -120,13 +122,13 @@ def shaded(solid: Solid, points: Array, towards: Array) -> Array:
     feet = solid.vertices - solid.vertices[:, 1:2] / mean[1] * mean
     near = beside(points, feet, 0.1 * np.ptp(solid.vertices[:, 1]))
     shadow = np.zeros(len(points), np.float32)
-    shadow[near] = solid.hides(points[near] + np.float32([0, OFF, 0]), towards[near])
+    shadow[near] = solid.hides(points[near] + OFF * UP, towards[near])
     return shadow
 
 
 def closeness(solid: Solid, points: Array, scatter: Array) -> Array:
     """0 to 1, how much the person darkens points (N, 3) of the floor by being close above them."""
-    ways = np.float32([0, 1, 0]) + scatter * np.float32([SPREAD, 0, SPREAD])
+    ways = UP + SPREAD * (1 - UP) * scatter
     near = beside(points, solid.vertices, 3 * CONTACT)
     close = np.zeros(len(points), np.float32)
     close[near] = 0.8 * np.exp(-solid.met(points[near], ways[near])[2] / CONTACT)
@@ -152,10 +154,11 @@ def scattered(width: int) -> Array:
 
 def blend(values: Array, corners: NDArray[np.integer], weights: Array) -> Array:
     """Values (V, C) of vertices -> (N, C) inside faces with these corners (N, 3), by weights (N, 3)."""
-    return sum(weights[:, k : k + 1] * values[corners[:, k]] for k in range(3))
+    first, second, third = (weights[:, k : k + 1] * values[corners[:, k]] for k in range(3))
+    return first + second + third
 
 
 def blocks(values: Array, size: int) -> Array:
     """Means (size, size, C) over the rays (N, C) of each pixel."""
     rays = values.reshape(size, SAMPLES, size, SAMPLES, -1)
-    return sum(rays[:, i, :, j] for i in range(SAMPLES) for j in range(SAMPLES)) / SAMPLES**2
+    return reduce(np.add, (rays[:, i, :, j] for i in range(SAMPLES) for j in range(SAMPLES))) / SAMPLES**2

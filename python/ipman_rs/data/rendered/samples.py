@@ -15,9 +15,10 @@ from ipman_rs.body import load_body
 from ipman_rs.fitting.benchmark.scenes import FAMILIES
 
 from .cameras import Camera, draw_camera
-from .figures import draw_figure, keypoint_names, keypoints
+from .figures import draw_figure, keypoints
 from .film import draw_film
 from .layout import SPLITS, key_of
+from .patterns import single
 from .renderer import Solid, render
 from .surroundings import draw_surroundings
 from .wardrobe import draw_clothes
@@ -64,7 +65,7 @@ def draw_sample(settings: Settings, split: str, index: int) -> Sample:
     picture = render(solid, resting(settings.body), clothes, settings.body, around, camera)
     points = keypoints(settings.body, vertices, joints)
     flat = camera.project(points)[:, :2]
-    inside = ((flat >= 0) & (flat <= settings.size)).all(axis=1)
+    inside = np.asarray(((flat >= 0) & (flat <= settings.size)).all(axis=1))
     arrays = {
         "pose": figure.pose,
         "betas": figure.betas,
@@ -76,7 +77,7 @@ def draw_sample(settings: Settings, split: str, index: int) -> Sample:
         "intrinsics": camera.intrinsics,
         "box": box(camera.project(vertices)[:, :2]),
     }
-    stored = {name: np.asarray(value, np.float32) for name, value in arrays.items()}
+    stored: dict[str, NDArray[Any]] = {name: single(value) for name, value in arrays.items()}
     stored["visible"] = inside & seen(solid, camera, points, len(joints))
     key = key_of(split, index)
     record = {
@@ -88,8 +89,8 @@ def draw_sample(settings: Settings, split: str, index: int) -> Sample:
 
 def rounded(camera: Camera) -> Camera:
     """The camera as it is written, so that labels and picture agree."""
-    stored = (np.float64(np.float32(value)) for value in (camera.rotation, camera.translation, camera.intrinsics))
-    return Camera(camera.size, *stored)
+    written = (single(value).astype(float) for value in (camera.rotation, camera.translation, camera.intrinsics))
+    return Camera(camera.size, *written)
 
 
 def seen(solid: Solid, camera: Camera, points: Array, num_joints: int) -> NDArray[np.bool_]:
@@ -117,5 +118,5 @@ def files(sample: Sample) -> dict[str, bytes]:
 
     image, arrays = io.BytesIO(), io.BytesIO()
     Image.fromarray(sample.image).save(image, "JPEG", quality=sample.quality)
-    np.savez(arrays, **sample.arrays)
+    np.savez(arrays, allow_pickle=False, **sample.arrays)
     return {"jpg": image.getvalue(), "json": json.dumps(sample.record).encode(), "npz": arrays.getvalue()}

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cameras import turned
-from .patterns import FLOOR, WALL, Pattern, draw_pattern, linear
+from .patterns import FLOOR, WALL, Pattern, draw_pattern, linear, single
 
 Array = NDArray[np.floating]
 
@@ -84,7 +84,7 @@ class Surroundings:
 
     def on_floor(self, points: Array, distance: Array, lit: Array, open_: Array) -> Array:
         """Colours (N, 3) of the floor at points (N, 3), `distance` (N,) m from the eye."""
-        normals = np.broadcast_to(np.float32([0, 1, 0]), points.shape)
+        normals = np.broadcast_to(single([0, 1, 0]), points.shape)
         colors = self.floor(points[:, [0, 2]]) * self.light.on(normals, lit, open_)
         if self.kind == "room":
             return colors
@@ -109,10 +109,10 @@ def draw_surroundings(draw: np.random.Generator) -> Surroundings:
         wall,
         skirting=draw.uniform(*SKIRTING) * draw.integers(2),
         skirting_color=_muted(draw) * light.above,
-        horizon=np.float32(horizon),
-        zenith=np.float32(zenith),
-        reach=np.float32(draw.uniform(2.2, 5.0, 2)),
-        walls_turn=np.float32([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]),
+        horizon=single(horizon),
+        zenith=single(zenith),
+        reach=single(draw.uniform(2.2, 5.0, 2)),
+        walls_turn=single([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]),
         light=light,
     )
 
@@ -126,7 +126,7 @@ def draw_light(draw: np.random.Generator) -> Light:
     ambient = draw.uniform(0.35, 0.7)
     cool = np.array([1 - 0.5 * warm, 1.0, 1 + 0.5 * warm])
     below = ambient * draw.uniform(0.3, 0.7) * cool
-    return Light(*map(np.float32, (towards, sun * tint, ambient * cool, below)))
+    return Light(*map(single, (towards, sun * tint, ambient * cool, below)))
 
 
 def _muted(draw: np.random.Generator) -> Array:

@@ -15,8 +15,8 @@ class RenderedImages(Dataset):
     """Items are dicts: "image" (3, S, S) uint8 RGB, the arrays of `ipman_rs.data.rendered` as tensors, "name", and the
     flags "static" and "contact".
 
-    A bad sample is warned of and replaced by the next good one, so that batches stay full and the order of the others as
-    it is; `data.bad` of the process that read it has their names. ValueError if there is no good one.
+    A bad sample is warned of and replaced by the next good one: batches stay full, and the others in their order.
+    `data.bad`, of the process that read it, has its name. ValueError if there is no good one.
     """
 
     def __init__(self, folder: Path, split: str):

@@ -62,7 +62,7 @@ class Clothes:
         self.paint_face(colors, place, marks, head)
         return colors
 
-    def paint_face(self, colors: Array, place: Array, marks: dict[str, Array], head: Array) -> None:
+    def paint_face(self, colors: Array, place: Array, marks: dict[str, Array], head: NDArray[np.bool_]) -> None:
         y, z = place[:, 1], place[:, 2]
         nose, middle = marks["nose"], marks["head"]
         slope = 0.9 * (z - nose[2]).clip(-0.13, 0)

@@ -9,7 +9,7 @@ import multiprocessing
 import os
 import tarfile
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
@@ -95,7 +95,7 @@ def _short(value: Any) -> str:
     return text if len(text) < 160 else f"{text[:160]}…"
 
 
-def packed(settings: Settings, shards: Iterable[Shard], workers: int) -> Iterator[tuple[str, dict[str, bytes]]]:
+def packed(settings: Settings, shards: Iterable[Shard], workers: int) -> Generator[tuple[str, dict[str, bytes]]]:
     """The keys and files of all samples of shards, in their order."""
     tasks = [
         (settings, shard.split, range(start, min(start + AT_ONCE, shard.first + shard.count)))
