@@ -21,7 +21,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..check import Finding, of_frames, sample
+import numpy as np
+
+from ..check import SAMPLE, Finding, of_frames
 from .layout import SPLITS
 from .reader import BadSample, Labels, Rendered
 
@@ -54,4 +56,5 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
     ]
     if len(data.bad) > 10:
         found.append(Finding("wrong", f"{len(data.bad)} bad samples in all"))
-    return found + of_frames(sample(data))
+    good = np.flatnonzero(~np.isin(data.names, list(data.bad)))
+    return found + (of_frames(data[good[:: -(-len(good) // SAMPLE)]]) if len(good) else [])

@@ -8,7 +8,6 @@ import tarfile
 import warnings
 import zipfile
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from ..frames import Cameras, Frames, Rows
 from .layout import INDEX, SPLITS, read_index, shards_of
 
 Array = NDArray[np.floating]
-Place = tuple[Path, int, int]  # a file of a shard: where it starts, and how many bytes it has
+Place = tuple[int, int]  # where a file starts in its shard, and how many bytes it has
 
 SHAPES = {
     "pose": (24, 3), "betas": (10,), "transl": (3,), "joints": (24, 3), "camera_rotation": (3, 3),
@@ -40,6 +39,15 @@ class Labels:
 
     arrays: dict[str, Array]
     record: dict[str, Any]
+
+    @property
+    def static(self) -> bool:
+        return bool(self.record["static"])
+
+    @property
+    def touching(self) -> bool:
+        """Whether the body touches the floor."""
+        return self.record["kind"] != "jumping"
 
 
 class Rendered:
@@ -64,6 +72,8 @@ class Rendered:
         self.keypoint_names: tuple[str, ...] = tuple(self.index["keypoint_names"])
         self.names = np.array([key for shard in self.shards for key in shard.keys])
         self.bad: dict[str, str] = {}
+        self._ends = np.cumsum([shard.count for shard in self.shards])
+        self._members: dict[Path, dict[str, Place]] = {}  # read when they are first asked for
 
     def __len__(self) -> int:
         return len(self.names)
@@ -71,14 +81,14 @@ class Rendered:
     def __getitem__(self, rows: Rows) -> Frames:
         """The labels of those images. Those of bad samples are NaN."""
         numbers = np.arange(len(self))[rows]
-        return self._frames(self.names[numbers], [self._labels_or_none(int(row)) for row in numbers])
+        return self._frames(numbers, [self._labels_or_none(int(row)) for row in numbers])
 
     def labels(self, row: int) -> Labels:
         """Of one image. BadSample if they are missing, damaged or not finite."""
         name = str(self.names[row])
         try:
-            record = json.loads(self._bytes(name, "json"))
-            with np.load(io.BytesIO(self._bytes(name, "npz")), allow_pickle=False) as stored:
+            record = json.loads(self._bytes(row, "json"))
+            with np.load(io.BytesIO(self._bytes(row, "npz")), allow_pickle=False) as stored:
                 arrays = {key: stored[key] for key in (*SHAPES, "keypoints", "visible")}
             if not isinstance(record, dict) or not {"static", "kind"} <= set(record):
                 raise ValueError("json: expected static and kind")
@@ -99,7 +109,7 @@ class Rendered:
 
         name, size = str(self.names[row]), self.index["settings"]["size"]
         try:
-            with Image.open(io.BytesIO(self._bytes(name, "jpg")), formats=["JPEG", "PNG"]) as image:
+            with Image.open(io.BytesIO(self._bytes(row, "jpg")), formats=["JPEG", "PNG"]) as image:
                 if image.size != (size, size):
                     raise ValueError(f"expected {size} x {size} pixels, got {image.size}")
                 return np.asarray(image.convert("RGB"))
@@ -112,18 +122,16 @@ class Rendered:
         except BadSample:
             return None
 
-    def _frames(self, names: NDArray[np.str_], labels: list[Labels | None]) -> Frames:
+    def _frames(self, numbers: NDArray[np.integer], labels: list[Labels | None]) -> Frames:
         def rows(key: str, shape: tuple[int, ...]) -> Array:
             none = np.full(shape, np.nan, np.float32)
             return (
                 np.stack([none if each is None else each.arrays[key] for each in labels]) if labels else none[None][:0]
             )
 
-        def flags(key: str, value: Any) -> NDArray[np.bool_]:
-            return np.array([each is not None and each.record[key] == value for each in labels], bool)
-
         values = {key: rows(key, shape) for key, shape in SHAPES.items()}
-        shards = {key: shard.name for shard in self.shards for key in shard.keys}
+        names = self.names[numbers]
+        images = [f"{self._shard(int(row))}/{name}.jpg" for row, name in zip(numbers, names, strict=True)]
         return Frames(
             names=names,
             sequences=names,
@@ -134,20 +142,22 @@ class Rendered:
             transl=values["transl"],
             joints=values["joints"],
             joint_names=SMPL,
-            images=np.array([f"{self.folder / shards[name]}/{name}.jpg" for name in names], np.str_),
+            images=np.array(images, np.str_),
             cameras=Cameras(values["camera_rotation"], values["camera_translation"], values["intrinsics"]),
             keypoints=rows("keypoints", (len(self.keypoint_names), 3)),
             keypoint_names=self.keypoint_names,
             boxes=values["box"],
-            standing=flags("static", True),
-            contact=~flags("kind", "jumping"),
+            standing=np.array([each is not None and each.static for each in labels], bool),
+            contact=np.array([each is not None and each.touching for each in labels], bool),
         )
 
-    def _bytes(self, name: str, ending: str) -> bytes:
-        place = self._places.get(f"{name}.{ending}")
-        if place is None:
-            raise ValueError(f"{name}.{ending} is not in its shard")
-        path, start, size = place
+    def _bytes(self, row: int, ending: str) -> bytes:
+        path, name = self._shard(row), f"{self.names[row]}.{ending}"
+        if path not in self._members:
+            self._members[path] = members(path)
+        if name not in self._members[path]:
+            raise ValueError(f"{name} is not in {path.name}")
+        start, size = self._members[path][name]
         with path.open("rb") as stream:
             stream.seek(start)
             content = stream.read(size)
@@ -155,10 +165,9 @@ class Rendered:
             raise ValueError(f"{path} is cut off")
         return content
 
-    @cached_property
-    def _places(self) -> dict[str, Place]:
-        """Where each file of each sample lies."""
-        return {name: place for shard in self.shards for name, place in members(self.folder / shard.name).items()}
+    def _shard(self, row: int) -> Path:
+        """The file that an image lies in."""
+        return self.folder / self.shards[np.searchsorted(self._ends, row, side="right")].name
 
     def _bad(self, name: str, why: str) -> BadSample:
         if name not in self.bad:
@@ -173,7 +182,7 @@ def members(path: Path) -> dict[str, Place]:
     try:
         with tarfile.open(path, "r:") as archive:
             for member in archive:
-                found[member.name] = (path, member.offset_data, member.size)
+                found[member.name] = member.offset_data, member.size
     except (tarfile.TarError, OSError) as error:
         warnings.warn(f"{path}: damaged after {len(found)} files: {error}", stacklevel=2)
     return found

@@ -40,6 +40,6 @@ class RenderedImages(Dataset):
             "name": str(self.data.names[row]),
             "image": image.permute(2, 0, 1),
             **{name: torch.from_numpy(value) for name, value in labels.arrays.items()},
-            "static": bool(labels.record["static"]),
-            "contact": labels.record["kind"] != "jumping",
+            "static": labels.static,
+            "contact": labels.touching,
         }
