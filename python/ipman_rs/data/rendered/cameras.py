@@ -39,16 +39,23 @@ class Camera:
         return np.concatenate([pixels, seen[:, 2:]], axis=1)
 
     def rays(self, pixels: Array) -> Array:
-        """Unit directions (N, 3) in the world through pixels (N, 2)."""
-        seen = (pixels - self.intrinsics[:2, 2]) / self.intrinsics[[0, 1], [0, 1]]
-        seen = np.concatenate([seen, np.ones((len(seen), 1))], axis=1)
-        return turned(seen / np.sqrt((seen**2).sum(axis=1, keepdims=True)), self.rotation.T)
+        """Unit directions (N, 3) in the world through pixels (N, 2), in their precision."""
+        intrinsics = self.intrinsics.astype(pixels.dtype)
+        x, y = ((pixels[:, i] - intrinsics[i, 2]) / intrinsics[i, i] for i in (0, 1))
+        length = np.sqrt(x * x + y * y + 1)
+        return turned(np.stack([x / length, y / length, 1 / length], axis=1), self.rotation.T)
 
 
 def turned(vectors: Array, rotation: Array) -> Array:
-    """R v of vectors (N, 3), summed by hand: no number of threads of a matrix library changes a bit."""
-    x, y, z = vectors.T
-    return np.stack([x * row[0] + y * row[1] + z * row[2] for row in rotation], axis=1)
+    """R v of vectors (N, 3), in their precision."""
+    return np.stack([dot(vectors, row.astype(vectors.dtype)) for row in rotation], axis=1)
+
+
+def dot(vectors: Array, others: Array) -> Array:
+    """(N,) of vectors (N, 3) and (N, 3) or (3,), summed by hand: faster than over a short axis, and no matrix library's
+    number of threads changes a bit."""
+    (x, y, z), (u, v, w) = vectors.T, others.T
+    return x * u + y * v + z * w
 
 
 def draw_camera(draw: np.random.Generator, vertices: Array, size: int) -> Camera:

@@ -44,7 +44,9 @@ class Pattern:
         column, row = np.floor(u), np.floor(v)
         right, down = u - column, v - row
         column, row = column.astype(np.int32), row.astype(np.int32)
-        corners = [[self.lattice[(row + i) % CELLS, (column + j) % CELLS] for j in (0, 1)] for i in (0, 1)]
+        columns = [(column + j) % CELLS for j in (0, 1)]
+        rows = [CELLS * ((row + i) % CELLS) for i in (0, 1)]
+        corners = [[self.lattice.ravel().take(below + beside) for beside in columns] for below in rows]
         top, bottom = (left + right * (other - left) for left, other in corners)
         return top + down * (bottom - top)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ipman_rs.view.geometry import vertex_normals
 
-from .cameras import Camera
+from .cameras import Camera, dot
 from .patterns import single
 from .surroundings import Surroundings
 from .wardrobe import Clothes
@@ -61,16 +61,14 @@ class Solid:
 
 def render(solid: Solid, resting: Array, clothes: Clothes, body: str, around: Surroundings, camera: Camera) -> Picture:
     """The person `solid`, whose vertices lie at `resting` (V, 3) on the mean `body` in its zero pose."""
-    grid = (np.arange(SAMPLES * camera.size) + 0.5) / SAMPLES
-    pixels = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
-    rays, scatter = camera.rays(pixels).astype(np.float32), scattered(len(grid))
-    eye = camera.eye.astype(np.float32)
+    grid = single((np.arange(SAMPLES * camera.size) + 0.5) / SAMPLES)
+    rays, scatter = camera.rays(np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)), scattered(len(grid))
     face, weights = first_met(solid, camera, grid, rays)
-    person = face >= 0
+    person, rest = np.flatnonzero(face >= 0), np.flatnonzero(face < 0)
     colors = np.empty_like(rays)
     colors[person] = skin(solid, face[person], weights[person], scatter[person], resting, clothes, body, around)
-    colors[~person] = background(solid, eye, rays[~person], scatter[~person], around)
-    return Picture(blocks(colors, camera.size), blocks(person[:, None].astype(np.float32), camera.size)[..., 0])
+    colors[rest] = background(solid, single(camera.eye), rays.take(rest, 0), scatter.take(rest, 0), around)
+    return Picture(blocks(colors, camera.size), blocks(single(face >= 0), camera.size)[..., 0])
 
 
 def first_met(solid: Solid, camera: Camera, grid: Array, rays: Array) -> tuple[NDArray[np.integer], Array]:
@@ -96,7 +94,7 @@ def skin(
     """Colours (N, 3) of points of the person."""
     corners = solid.faces[face]
     points, normals, places = (blend(values, corners, weights) for values in (solid.vertices, solid.normals, resting))
-    normals /= np.sqrt((normals**2).sum(axis=1, keepdims=True))
+    normals /= np.sqrt(dot(normals, normals))[:, None]
     lit = single(~solid.hides(points + OFF * normals, around.light.towards + SUN * scatter))
     return clothes(places, body) * around.light.on(normals, lit, np.ones(len(points)))
 
@@ -105,14 +103,16 @@ def background(solid: Solid, eye: Array, rays: Array, scatter: Array, around: Su
     """Colours (N, 3) of what rays (N, 3) see beside the person."""
     with np.errstate(divide="ignore"):
         distance = np.where(rays[:, 1] < 0, -eye[1] / rays[:, 1], np.inf)
-    floor = distance < around.to_wall(eye, rays)
+    on_floor = distance < around.to_wall(eye, rays)
+    floor, rest = np.flatnonzero(on_floor), np.flatnonzero(~on_floor)
     colors = np.empty_like(rays)
-    colors[~floor] = around.behind(eye, rays[~floor])
-    points = eye + distance[floor, None] * rays[floor]
+    colors[rest] = around.behind(eye, rays.take(rest, 0))
+    distance, scatter = distance.take(floor), scatter.take(floor, 0)
+    points = eye + distance[:, None] * rays.take(floor, 0)
     points[:, 1] = 0.0
-    lit = 1 - shaded(solid, points, around.light.towards + SUN * scatter[floor])
-    open_ = 1 - closeness(solid, points, scatter[floor])
-    colors[floor] = around.on_floor(points, distance[floor], lit, open_)
+    lit = 1 - shaded(solid, points, around.light.towards + SUN * scatter)
+    open_ = 1 - closeness(solid, points, scatter)
+    colors[floor] = around.on_floor(points, distance, lit, open_)
     return colors
 
 
@@ -122,7 +122,7 @@ def shaded(solid: Solid, points: Array, towards: Array) -> Array:
     feet = solid.vertices - solid.vertices[:, 1:2] / mean[1] * mean
     near = beside(points, feet, 0.1 * np.ptp(solid.vertices[:, 1]))
     shadow = np.zeros(len(points), np.float32)
-    shadow[near] = solid.hides(points[near] + OFF * UP, towards[near])
+    shadow[near] = solid.hides(points.take(near, 0) + OFF * UP, towards.take(near, 0))
     return shadow
 
 
@@ -131,15 +131,15 @@ def closeness(solid: Solid, points: Array, scatter: Array) -> Array:
     ways = UP + SPREAD * (1 - UP) * scatter
     near = beside(points, solid.vertices, 3 * CONTACT)
     close = np.zeros(len(points), np.float32)
-    close[near] = 0.8 * np.exp(-solid.met(points[near], ways[near])[2] / CONTACT)
+    close[near] = 0.8 * np.exp(-solid.met(points.take(near, 0), ways.take(near, 0))[2] / CONTACT)
     return close
 
 
-def beside(points: Array, others: Array, distance: float) -> NDArray[np.bool_]:
-    """Which points (N, 3) are in the rectangle of the floor around the others, wider by that distance."""
-    flat = others[:, [0, 2]]
-    inside = (points[:, [0, 2]] > flat.min(axis=0) - distance) & (points[:, [0, 2]] < flat.max(axis=0) + distance)
-    return inside.all(axis=1)
+def beside(points: Array, others: Array, distance: float) -> NDArray[np.integer]:
+    """Which of points (N, 3) are in the rectangle of the floor around the others, wider by that distance."""
+    low, high = others.min(axis=0) - distance, others.max(axis=0) + distance
+    x, _, z = points.T
+    return np.flatnonzero((x > low[0]) & (x < high[0]) & (z > low[2]) & (z < high[2]))
 
 
 @cache

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .cameras import turned
+from .cameras import dot, turned
 from .patterns import FLOOR, WALL, Pattern, draw_pattern, linear, single
 
 Array = NDArray[np.floating]
@@ -30,7 +30,7 @@ class Light:
     def on(self, normals: Array, lit: Array, open_: Array) -> Array:
         """The light (N, 3) on surfaces with these normals (N, 3); `lit` (N,) by the sun, `open_` (N,) to the rest."""
         share = (0.5 + 0.5 * normals[:, 1:2]) * open_[:, None]
-        facing = (normals * self.towards).sum(axis=1).clip(0, None) * lit
+        facing = dot(normals, self.towards).clip(0, None) * lit
         return self.below + share * (self.above - self.below) + facing[:, None] * self.sun
 
 
@@ -51,7 +51,7 @@ class Surroundings:
 
     def to_wall(self, eye: Array, rays: Array) -> Array:
         """Metres (N,) along rays (N, 3) to the wall that ends them; infinite where there are no walls."""
-        return self.away(eye, rays).min(axis=1) if self.kind == "room" else np.full(len(rays), np.inf, rays.dtype)
+        return np.minimum(*self.away(eye, rays)) if self.kind == "room" else np.full(len(rays), np.inf, rays.dtype)
 
     def behind(self, eye: Array, rays: Array) -> Array:
         """Colours (N, 3) of what is seen along rays that meet neither the body nor the floor."""
@@ -66,19 +66,19 @@ class Surroundings:
         return sky + 0.6 * cloud * rise * (0.9 - sky)
 
     def away(self, eye: Array, rays: Array) -> Array:
-        """Metres (N, 2) along the rays to the box's far sides, so that a camera outside looks through the near ones."""
-        start, way = turned(eye[None], self.walls_turn)[:, [0, 2]], turned(rays, self.walls_turn)[:, [0, 2]]
+        """Metres (2, N) along the rays to the box's far sides, so that a camera outside looks through the near ones."""
+        start, way = turned(eye[None], self.walls_turn)[0, ::2, None], turned(rays, self.walls_turn).T[::2]
         with np.errstate(divide="ignore", invalid="ignore"):
-            return (np.copysign(self.reach, way) - start) / way
+            return (np.copysign(self.reach[:, None], way) - start) / way
 
     def walls(self, eye: Array, rays: Array) -> Array:
         away = self.away(eye, rays)
-        side, distance = away.argmin(axis=1), away.min(axis=1)
+        side, distance = away[1] < away[0], np.minimum(*away)
         way = turned(rays, self.walls_turn)
         point = turned(eye[None], self.walls_turn) + distance[:, None] * way
-        colors = self.wall(np.stack([np.where(side == 0, point[:, 2], point[:, 0]), point[:, 1]], axis=1))
+        colors = self.wall(np.stack([np.where(side, point[:, 0], point[:, 2]), point[:, 1]], axis=1))
         colors[point[:, 1] < self.skirting] = self.skirting_color
-        inwards = -np.sign(np.stack([np.where(side == 0, way[:, 0], 0), 0 * distance, np.where(side, way[:, 2], 0)], 1))
+        inwards = -np.sign(np.stack([np.where(side, 0, way[:, 0]), 0 * distance, np.where(side, way[:, 2], 0)], 1))
         everywhere = np.ones_like(distance)
         return colors * self.light.on(turned(inwards, self.walls_turn.T), INDOORS * everywhere, everywhere)
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ipman_rs.body import load_body
 from ipman_rs.fitting.surface import skin_points
 
+from .cameras import dot
 from .patterns import CLOTH, Pattern, draw_pattern, linear
 
 Array = NDArray[np.floating]
@@ -78,7 +79,8 @@ class Clothes:
 
 def within(points: Array, center: Array, radii: tuple[float, float, float]) -> NDArray[np.bool_]:
     """Which points (N, 3) are inside an ellipsoid."""
-    return (((points - center) / radii) ** 2).sum(axis=1) < 1
+    scaled = (points - center) / radii
+    return dot(scaled, scaled) < 1
 
 
 @cache
