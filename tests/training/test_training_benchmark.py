@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from ipman_rs.cli import main
 from ipman_rs.training.benchmark import report
 from ipman_rs.training.benchmark.intervals import paired_over_seeds
-from ipman_rs.training.benchmark.measure import figures
+from ipman_rs.training.figures import figures
 from ipman_rs.training.benchmark.rows import BASELINE, CONTROL, OURS, settings
 from ipman_rs.training.lifting import views
 from ipman_rs.training.model import Estimate

@@ -13,6 +13,7 @@ from .data import data
 from .errors import FileError
 from .fit import fit
 from .options import GROUND, PRESETS, UP
+from .train import train
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -46,6 +47,7 @@ def main() -> None:
 
 main.add_command(fit)
 main.add_command(benchmark)
+main.add_command(train)
 main.add_command(data)
 
 

@@ -43,7 +43,8 @@ class Posing(nn.Module):
         if unknown:
             listed = ", ".join([*rows, *MIDPOINTS])
             raise ValueError(f"keypoints: the body {full.name!r} has no {unknown[0]!r}; it has {listed}")
-        self.register_buffer("ends", torch.tensor([[rows[name] for name in pair] for pair in pairs]), persistent=False)
+        ends = torch.tensor([[rows[name] for name in pair] for pair in pairs], dtype=torch.int64).reshape(-1, 2)
+        self.register_buffer("ends", ends, persistent=False)
 
     def forward(self, estimate: Estimate) -> Posed:
         # In half precision a body is off by centimetres.

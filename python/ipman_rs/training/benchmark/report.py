@@ -13,8 +13,8 @@ import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..figures import Figures
 from .intervals import paired_over_seeds
-from .measure import Figures
 from .rows import BASELINE, CONTROL, OURS
 from .run import Benchmark, Result
 

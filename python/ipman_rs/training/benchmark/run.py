@@ -16,12 +16,12 @@ import torch
 from ipman_rs.fitting.fit import one_thread
 
 from ..batch import Batch
+from ..figures import Figures, figures
 from ..lifting import bodies, views
 from ..lifting.drill import drill, estimated
 from ..lifting.network import lifter
 from ..losses import Loss
 from ..model import HMR
-from .measure import Figures, figures
 from .rows import Row, Settings, settings
 
 TRAINING = 31_000  # seeds: of the people that are trained on, and those whose figures are reported or tuned on

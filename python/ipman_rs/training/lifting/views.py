@@ -105,7 +105,8 @@ def _cameras(count: int, draw: Draw) -> tuple[Array, Array]:
 def _tilts(cameras: Array, degrees: float, draw: Draw) -> Array:
     """(n, 3, 3) turns about level axes of the world, for cameras (n, 3, 3)."""
     import os
-    count=len(cameras)
+
+    count = len(cameras)
     heading = draw.uniform(0, 2 * np.pi, count)
     angle = np.radians((degrees * (1 + TILT_SPREAD * draw.standard_normal(count))).clip(min=0))
     axis = np.stack([np.cos(heading), 0 * heading, np.sin(heading)], axis=1)

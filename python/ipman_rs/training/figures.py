@@ -1,4 +1,7 @@
-"""The figures of estimated bodies in the world against true ones, an entry a body; metres where nothing is said."""
+"""The figures of estimated bodies in the world against true ones, an entry a body; metres where nothing is said.
+
+NaN where there is no truth: errors and tilt need labelled parameters, what concerns the ground needs the world.
+"""
 
 from __future__ import annotations
 
@@ -14,15 +17,14 @@ from torch import Tensor
 import ipman_rs.torch as ipt
 from ipman_rs.evaluation import mpjpe, pa_mpjpe, pve
 
-from ..batch import Batch
-from ..model import Estimate
-from ..posing import Posed, Posing
-from ..world import to_world
+from .batch import Batch
+from .model import Estimate
+from .posing import Posed, Posing
+from .world import to_world
 
 Array = NDArray[np.floating]
 
 STRICT = 0.025  # m, of contact
-UP = (0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,22 +52,32 @@ class Figures:
 
 @torch.no_grad()
 def figures(estimate: Estimate, truth: Batch, posing: Posing) -> Figures:
-    """Of estimates for images whose labels are true, on the floor y = 0."""
+    """Of estimates for inputs that were not augmented, whose labels are true."""
+    estimate, truth = _on_cpu(estimate), truth.to("cpu")
+    posing = posing.to("cpu")
     known = Estimate(_columns(truth.pose), truth.betas, estimate.camera)
     vertices, joints = _in_world(posing(estimate), truth)
     true_vertices, true_joints = _in_world(posing(known), truth)
-    template, floor = posing.body.template, ipt.Ground.y_up()
-    lowest = vertices[..., 1].amin(dim=1)
-    snapped = vertices - lowest[:, None, None] * vertices.new_tensor(UP)
+    template, ground = posing.body.template, truth.ground
+    lowest = ground.signed_height(vertices).amin(dim=1)
+    snapped = vertices - lowest[:, None, None] * truth.up[:, None].double()
+    balanced = ipt.support_margin(vertices, template, ground) >= 0
+    strict = ipt.support_margin(snapped, template, ground, STRICT, "exact") >= 0
+    roots = joints[:, 0].numpy(), true_joints[:, 0].numpy()
+    body, world = truth.has_body.numpy(), truth.has_world.numpy()
     return Figures(
-        mpjpe=mpjpe(joints.numpy(), true_joints.numpy()),
-        pa_mpjpe=pa_mpjpe(joints.numpy(), true_joints.numpy()),
-        pve=pve(vertices.numpy(), true_vertices.numpy(), joints[:, 0].numpy(), true_joints[:, 0].numpy()),
-        bose=(ipt.support_margin(vertices, template, floor) >= 0).numpy(),
-        strict=(ipt.support_margin(snapped, template, floor, STRICT, "exact") >= 0).numpy(),
-        lowest=lowest.numpy(),
-        tilt=_tilt(estimate.rotations[:, 0].double(), truth).numpy(),
+        mpjpe=np.where(body, mpjpe(joints.numpy(), true_joints.numpy()), np.nan),
+        pa_mpjpe=np.where(body, pa_mpjpe(joints.numpy(), true_joints.numpy()), np.nan),
+        pve=np.where(body, pve(vertices.numpy(), true_vertices.numpy(), *roots), np.nan),
+        bose=np.where(world, balanced.numpy(), np.nan),
+        strict=np.where(world, strict.numpy(), np.nan),
+        lowest=np.where(world, lowest.numpy(), np.nan),
+        tilt=np.where(body & world, _tilt(estimate.rotations[:, 0].double(), truth).numpy(), np.nan),
     )
+
+
+def _on_cpu(estimate: Estimate) -> Estimate:
+    return Estimate(*(value.float().cpu() for value in (estimate.pose, estimate.betas, estimate.camera)))
 
 
 def _in_world(posed: Posed, truth: Batch) -> tuple[Tensor, Tensor]:
@@ -79,6 +91,6 @@ def _columns(rotations: Tensor) -> Tensor:
 
 def _tilt(root: Tensor, truth: Batch) -> Tensor:
     """The angle between the directions that the two pelvises have for up. Both are (B, 3, 3) in camera axes."""
-    up = truth.camera.double() @ root.new_tensor(UP)
+    up = torch.einsum("bij,bj->bi", truth.camera.double(), truth.up.double())
     own, true = (torch.einsum("bij,bi->bj", turn, up) for turn in (root, truth.pose[:, 0].double()))
     return torch.atan2(torch.linalg.cross(own, true).norm(dim=1), (own * true).sum(dim=1))

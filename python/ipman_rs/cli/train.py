@@ -1,0 +1,39 @@
+"""`ipman train`: IPMAN-R's regressor on data sets that a YAML file names."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("config", type=click.Path(dir_okay=False, exists=True, path_type=Path))
+@click.argument("changes", nargs=-1, metavar="[NAME=VALUE]...")
+@click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Folder.")
+def train(config: Path, changes: tuple[str, ...], output: Path) -> None:
+    """Train a regressor of bodies with the intuitive-physics losses.
+
+    CONFIG is a YAML file (docs/training.md lists its entries); NAME=VALUE takes precedence over it. Interrupted, the
+    same command goes on where it was, with the same losses as if it had not been. Needs the extra `train`.
+
+    \b
+    ipman train hmr.yaml -o out/hmr
+    ipman train hmr.yaml -o out/ipman physics.preset=paper-r steps=20000
+    torchrun --nproc-per-node 4 $(which ipman) train hmr.yaml -o out/hmr devices=4
+    """
+    from . import console
+
+    try:
+        from ..training.trainer.config import load
+        from ..training.trainer.run import train as run
+    except ImportError as error:
+        console.error(f"{error.name} is needed: pip install 'ipman_rs[train]'")
+        sys.exit(1)
+    try:
+        last = run(load(config, changes), output)
+    except (ImportError, ValueError) as error:
+        console.error(str(error))
+        sys.exit(1)
+    click.echo(f"checkpoint: {last}")

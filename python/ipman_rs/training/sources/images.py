@@ -1,0 +1,131 @@
+"""Images of a data set of `ipman_rs.data` with their labels, cropped and augmented."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from ipman_rs.body import BodyModel, rotations
+from ipman_rs.data import DataSet, Frames
+
+from ..augment import Augmentation, Augmenting, crop, follow, to_crop
+from .source import BadSample
+
+Array = NDArray[np.floating]
+
+
+class Images:
+    """Frames of one data set for a body model.
+
+    keypoints: names of those that are asked for; a data set's others are left out. size: pixels of a crop's side.
+    augmenting: how samples are changed where a generator is given. Pose and betas of another body model count as not
+    labelled. Frames without cameras give the body in camera axes, as SPIN's files do; they have no world.
+    """
+
+    def __init__(
+        self,
+        data: DataSet,
+        body: BodyModel,
+        keypoints: Sequence[str],
+        size: int = 224,
+        augmenting: Augmenting | None = None,
+    ) -> None:
+        self.data, self.body, self.keypoints, self.size = data, body, tuple(keypoints), size
+        self.augmenting = augmenting or Augmenting()
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+    def sample(self, row: int, draw: np.random.Generator | None) -> dict[str, Tensor]:
+        frame = self.data[slice(row, row + 1)]
+        if frame.boxes is None:
+            raise BadSample(f"{frame.names[0]}: no box around the person")
+        change = Augmentation() if draw is None else self.augmenting.draw(draw)
+        try:
+            whole = to_crop(frame.boxes[0].tolist(), change)
+            pixels = crop(self._image(frame, row), frame.boxes[0].tolist(), change, self.size)
+        except (OSError, SyntaxError, ValueError) as error:
+            raise BadSample(f"{frame.names[0]}: {error}") from None
+        labels = self.labels(frame)
+        return {**follow(labels, whole, change, self.keypoints, self.body.joint_names), "inputs": pixels}
+
+    def labels(self, frame: Frames) -> dict[str, Tensor]:
+        """Of the one image as it is: fields of `Batch`, keypoints in pixels. What is not labelled has zeros."""
+        labelled = frame.pose is not None and frame.betas is not None and frame.body == self.body.name
+        camera = np.eye(3) if frame.cameras is None else np.asarray(frame.cameras.rotation[0], float)
+        pose = np.tile(np.eye(3), (self.body.num_joints, 1, 1))
+        betas = np.zeros(self.body.num_betas)
+        if labelled:
+            assert frame.pose is not None
+            assert frame.betas is not None
+            pose = rotations.from_axis_angle(np.asarray(frame.pose[0], float))
+            pose[0] = camera @ pose[0]
+            count = min(len(betas), frame.betas.shape[1])
+            betas[:count] = frame.betas[0, :count]
+        joints = _named(frame.joints, frame.joint_names, self.body.joint_names, 3)
+        pelvis = joints[0, :3].copy()
+        joints[:, :3] = joints[:, :3] @ camera.T
+        world = frame.cameras is not None and frame.ground is not None and joints[0, 3] > 0
+        ground = _plane(frame)
+        return {
+            "keypoints": _single(_named(frame.keypoints, frame.keypoint_names, self.keypoints, 2)),
+            "joints": _single(joints),
+            "pose": _single(pose),
+            "betas": _single(betas),
+            "has_body": torch.tensor(labelled),
+            "camera": _single(camera),
+            "pelvis": _single(pelvis),
+            "up": _single(ground[0]),
+            "height": _single(ground[1]),
+            "has_world": torch.tensor(world),
+            "standing": torch.tensor(_flag(frame.standing)),
+            "contact": torch.tensor(_flag(frame.contact)),
+        }
+
+    def _image(self, frame: Frames, row: int) -> Any:
+        """A PIL image: the data set's own, or the file that the frame names."""
+        from PIL import Image
+
+        own = getattr(self.data, "image", None)
+        if own is not None:
+            return Image.fromarray(own(row))
+        if frame.images is None:
+            raise BadSample(f"{frame.names[0]}: no image")
+        with Image.open(str(frame.images[0])) as image:
+            return image.convert("RGB")
+
+
+def _named(points: Array | None, names: Sequence[str] | None, wanted: Sequence[str], size: int) -> Array:
+    """The wanted points of a frame (len(wanted), size + 1), confidence last, 0 for those it lacks."""
+    found = np.zeros((len(wanted), size + 1))
+    if points is None or names is None:
+        return found
+    rows = {name: row for row, name in enumerate(names)}
+    for index, name in enumerate(wanted):
+        if name in rows:
+            point = np.asarray(points[0, rows[name]], float)
+            found[index, :size] = point[:size]
+            found[index, size] = point[size] if len(point) > size else 1.0
+    return found
+
+
+def _plane(frame: Frames) -> tuple[Array, Array]:
+    """Normal (3,) and height () of the ground."""
+    if frame.ground is None:
+        return np.array([0.0, 1.0, 0.0]), np.array(0.0)
+    normal, height = np.asarray(frame.ground.normal, float), np.asarray(frame.ground.height, float)
+    return normal.reshape(-1, 3)[0], height.reshape(-1)[0]
+
+
+def _flag(flags: Any) -> bool:
+    """Of one frame: a data set without the label claims nothing."""
+    return flags is not None and bool(flags[0])
+
+
+def _single(array: Any) -> Tensor:
+    return torch.from_numpy(np.array(array, np.float32))

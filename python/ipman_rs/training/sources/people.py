@@ -1,0 +1,29 @@
+"""Static people of the embedded body, seen as keypoints: a source that needs no files."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ..batch import Batch
+from ..lifting.bodies import draw_bodies
+from ..lifting.views import noisy, views
+
+
+class People:
+    """`count` people of a seed, an image each; labels lean by `tilt` degrees."""
+
+    def __init__(self, count: int, seed: int, tilt: float = 0.0) -> None:
+        self.views = views(draw_bodies(count, seed), seed, tilt=tilt)
+
+    def __len__(self) -> int:
+        return len(self.views)
+
+    def sample(self, row: int, draw: np.random.Generator | None) -> dict[str, Tensor]:
+        one = self.views[slice(row, row + 1)]
+        if draw is not None:
+            one = noisy(one, torch.Generator().manual_seed(int(draw.integers(2**63))))
+        return {field.name: getattr(one, field.name)[0] for field in fields(Batch)}

@@ -1,0 +1,167 @@
+"""What a training run is told: a YAML file, and numbers on the command line that take precedence."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from ipman_rs.presets import PRESETS
+
+from ..augment import Augmenting
+from ..losses import Weights
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """One data set. name: of `ipman_rs.data`, or "people" (built ones, seen as keypoints; path is then their number).
+    share: of the training samples. options: of the data set, such as `split` or `images`."""
+
+    name: str
+    path: str
+    share: float = 1.0
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Physics:
+    """preset: of `ipman_rs.presets`, or none. weights, counted: as in `losses.Physics`."""
+
+    preset: str = "none"
+    weights: dict[str, float] = field(default_factory=dict)
+    counted: str = "labelled"
+
+
+@dataclass(frozen=True)
+class Model:
+    """backbone: as in `model.backbone`, or "keypoints". pretrained: with ImageNet's weights. size: of the crop, pixels.
+    spin: a checkpoint in SPIN's format to start from. mean: SPIN's file of mean parameters. dropout: of the
+    regressor."""
+
+    backbone: str = "resnet50"
+    pretrained: bool = False
+    size: int = 224
+    spin: str = ""
+    mean: str = ""
+    dropout: float = 0.5
+
+
+@dataclass(frozen=True)
+class Config:
+    """batch: of each process. rate: of Adam. devices, nodes, accelerator, precision: Lightning's. workers: processes
+    that load data. validate, save, log: every so many steps; validate: 0 for never."""
+
+    data: tuple[DataSet, ...]
+    validation: tuple[DataSet, ...] = ()
+    body: str = "anny-lite"
+    model: Model = field(default_factory=Model)
+    loss: Weights = field(default_factory=Weights)
+    physics: Physics = field(default_factory=Physics)
+    augment: Augmenting = field(default_factory=Augmenting)
+    steps: int = 10_000
+    batch: int = 64
+    rate: float = 5e-5
+    seed: int = 0
+    validate: int = 1000
+    save: int = 500
+    log: int = 10
+    workers: int = 0
+    devices: int = 1
+    nodes: int = 1
+    accelerator: str = "auto"
+    precision: str = "32-true"
+
+
+def load(path: Path, changes: Sequence[str] = ()) -> Config:
+    """A YAML file, changed by `name=value` or `group.name=value`.
+
+    ValueError, naming the file and the entry, for what is unknown or of the wrong kind.
+    """
+    import yaml
+
+    try:
+        content = yaml.safe_load(path.read_text())
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read: {error}") from None
+    except yaml.YAMLError as error:
+        raise ValueError(f"{path}: not YAML: {error}") from None
+    try:
+        if not isinstance(content, dict):
+            raise ValueError(f"expected names with values, got {content!r}")
+        for change in changes:
+            _change(content, change)
+        return config(content)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def config(content: Mapping[str, Any]) -> Config:
+    """A configuration from plain dictionaries. ValueError as `load`."""
+    made = _made(Config, content, "")
+    if not made.data:
+        raise ValueError("data: expected at least one data set to train on, got none")
+    if made.physics.preset != "none" and made.physics.preset not in PRESETS:
+        raise ValueError(f"physics.preset: expected none or one of {', '.join(PRESETS)}, got {made.physics.preset!r}")
+    for name in ("steps", "batch", "save", "log"):
+        if getattr(made, name) < 1:
+            raise ValueError(f"{name}: expected at least 1, got {getattr(made, name)}")
+    return made
+
+
+def plain(settings: Config) -> dict[str, Any]:
+    """The configuration as dictionaries and lists, for files."""
+    content = dataclasses.asdict(settings)
+    return {**content, "data": list(content["data"]), "validation": list(content["validation"])}
+
+
+def _change(content: dict[str, Any], change: str) -> None:
+    import yaml
+
+    name, given, value = change.partition("=")
+    if not given:
+        raise ValueError(f"{change}: expected name=value")
+    *groups, last = name.split(".")
+    for group in groups:
+        content = content.setdefault(group, {})
+        if not isinstance(content, dict):
+            raise ValueError(f"{name}: {group} has no entries")
+    content[last] = yaml.safe_load(value)
+
+
+def _made(kind: Any, content: Any, place: str) -> Any:
+    """A dataclass from a dictionary, recursively."""
+    if not isinstance(content, Mapping):
+        raise ValueError(f"{place or 'the file'}: expected names with values, got {content!r}")
+    hints = get_type_hints(kind)
+    names = [entry.name for entry in dataclasses.fields(kind)]
+    unknown = [str(name) for name in content if name not in names]
+    if unknown:
+        raise ValueError(f"{_at(place, unknown[0])}: unknown; expected some of {', '.join(names)}")
+    for entry in dataclasses.fields(kind):
+        needed = entry.default is dataclasses.MISSING and entry.default_factory is dataclasses.MISSING
+        if needed and entry.name not in content:
+            raise ValueError(f"{_at(place, entry.name)}: missing")
+    return kind(**{name: _value(hints[name], value, _at(place, name)) for name, value in content.items()})
+
+
+def _value(hint: Any, value: Any, place: str) -> Any:
+    if dataclasses.is_dataclass(hint):
+        return _made(hint, value, place)
+    if hint == tuple[DataSet, ...]:
+        if not isinstance(value, (list, tuple)):
+            raise ValueError(f"{place}: expected a list of data sets, got {value!r}")
+        return tuple(_made(DataSet, one, f"{place}[{number}]") for number, one in enumerate(value))
+    if hint is float and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value)
+    if hint is str and isinstance(value, (str, int)) and not isinstance(value, bool):
+        return str(value)
+    wanted = dict if getattr(hint, "__origin__", None) is dict else hint
+    if not isinstance(value, wanted) or (isinstance(value, bool) and wanted is not bool):
+        raise ValueError(f"{place}: expected {wanted.__name__}, got {value!r}")
+    return value
+
+
+def _at(place: str, name: str) -> str:
+    return f"{place}.{name}" if place else name

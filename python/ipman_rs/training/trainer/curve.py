@@ -1,0 +1,56 @@
+"""The loss of every step, and the figures of every validation, as CSV that a kill leaves whole."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import lightning
+
+
+class Curve(lightning.Callback):
+    """`curve.csv`: a line a step; `validation.csv`: a line a validation. A run that goes on from a checkpoint first
+    drops the lines that it will write again."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def on_train_start(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
+        if trainer.is_global_zero:
+            for name, last in (("curve.csv", trainer.global_step - 1), ("validation.csv", trainer.global_step)):
+                _drop_after(self.folder / name, last)
+
+    def on_train_batch_end(
+        self, trainer: lightning.Trainer, pl_module: lightning.LightningModule, outputs: Any, batch: Any, batch_idx: int
+    ) -> None:
+        if trainer.is_global_zero:
+            numbers = {"loss": outputs["loss"], **outputs["terms"]}
+            self._write("curve.csv", trainer.global_step - 1, {key: float(value) for key, value in numbers.items()})
+
+    def on_validation_end(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
+        if trainer.is_global_zero:
+            found = {key: float(value) for key, value in trainer.callback_metrics.items() if "/" in key}
+            self._write("validation.csv", trainer.global_step, found)
+
+    def _write(self, name: str, step: int, numbers: Mapping[str, float]) -> None:
+        path = self.folder / name
+        fresh = not path.exists()
+        with path.open("a", newline="") as file:
+            lines = csv.writer(file)
+            if fresh:
+                lines.writerow(["step", *numbers])
+            lines.writerow([step, *(repr(value) for value in numbers.values())])
+
+
+def _drop_after(path: Path, last: int) -> None:
+    if not path.exists():
+        return
+    head, *lines = path.read_text().splitlines(keepends=True)
+    # A kill may have cut the last line short.
+    kept = [line for line in lines if line.endswith("\n") and int(line.partition(",")[0]) <= last]
+    rest = path.with_suffix(".rest")
+    rest.write_text("".join([head, *kept]))
+    os.replace(rest, path)

@@ -1,0 +1,83 @@
+"""The data sets of a configuration as loaders."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from torch.utils.data import DataLoader, Dataset
+
+from ipman_rs.body import BodyModel
+
+from ..batch import Batch
+from ..lifting.views import KEYPOINTS
+from ..sources import BadSample, Images, Mixture, People, Share, Source
+from ..sources.mixture import Steps
+from . import config
+
+PEOPLE_SEED, VALIDATION_SEED = 41_000, 42_000
+
+
+def keypoint_names() -> tuple[str, ...]:
+    """The keypoints that every data set is asked for."""
+    return KEYPOINTS
+
+
+def source(told: config.DataSet, settings: config.Config, body: BodyModel, seed: int = PEOPLE_SEED) -> Source:
+    """One data set. ValueError, naming it, if it cannot be opened or does not fit the model."""
+    of_keypoints = settings.model.backbone == "keypoints"
+    if told.name == "people":
+        if not of_keypoints:
+            raise ValueError("data: 'people' are keypoints; they need model.backbone: keypoints")
+        if not told.path.isdigit() or int(told.path) < 1:
+            raise ValueError(f"data: people: path: expected their number, got {told.path!r}")
+        return People(int(told.path), seed, **told.options)
+    if of_keypoints:
+        raise ValueError(f"data: {told.name}: model.backbone 'keypoints' is for 'people' alone")
+    import ipman_rs.data
+
+    try:
+        data = ipman_rs.data.open(told.name, Path(os.path.expanduser(told.path)), **told.options)
+    except (OSError, TypeError, ValueError) as error:
+        raise ValueError(f"data: {told.name}: {error}") from None
+    return Images(data, body, keypoint_names(), settings.model.size, settings.augment)
+
+
+def training_loader(settings: config.Config, body: BodyModel, start: int, rank: int, processes: int) -> DataLoader:
+    """Batches of one process from step `start` on."""
+    shares = [Share(told.name, source(told, settings, body), told.share) for told in settings.data]
+    steps = Steps(start, settings.steps, settings.batch, rank, processes)
+    return DataLoader(
+        Mixture(shares, settings.seed), batch_sampler=steps, collate_fn=Batch.of, num_workers=settings.workers
+    )
+
+
+def validation_loaders(settings: config.Config, body: BodyModel, rank: int, processes: int) -> list[DataLoader]:
+    """A loader for each set: this process' part of it, as it is."""
+    loaders = []
+    for told in settings.validation:
+        rows = Plain(source(told, settings, body, VALIDATION_SEED), rank, processes)
+        loaders.append(DataLoader(rows, settings.batch, collate_fn=_good, num_workers=settings.workers))
+    return loaders
+
+
+class Plain(Dataset):
+    """Every `processes`-th sample of a source, not augmented; None for a bad one."""
+
+    def __init__(self, origin: Source, rank: int, processes: int) -> None:
+        self.origin, self.rows = origin, range(rank, len(origin), processes)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, index: int):
+        try:
+            return self.origin.sample(self.rows[index], None)
+        except BadSample:
+            return None
+
+
+def _good(samples: Sequence) -> Batch | None:
+    found = [sample for sample in samples if sample is not None]
+    return Batch.of(found) if found else None

@@ -1,0 +1,101 @@
+"""The Lightning module: HMR, its loss, and its figures on each validation set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import lightning
+import numpy as np
+import torch
+from torch import Tensor
+
+import ipman_rs.torch as ipt
+
+from ..batch import Batch
+from ..benchmark.report import COLUMNS, columns
+from ..figures import figures
+from ..lifting.network import WIDTH, KeypointEncoder
+from ..losses import Loss, Physics
+from ..model import HMR, MeanParameters, backbone, load_spin
+from ..posing import Posing
+from . import config, data
+
+
+class Training(lightning.LightningModule):
+    """Everything that a configuration decides."""
+
+    def __init__(self, settings: config.Config) -> None:
+        super().__init__()
+        self.settings = settings
+        posing = Posing(ipt.BodyModel(settings.body), data.keypoint_names())
+        self.body = posing.body.body
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(settings.seed)  # the same weights in every process
+            self.model = made(settings, posing)
+        self.loss = Loss(posing, _physics(settings, posing), settings.loss)
+        self._sums = torch.zeros(0)
+
+    def forward(self, inputs: Tensor):
+        return self.model(inputs)
+
+    def configure_optimizers(self):
+        return torch.optim.Adam(self.parameters(), lr=self.settings.rate)
+
+    def train_dataloader(self):
+        start = self.trainer.global_step
+        return data.training_loader(self.settings, self.body, start, self.global_rank, self.trainer.world_size)
+
+    def val_dataloader(self):
+        return data.validation_loaders(self.settings, self.body, self.global_rank, self.trainer.world_size)
+
+    def on_train_batch_start(self, batch: Batch, batch_idx: int) -> None:
+        # Dropout depends on the step and the process alone: an interrupted run goes on as if it had not been one.
+        seed = np.random.SeedSequence([self.settings.seed, self.global_step, self.global_rank])
+        torch.manual_seed(int(seed.generate_state(1, np.uint64)[0] >> 1))
+
+    def training_step(self, batch: Batch, batch_idx: int) -> dict[str, Any]:
+        batch = batch.sound()
+        total, terms = self.loss(self.model(batch.inputs), batch)
+        return {"loss": total, "terms": terms}
+
+    def on_validation_epoch_start(self) -> None:
+        self._sums = torch.zeros(len(self.settings.validation), len(COLUMNS), 2, dtype=torch.float64)
+
+    def validation_step(self, batch: Batch | None, batch_idx: int, dataloader_idx: int = 0) -> None:
+        if batch is None:
+            return
+        batch = batch.sound()
+        found = columns(figures(self.model(batch.inputs), batch, Posing(ipt.BodyModel(self.body), ())))
+        for number, key in enumerate(COLUMNS):
+            values = torch.from_numpy(found[key][np.isfinite(found[key])])
+            self._sums[dataloader_idx, number] += torch.tensor([values.sum(), len(values)], dtype=torch.float64)
+
+    def on_validation_epoch_end(self) -> None:
+        """Means over each set, of all processes, under the set's name; `PVE` alone is the first set's."""
+        sums = self.trainer.strategy.reduce(self._sums.to(self.device), reduce_op="sum")
+        assert isinstance(sums, Tensor)
+        means = (sums[..., 0] / sums[..., 1]).cpu()
+        for row, told in enumerate(self.settings.validation):
+            for number, key in enumerate(COLUMNS):
+                self.log(f"{told.name}/{row}/{key}", means[row, number].float(), rank_zero_only=False, sync_dist=False)
+        self.log("PVE", means[0, list(COLUMNS).index("PVE")].float())
+
+
+def made(settings: config.Config, posing: Posing) -> HMR:
+    """The regressor of a configuration, with the weights that it starts from."""
+    told = settings.model
+    mean = MeanParameters.read(Path(told.mean)) if told.mean else MeanParameters.of(posing.body.body)
+    if told.backbone == "keypoints":
+        return HMR(KeypointEncoder(len(posing.keypoints)), WIDTH, mean, hidden=WIDTH, dropout=told.dropout)
+    model = HMR(*backbone(told.backbone, told.pretrained), mean, dropout=told.dropout)
+    if told.spin:
+        load_spin(model, told.spin)
+    return model
+
+
+def _physics(settings: config.Config, posing: Posing) -> Physics | None:
+    told = settings.physics
+    if told.preset == "none":
+        return None
+    return Physics(posing.body.template, told.preset, told.weights, told.counted)  # type: ignore[arg-type]
