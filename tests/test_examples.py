@@ -20,6 +20,8 @@ def run(code: list[str], source: str) -> str:
     """Standard output of a script in a process of its own, as a user would start it."""
     if "torch" in source and importlib.util.find_spec("torch") is None:
         pytest.skip("needs torch, which is an extra")
+    if "import lightning" in source and importlib.util.find_spec("lightning") is None:
+        pytest.skip("needs lightning, which is an extra")
     done = subprocess.run(
         [sys.executable, "-W", "error::DeprecationWarning:__main__", *code],
         cwd=ROOT, env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True, timeout=300, check=False,
@@ -68,6 +70,12 @@ def test_balance_and_gradients():
     first, cross, cross_again, second = numbers(r"-?\d+\.\d+", shown.splitlines()[-1])
     assert cross == cross_again
     assert min(first, first * second - cross**2) > 0, "balance is a minimum: the Hessian is positive definite"
+
+
+def test_physics_in_your_trainer():
+    theirs, with_physics = numbers(r"leans by ([\d.]+)", example(5))
+    assert theirs == pytest.approx(14.3, abs=2), "the labels' lean of 0.25 radians is learnt"
+    assert with_physics < theirs - 2, "physics lifts the body"
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)

@@ -15,8 +15,8 @@ from click.testing import CliRunner
 from ipman_rs.cli import main
 from ipman_rs.training.benchmark import report
 from ipman_rs.training.benchmark.intervals import paired_over_seeds
-from ipman_rs.training.figures import figures
 from ipman_rs.training.benchmark.rows import BASELINE, CONTROL, OURS, settings
+from ipman_rs.training.figures import figures
 from ipman_rs.training.lifting import views
 from ipman_rs.training.model import Estimate
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pickle
 from pathlib import Path
 
 import lightning
@@ -52,9 +53,9 @@ def train(settings: Config, folder: Path) -> Path:
     )
     try:
         trainer.fit(module, ckpt_path=str(last) if last.exists() else None, weights_only=True)
-    except (RuntimeError, KeyError) as error:
+    except (RuntimeError, KeyError, EOFError, pickle.UnpicklingError) as error:
         if last.exists() and trainer.global_step == 0:
-            raise ValueError(f"{last}: does not fit this model: {str(error).splitlines()[0]}") from error
+            raise ValueError(f"{last}: not a checkpoint of this model: {str(error).splitlines()[0]}") from error
         raise
     return last
 

@@ -1,0 +1,58 @@
+"""The losses in somebody else's LightningModule, in the manner of 4D-Humans' (needs torch and lightning).
+
+`Theirs` stands for it; `WithPhysics` is all that is added. Run:    python examples/05_physics_in_your_trainer.py
+"""
+
+from __future__ import annotations
+
+import lightning
+import torch
+
+import ipman_rs.torch as ipt
+
+body = ipt.BodyModel("anny-lite")
+
+
+class Theirs(lightning.LightningModule):
+    def __init__(self):
+        super().__init__()
+        self.network = torch.nn.Sequential(torch.nn.Conv2d(3, 8, 16, 16), torch.nn.Flatten(), torch.nn.Linear(128, 144))
+        torch.nn.init.zeros_(self.network[2].weight)
+
+    def forward_step(self, batch):
+        start = torch.tensor([1.0, 0, 0, 0, 1, 0]).repeat(24, 1)
+        start[0, 4] = -1  # upright where y runs down
+        posed = body(start + self.network(batch["img"]).reshape(-1, 24, 6))
+        return {"pred_vertices": posed.vertices, "pred_keypoints_3d": posed.joints}
+
+    def compute_loss(self, batch, output):
+        found, labels = output["pred_keypoints_3d"], batch["keypoints_3d"]
+        return 5 * (found - found[:, :1] - labels + labels[:, :1]).abs().mean()
+
+
+class WithPhysics(Theirs):
+    physics = ipt.IntuitivePhysicsLoss(body.template, "balanced", weights={"balance": 3.0, "pull": 2.0, "push": 2.0})
+
+    def compute_loss(self, batch, output):
+        vertices, root = output["pred_vertices"], output["pred_keypoints_3d"][:, 0]
+        turned, _ = ipt.camera_to_world(vertices - root[:, None], 0 * root, batch["cam_R"], 0 * root)
+        world = turned + batch["pelvis_world"][:, None]
+        return super().compute_loss(batch, output) + self.physics.weighted(world, batch["ground"])[0]
+
+
+if __name__ == "__main__":
+    rest, camera = body(), torch.diag(torch.tensor([1.0, -1, -1]))  # a level camera: x right, y down, z forward
+    lean = torch.linalg.matrix_exp(0.25 * torch.tensor([[0.0, 0, 0], [0, 0, -1], [0, 1, 0]]))  # of labels: 14 degrees
+    pelvis = rest.joints[0] - rest.vertices[:, 1].min() * torch.tensor([0.0, 1, 0])
+    batch = {"img": torch.rand(8, 3, 64, 64), "keypoints_3d": (rest.joints @ (camera @ lean).T).expand(8, -1, -1)}
+    batch |= {"cam_R": camera.expand(8, 3, 3), "pelvis_world": pelvis.expand(8, 3), "ground": ipt.Ground.y_up()}
+    for kind in (Theirs, WithPhysics):
+        torch.manual_seed(0)
+        optimizer = torch.optim.Adam((module := kind()).parameters(), lr=2e-3)
+        for _ in range(80):
+            loss = module.compute_loss(batch, output := module.forward_step(batch))
+            optimizer.zero_grad(), loss.backward(), optimizer.step()
+        spine = (output["pred_keypoints_3d"][:, 12] - output["pred_keypoints_3d"][:, 0]) @ camera
+        print(
+            f"{kind.__name__}: leans by {torch.rad2deg(torch.acos(spine[:, 1] / spine.norm(dim=1))).mean():.1f} degrees"
+        )

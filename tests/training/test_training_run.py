@@ -1,0 +1,170 @@
+"""The trainer: configurations, a run, a kill, two processes, folders and checkpoints that do not fit."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import torch
+from click.testing import CliRunner
+
+pytest.importorskip("lightning", reason="lightning is not installed")
+
+from ipman_rs.cli import main
+from ipman_rs.training.trainer import config
+
+SETTINGS = """
+data: [{name: people, path: 28}]
+validation: [{name: people, path: 7}]
+model: {backbone: keypoints, dropout: 0.3}
+physics: {preset: paper-r}
+steps: 24
+batch: 4
+rate: 1.0e-3
+validate: 12
+save: 5
+accelerator: cpu
+"""
+
+
+@pytest.fixture
+def settings(tmp_path):
+    path = tmp_path / "run.yaml"
+    path.write_text(SETTINGS)
+    return path
+
+
+def curve(folder: Path, name: str = "curve.csv") -> list[dict[str, str]]:
+    with (folder / name).open() as file:
+        return list(csv.DictReader(file))
+
+
+def command(*arguments) -> list[str]:
+    return [sys.executable, str(Path(__file__).with_name("ipman_script.py")), *map(str, arguments)]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A run that nothing interrupted."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "run.yaml").write_text(SETTINGS)
+    result = CliRunner().invoke(main, ["train", str(folder / "run.yaml"), "-o", str(folder / "out")])
+    assert result.exit_code == 0, result.output
+    return folder / "out"
+
+
+def test_a_run(whole):
+    lines = curve(whole)
+    assert [int(line["step"]) for line in lines] == list(range(24))
+    losses = [float(line["loss"]) for line in lines]
+    assert sum(losses[-4:]) < 0.8 * sum(losses[:4])
+    assert {"keypoints_2d", "joints_3d", "pose", "betas", "scale", "stability", "pull", "push"} <= set(lines[0])
+    found = curve(whole, "validation.csv")
+    assert [int(line["step"]) for line in found] == [12, 24]
+    assert 0 < float(found[1]["people/0/PVE"]) < 1000
+    assert (whole / "last.ckpt").exists()
+    assert (whole / "best.ckpt").exists()
+
+
+def test_a_killed_run_goes_on_as_if_nothing_had_been(whole, settings, tmp_path):
+    folder = tmp_path / "out"
+    process = subprocess.Popen(
+        command("train", settings, "-o", folder, "steps=2000", "validate=0"), stderr=subprocess.DEVNULL
+    )
+    until = time.time() + 300
+    while time.time() < until and not (folder / "last.ckpt").exists():
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    reached = len(curve(folder))
+    assert 5 <= reached < 2000
+    saved = torch.load(folder / "last.ckpt", weights_only=True)["global_step"]
+    result = CliRunner().invoke(
+        main, ["train", str(settings), "-o", str(folder), f"steps={max(24, saved + 3)}", "validate=0"]
+    )
+    assert result.exit_code == 0, result.output
+    again, straight = curve(folder), curve(whole)
+    assert [int(line["step"]) for line in again] == list(range(max(24, saved + 3)))
+    assert again[:24] == straight  # to the last digit
+
+
+def test_two_processes_are_one_with_twice_the_batch(settings, tmp_path):
+    """Equal but for the order of sums: the first losses within 1e-5, the weights after six steps within 1e-4."""
+    common = ["train", settings, "steps=6", "validate=0", "save=6", "model.dropout=0"]
+    weights = []
+    for processes in (1, 2):
+        folder = tmp_path / str(processes)
+        arguments = [*common, "-o", folder, f"devices={processes}", f"batch={8 // processes}"]
+        done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=900, check=False)
+        assert done.returncode == 0, done.stderr[-2000:]
+        weights.append(torch.load(folder / "last.ckpt", weights_only=True)["state_dict"])
+    # Adam's first steps are the gradient's sign: where a gradient is near zero the two may part by the rate.
+    differences = torch.cat([(weights[0][name] - weights[1][name]).abs().flatten() for name in weights[0]])
+    assert (differences < 1e-4).float().mean() > 0.999
+    assert differences.max() < 6e-3
+
+
+def test_another_configuration_is_refused(whole, settings):
+    result = CliRunner().invoke(main, ["train", str(settings), "-o", str(whole), "rate=0.5"])
+    assert result.exit_code == 1
+    assert "another rate" in result.output
+
+
+def test_damaged_checkpoints_are_named(settings, tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "last.ckpt").write_bytes(b"no checkpoint")
+    result = CliRunner().invoke(main, ["train", str(settings), "-o", str(folder)])
+    assert result.exit_code == 1
+    assert "last.ckpt" in result.output
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("stepz=3", "stepz: unknown; expected some of data"),
+        ("steps=many", "steps: expected int, got 'many'"),
+        ("steps=0", "steps: expected at least 1"),
+        ("model.backbones=small", "model.backbones: unknown"),
+        ("physics.preset=paper-x", "physics.preset: expected none or one of paper-r"),
+        ("data=[]", "at least one data set"),
+        ("data=[{name: people}]", r"data\[0\].path: missing"),
+        ("data=3", "data: expected a list"),
+        ("steps", "steps: expected name=value"),
+    ],
+)
+def test_configurations_that_cannot_be(settings, change, said):
+    with pytest.raises(ValueError, match=said):
+        config.load(settings, [change])
+
+
+def test_configurations_survive_their_file(settings):
+    made = config.load(settings, ["model.size=128", "augment.flip=0.25", "loss.pose=2", "precision=bf16-mixed"])
+    assert (made.model.size, made.augment.flip, made.loss.pose, made.precision) == (128, 0.25, 2.0, "bf16-mixed")
+    assert config.config(config.plain(made)) == made
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (["model.backbone=small"], "people.*need model.backbone: keypoints"),
+        (["data=[{name: rendered, path: nowhere}]"], "keypoints' is for 'people' alone"),
+        (["data=[{name: rendered, path: nowhere}]", "model.backbone=small", "validation=[]"], "rendered: .*nowhere"),
+        (
+            ["data=[{name: picasso, path: nowhere}]", "model.backbone=small", "validation=[]"],
+            "picasso.*expected one of",
+        ),
+    ],
+)
+def test_data_that_does_not_fit(settings, tmp_path, changes, said):
+    import re
+
+    result = CliRunner().invoke(main, ["train", str(settings), "-o", str(tmp_path / "out"), *changes])
+    assert result.exit_code == 1
+    assert re.search(said, result.output), result.output
