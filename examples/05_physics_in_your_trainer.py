@@ -31,7 +31,7 @@ class Theirs(lightning.LightningModule):
 
 
 class WithPhysics(Theirs):
-    physics = ipt.IntuitivePhysicsLoss(body.template, "balanced", weights={"balance": 3.0, "pull": 2.0, "push": 2.0})
+    physics = ipt.IntuitivePhysicsLoss(body.template, "balanced", weights={"balance": 1.0, "pull": 0.6, "push": 0.6})
 
     def compute_loss(self, batch, output):
         vertices, root = output["pred_vertices"], output["pred_keypoints_3d"][:, 0]
@@ -52,7 +52,6 @@ if __name__ == "__main__":
         for _ in range(80):
             loss = module.compute_loss(batch, output := module.forward_step(batch))
             optimizer.zero_grad(), loss.backward(), optimizer.step()
-        spine = (output["pred_keypoints_3d"][:, 12] - output["pred_keypoints_3d"][:, 0]) @ camera
-        print(
-            f"{kind.__name__}: leans by {torch.rad2deg(torch.acos(spine[:, 1] / spine.norm(dim=1))).mean():.1f} degrees"
-        )
+        error = 1e3 * Theirs.compute_loss(module, batch, output) / 5
+        terms = WithPhysics.physics(output["pred_vertices"] @ camera + pelvis - rest.joints[0], batch["ground"])
+        print(f"{kind.__name__}: keypoints off by {error:.0f} mm, balance cost {terms['balance']:.2f}")

@@ -73,9 +73,10 @@ def test_balance_and_gradients():
 
 
 def test_physics_in_your_trainer():
-    theirs, with_physics = numbers(r"leans by ([\d.]+)", example(5))
-    assert theirs == pytest.approx(14.3, abs=2), "the labels' lean of 0.25 radians is learnt"
-    assert with_physics < theirs - 2, "physics lifts the body"
+    shown = example(5)
+    errors, costs = numbers(r"off by (\d+)", shown), numbers(r"cost ([\d.]+)", shown)
+    assert costs[1] < 0.8 * costs[0], "labels that lean are followed less"
+    assert errors[0] < errors[1] < errors[0] + 60, "at some cost"
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)

@@ -76,9 +76,10 @@ def test_keypoints_are_the_projected_body(static, posing):
         torch.testing.assert_close((seen - middle) / (0.5 * 1.2 * side.max()), told, atol=1e-4, rtol=0)
 
 
-def test_labels_lean_as_told(static):
+@pytest.mark.parametrize("lean", ["camera", "any"])
+def test_labels_lean_as_told(static, lean):
     """Root and joints turn together, about level axes, by 8 ± 5 degrees; nothing else changes."""
-    clean, leaning = (views.views(static, seed=1, per_body=40, tilt=tilt) for tilt in (0.0, 8.0))
+    clean, leaning = (views.views(static, seed=1, per_body=40, tilt=tilt, lean=lean) for tilt in (0.0, 8.0))
     for name in ("keypoints", "camera", "pelvis", "betas"):
         assert torch.equal(getattr(clean, name), getattr(leaning, name))
     turn = leaning.pose[:, 0].double() @ clean.pose[:, 0].double().transpose(1, 2)  # in camera axes
@@ -89,6 +90,11 @@ def test_labels_lean_as_told(static):
     assert angle.std().item() == pytest.approx(spread.clip(0).std(), abs=0.4)
     lean = torch.rad2deg(torch.arccos(world[:, 1, 1].clamp(-1, 1)))  # of the vertical: all of it
     torch.testing.assert_close(lean, angle, atol=0.1, rtol=0)  # both from single precision
+    # Where the head goes: towards the camera, which looks along the third row; or any way.
+    towards = -(clean.camera.double()[:, 2] * world[..., 1]).sum(dim=1)
+    level = -(clean.camera.double()[:, 2, 1])  # of a head that does not lean
+    nearer = (towards > level)[angle > 1].float().mean().item()
+    assert nearer == (1.0 if lean == "camera" else pytest.approx(0.5, abs=0.06))
     moved = (turn.float() @ clean.joints[..., :3].transpose(1, 2)).transpose(1, 2)
     torch.testing.assert_close(moved, leaning.joints[..., :3], atol=1e-5, rtol=0)
     assert torch.equal(clean.pose[:, 1:], leaning.pose[:, 1:])

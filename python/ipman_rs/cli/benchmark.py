@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -67,9 +68,13 @@ def fit(output: Path, bodies: int, controls: int, iterations: int, split: str, o
     "--split", type=click.Choice(["test", "tune"]), default="test", show_default=True,
     help="Whose figures: settings are chosen on the one and reported on the other.",
 )  # fmt: skip
+@click.option(
+    "--lean", type=click.Choice(["camera", "any"]), default="camera", show_default=True,
+    help="Where to labels lean: all towards the camera, or each any way.",
+)  # fmt: skip
 @click.option("--part", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Of the steps, for a trial.")
 def train(
-    output: Path, bodies: int, people: int, seeds: int, tilts: tuple[float, ...], split: str, part: float
+    output: Path, bodies: int, people: int, seeds: int, tilts: tuple[float, ...], split: str, lean: Any, part: float
 ) -> None:
     """Training with and without intuitive physics: a regressor from keypoints, on people whose truth is known.
 
@@ -81,7 +86,7 @@ def train(
     from ..training.benchmark.run import SPLITS, TILTS, TRAINING, Benchmark
     from . import console
 
-    run = Benchmark(output, people, bodies, seeds, split, part)
+    run = Benchmark(output, people, bodies, seeds, split, part, lean)
     chosen = tuple(dict.fromkeys(tilts)) or TILTS
     with console.progress("drawing people", people) as step:
         run.drawn(TRAINING, people, step.to)

@@ -13,7 +13,7 @@ from ..lifting.drill import Drill
 from ..losses import Physics
 
 BASELINE = "HMR*"
-OURS = "balanced, tuned"
+OURS = "balanced"
 CONTROL = f"{OURS}, shuffled camera"
 
 

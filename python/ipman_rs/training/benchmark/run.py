@@ -20,6 +20,7 @@ from ..figures import Figures, figures
 from ..lifting import bodies, views
 from ..lifting.drill import drill, estimated
 from ..lifting.network import lifter
+from ..lifting.views import Lean
 from ..losses import Loss
 from ..model import HMR
 from .rows import Row, Settings, settings
@@ -41,7 +42,7 @@ class Result:
 @dataclass(frozen=True)
 class Benchmark:
     """people: that are trained on. bodies: whose figures are taken, an image each. seeds: of weights and batches.
-    part: of the settings' steps, for trials."""
+    part: of the settings' steps, for trials. lean: as in `lifting.views`."""
 
     folder: Path
     people: int = 3500
@@ -49,6 +50,7 @@ class Benchmark:
     seeds: int = 3
     split: str = "test"
     part: float = 1.0
+    lean: Lean = "camera"
 
     def run(self, tilt: float, progress: Callable[[], None] = lambda: None) -> list[Result]:
         """All rows with labels that lean by `tilt` degrees; `progress` is called after each row of each seed."""
@@ -105,7 +107,7 @@ class Benchmark:
     def _data(self, tilt: float) -> Batch:
         if tilt not in self._kept:
             self._kept.clear()
-            self._kept[tilt] = views.views(self.drawn(TRAINING, self.people), TRAINING, VIEWS, tilt)
+            self._kept[tilt] = views.views(self.drawn(TRAINING, self.people), TRAINING, VIEWS, tilt, self.lean)
         return self._kept[tilt]
 
     @cached_property
@@ -114,7 +116,7 @@ class Benchmark:
 
     def _place(self, kind: str, tilt: float, seed: int, row: Row | None = None) -> Path:
         """The file of a result: named by all that decides it."""
-        told: list[Any] = [self.people, VIEWS, tilt, seed, asdict(self.settings.base)]
+        told: list[Any] = [self.people, VIEWS, tilt, tilt and self.lean, seed, asdict(self.settings.base)]
         if row is not None:
             told += [self.split, self.bodies, asdict(self.settings.fine), row.preset, dict(row.weights), row.shuffled]
         key = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]

@@ -1,13 +1,15 @@
 """Cameras around static people, the keypoints they see, and labels whose gravity may lean.
 
-A tilt of d degrees turns the labelled body, parameters and joints, about a level axis through its pelvis: a random axis
-and an angle of d ± 5/8 d (standard deviation, not below 0), drawn once an image. So do parameters that were fitted to
-images before; keypoints, camera and ground stay true.
+A tilt of d degrees turns the labelled body, parameters and joints, about a level axis through its pelvis by d ± 5/8 d
+degrees (standard deviation, not below 0), drawn once an image. The lean is towards the camera: depth is what fits to
+images get wrong, and a regressor learns what all its labels have in common. Or it is any way, which averages out.
+Keypoints, camera and ground stay true.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from typing import Literal
 
 import numpy as np
 import torch
@@ -25,6 +27,7 @@ from .bodies import BODY, Bodies
 
 Array = NDArray[np.floating]
 Draw = np.random.Generator
+Lean = Literal["camera", "any"]
 
 KEYPOINTS = (*coco.NAMES, "left_big_toe", "right_big_toe", "left_heel", "right_heel")
 DISTANCE, PITCH, ROLL = (3.0, 6.0), (-5.0, 35.0), 4.0  # m, degrees the camera looks down, degrees
@@ -38,12 +41,12 @@ def posing() -> Posing:
     return Posing(ipt.BodyModel(BODY), KEYPOINTS)
 
 
-def views(bodies: Bodies, seed: int, per_body: int = 1, tilt: float = 0.0) -> Batch:
+def views(bodies: Bodies, seed: int, per_body: int = 1, tilt: float = 0.0, lean: Lean = "camera") -> Batch:
     """`per_body` images of each person, one after the other: inputs (n, K, 3) without noise, labels that lean by `tilt`
-    degrees. Cameras do not depend on the tilt."""
+    degrees towards the camera or "any" way. Cameras do not depend on the tilt."""
     rows = np.repeat(np.arange(len(bodies)), per_body)
     cameras, places = _cameras(len(rows), np.random.default_rng([seed, 0]))
-    tilts = _tilts(cameras, tilt, np.random.default_rng([seed, 1]))
+    tilts = _tilts(cameras, tilt, lean, np.random.default_rng([seed, 1]))
     matrices = rotations.from_axis_angle(bodies.pose)[rows]
     body = posing()
     with torch.no_grad():
@@ -102,16 +105,14 @@ def _cameras(count: int, draw: Draw) -> tuple[Array, Array]:
     return level @ turns, np.stack([0 * depth, 0 * depth, depth], axis=1)
 
 
-def _tilts(cameras: Array, degrees: float, draw: Draw) -> Array:
+def _tilts(cameras: Array, degrees: float, lean: Lean, draw: Draw) -> Array:
     """(n, 3, 3) turns about level axes of the world, for cameras (n, 3, 3)."""
-    import os
-
     count = len(cameras)
     heading = draw.uniform(0, 2 * np.pi, count)
     angle = np.radians((degrees * (1 + TILT_SPREAD * draw.standard_normal(count))).clip(min=0))
     axis = np.stack([np.cos(heading), 0 * heading, np.sin(heading)], axis=1)
-    if os.environ.get("LEAN"):
-        axis = cameras[:, 0] * [1.0, 0.0, 1.0]
+    if lean == "camera":
+        axis = cameras[:, 0] * [1.0, 0.0, 1.0]  # to the right in the image: about it, up turns towards the camera
         axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     return rotations.from_axis_angle(angle[:, None] * axis)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from torch.utils.data import DataLoader, Dataset
 
@@ -48,9 +49,19 @@ def training_loader(settings: config.Config, body: BodyModel, start: int, rank: 
     """Batches of one process from step `start` on."""
     shares = [Share(told.name, source(told, settings, body), told.share) for told in settings.data]
     steps = Steps(start, settings.steps, settings.batch, rank, processes)
-    return DataLoader(
+    return Resumable(
         Mixture(shares, settings.seed), batch_sampler=steps, collate_fn=Batch.of, num_workers=settings.workers
     )
+
+
+class Resumable(DataLoader):
+    """Tells Lightning that it may go on in the middle: where, `Steps` is told when the loader is made."""
+
+    def state_dict(self) -> dict[str, Any]:
+        return {}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        pass
 
 
 def validation_loaders(settings: config.Config, body: BodyModel, rank: int, processes: int) -> list[DataLoader]:
