@@ -16,8 +16,9 @@ body = ipt.BodyModel("anny-lite")
 class Theirs(lightning.LightningModule):
     def __init__(self):
         super().__init__()
-        self.network = torch.nn.Sequential(torch.nn.Conv2d(3, 8, 16, 16), torch.nn.Flatten(), torch.nn.Linear(128, 144))
-        torch.nn.init.zeros_(self.network[2].weight)
+        head = torch.nn.Linear(128, 144)
+        torch.nn.init.zeros_(head.weight)
+        self.network = torch.nn.Sequential(torch.nn.Conv2d(3, 8, 16, 16), torch.nn.Flatten(), head)
 
     def forward_step(self, batch):
         start = torch.tensor([1.0, 0, 0, 0, 1, 0]).repeat(24, 1)
@@ -51,7 +52,9 @@ if __name__ == "__main__":
         optimizer = torch.optim.Adam((module := kind()).parameters(), lr=2e-3)
         for _ in range(80):
             loss = module.compute_loss(batch, output := module.forward_step(batch))
-            optimizer.zero_grad(), loss.backward(), optimizer.step()
+            optimizer.zero_grad()
+            loss.backward()
+            optimizer.step()
         error = 1e3 * Theirs.compute_loss(module, batch, output) / 5
         terms = WithPhysics.physics(output["pred_vertices"] @ camera + pelvis - rest.joints[0], batch["ground"])
         print(f"{kind.__name__}: keypoints off by {error:.0f} mm, balance cost {terms['balance']:.2f}")

@@ -88,8 +88,8 @@ def test_labels_lean_as_told(static, lean):
     spread = 5.0 * np.random.default_rng(0).standard_normal(100_000) + 8.0
     assert angle.mean().item() == pytest.approx(spread.clip(0).mean(), abs=0.4)
     assert angle.std().item() == pytest.approx(spread.clip(0).std(), abs=0.4)
-    lean = torch.rad2deg(torch.arccos(world[:, 1, 1].clamp(-1, 1)))  # of the vertical: all of it
-    torch.testing.assert_close(lean, angle, atol=0.1, rtol=0)  # both from single precision
+    of_vertical = torch.rad2deg(torch.arccos(world[:, 1, 1].clamp(-1, 1)))  # all of it
+    torch.testing.assert_close(of_vertical, angle, atol=0.1, rtol=0)  # both from single precision
     # Where the head goes: towards the camera, which looks along the third row; or any way.
     towards = -(clean.camera.double()[:, 2] * world[..., 1]).sum(dim=1)
     level = -(clean.camera.double()[:, 2, 1])  # of a head that does not lean

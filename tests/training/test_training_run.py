@@ -16,7 +16,11 @@ from click.testing import CliRunner
 
 pytest.importorskip("lightning", reason="lightning is not installed")
 
+from PIL import Image
+
 from ipman_rs.cli import main
+from ipman_rs.training.augment import Augmentation, crop
+from ipman_rs.training.projection import project
 from ipman_rs.training.trainer import config
 
 SETTINGS = """
@@ -168,3 +172,83 @@ def test_data_that_does_not_fit(settings, tmp_path, changes, said):
     result = CliRunner().invoke(main, ["train", str(settings), "-o", str(tmp_path / "out"), *changes])
     assert result.exit_code == 1
     assert re.search(said, result.output), result.output
+
+
+def test_rendered_images(tmp_path):
+    """From rendering to a checkpoint, with a network for images."""
+    pytest.importorskip("embreex", reason="embreex is not installed")
+    render = [
+        "data",
+        "render",
+        "-o",
+        str(tmp_path / "images"),
+        "-n",
+        "7",
+        "--val",
+        "3",
+        "--test",
+        "0",
+        "--size",
+        "64",
+    ]
+    done = CliRunner().invoke(main, render)
+    assert done.exit_code == 0, done.output
+    (tmp_path / "run.yaml").write_text(f"""
+data: [{{name: rendered, path: {tmp_path / "images"}, options: {{split: train}}}}]
+validation: [{{name: rendered, path: {tmp_path / "images"}, options: {{split: val}}}}]
+model: {{backbone: small, size: 64}}
+physics: {{preset: balanced}}
+steps: 3
+batch: 4
+validate: 3
+save: 3
+accelerator: cpu
+""")
+    done = CliRunner().invoke(main, ["train", str(tmp_path / "run.yaml"), "-o", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    terms = curve(tmp_path / "out")[2]
+    assert float(terms["balance"]) > 0
+    assert float(terms["keypoints_2d"]) > 0
+    assert float(terms["pose"]) > 0
+    assert float(curve(tmp_path / "out", "validation.csv")[0]["rendered/0/PVE"]) > 0
+
+    # And back: bodies for two of the images and a file that is none.
+    import numpy as np
+
+    from ipman_rs.data import open as open_data
+    from ipman_rs.training.predict import Trained
+
+    data = open_data("rendered", tmp_path / "images", split="val")
+    photos = tmp_path / "photos"
+    photos.mkdir()
+    for row in range(2):
+        Image.fromarray(data.image(row)).save(photos / f"{row}.png")
+    (photos / "2.jpg").write_bytes(b"none")
+    arguments = [
+        "predict",
+        str(photos),
+        "--checkpoint",
+        str(tmp_path / "out" / "last.ckpt"),
+        "-o",
+        str(tmp_path / "found"),
+    ]
+    done = CliRunner().invoke(main, [*arguments, "--pictures", "1"])
+    assert done.exit_code == 1
+    assert "2.jpg" in done.output
+    assert (tmp_path / "found" / "report.html").exists()
+    assert (tmp_path / "found" / "0" / "overlay.png").exists()
+    stored = np.load(tmp_path / "found" / "1" / "1.npz")
+    # The stored body, seen by the stored camera, lies in the image where the regressor's own camera put it.
+    trained = Trained.load(tmp_path / "out" / "last.ckpt")
+    body = trained.posing.body.body
+    pose = np.concatenate([stored["global_orient"], stored["body_pose"].reshape(23, 3)])
+    joints = np.asarray(body(pose, stored["betas"][0], stored["transl"][0]).joints)
+    inside = joints @ stored["camera_rotation"][0].T + stored["camera_translation"][0]
+    pixels = stored["focal"][0] * inside[:, :2] / inside[:, 2:] + stored["center"][0]
+    with torch.no_grad():
+        estimate = trained.model(crop(Image.fromarray(data.image(1)), (0, 0, 64, 64), Augmentation(), 64)[None])
+        posed = trained.posing(estimate)
+        own = project(posed.joints, estimate.camera)[0].numpy() * 0.5 * 1.2 * 64 + 32
+    # Perspectives differ in depth by the body's own: by a few pixels at its ends, none at its middle.
+    assert np.abs(pixels - own).max() < 8
+    assert np.linalg.norm((pixels - own)[0]) < 1

@@ -13,6 +13,7 @@ from .data import data
 from .errors import FileError
 from .fit import fit
 from .options import GROUND, PRESETS, UP
+from .predict import predict
 from .train import train
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def main() -> None:
 main.add_command(fit)
 main.add_command(benchmark)
 main.add_command(train)
+main.add_command(predict)
 main.add_command(data)
 
 

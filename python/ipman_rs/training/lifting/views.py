@@ -47,7 +47,7 @@ def views(bodies: Bodies, seed: int, per_body: int = 1, tilt: float = 0.0, lean:
     rows = np.repeat(np.arange(len(bodies)), per_body)
     cameras, places = _cameras(len(rows), np.random.default_rng([seed, 0]))
     tilts = _tilts(cameras, tilt, lean, np.random.default_rng([seed, 1]))
-    matrices = rotations.from_axis_angle(bodies.pose)[rows]
+    matrices = rotations.from_axis_angle(np.asarray(bodies.pose, np.float64))[rows]
     body = posing()
     with torch.no_grad():
         posed = body.body.to(torch.float64)(*(torch.from_numpy(part) for part in (bodies.pose, bodies.betas)))

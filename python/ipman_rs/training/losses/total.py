@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import torch
 from torch import Tensor, nn
 
 from ..batch import Batch
@@ -41,7 +42,7 @@ class Loss(nn.Module):
         """The weighted sum, and the unweighted terms, detached."""
         posed = self.posing(estimate)
         terms = self._data_terms(estimate, posed, batch)
-        total = sum(getattr(self.weights, name) * value for name, value in terms.items())
+        total = torch.stack([getattr(self.weights, name) * value for name, value in terms.items()]).sum()
         terms = {name: value.detach() for name, value in terms.items()}
         if self.physics is not None:
             physics, found = self.physics(posed, batch)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import lightning
@@ -15,9 +14,8 @@ import ipman_rs.torch as ipt
 from ..batch import Batch
 from ..benchmark.report import COLUMNS, columns
 from ..figures import figures
-from ..lifting.network import WIDTH, KeypointEncoder
 from ..losses import Loss, Physics
-from ..model import HMR, MeanParameters, backbone, load_spin
+from ..model.made import made
 from ..posing import Posing
 from . import config, data
 
@@ -32,9 +30,12 @@ class Training(lightning.LightningModule):
         self.body = posing.body.body
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(settings.seed)  # the same weights in every process
-            self.model = made(settings, posing)
+            self.model = made(settings, self.body)
         self.loss = Loss(posing, _physics(settings, posing), settings.loss)
         self._sums = torch.zeros(0)
+
+    def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        checkpoint["settings"] = config.plain(self.settings)
 
     def forward(self, inputs: Tensor):
         return self.model(inputs)
@@ -80,18 +81,6 @@ class Training(lightning.LightningModule):
             for number, key in enumerate(COLUMNS):
                 self.log(f"{told.name}/{row}/{key}", means[row, number].float(), rank_zero_only=False, sync_dist=False)
         self.log("PVE", means[0, list(COLUMNS).index("PVE")].float())
-
-
-def made(settings: config.Config, posing: Posing) -> HMR:
-    """The regressor of a configuration, with the weights that it starts from."""
-    told = settings.model
-    mean = MeanParameters.read(Path(told.mean)) if told.mean else MeanParameters.of(posing.body.body)
-    if told.backbone == "keypoints":
-        return HMR(KeypointEncoder(len(posing.keypoints)), WIDTH, mean, hidden=WIDTH, dropout=told.dropout)
-    model = HMR(*backbone(told.backbone, told.pretrained), mean, dropout=told.dropout)
-    if told.spin:
-        load_spin(model, told.spin)
-    return model
 
 
 def _physics(settings: config.Config, posing: Posing) -> Physics | None:

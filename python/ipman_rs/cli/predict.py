@@ -1,0 +1,119 @@
+"""`ipman predict`: bodies for images from a trained regressor."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .errors import FileError
+
+if TYPE_CHECKING:
+    from ..training.predict import Trained
+    from ..view import Study
+
+
+@click.command()
+@click.argument("images", nargs=-1, required=True, metavar="IMAGE|FOLDER...", type=click.Path(path_type=Path))
+@click.option("--checkpoint", required=True, type=click.Path(dir_okay=False, path_type=Path), help="Of `ipman train`.")
+@click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Output folder.")
+@click.option(
+    "--box", type=float, nargs=4, metavar="X Y W H", help="Pixels around the person. Default: the whole image."
+)
+@click.option("--focal", type=float, metavar="PX", help="Focal length in pixels. Default: the image's diagonal.")
+@click.option(
+    "--camera-pitch", "pitch", type=float, default=0.0, show_default=True, metavar="DEGREES",
+    help="How far the camera looks down; negative: up.",
+)  # fmt: skip
+@click.option(
+    "--pictures", type=click.IntRange(0), default=8, show_default=True, help="Draw the first N images (seconds each)."
+)
+def predict(images: tuple[Path, ...], checkpoint: Path, output: Path, pictures: int, **seen: Any) -> None:
+    """A body for the person in each image, from a regressor that `ipman train` trained, in one look.
+
+    The same report as of `ipman fit`, and for each image a folder with parameters (.npz, for `ipman analyze`) and mesh
+    (.glb). The floor lies under the body's lowest vertex; up is the camera's, but for --camera-pitch.
+
+    Exit code: 0 when every image has a body, 1 when one has none (the others have), 2 for wrong usage.
+    """
+    from . import console
+    from .fit_inputs import IMAGES
+
+    try:
+        from ..training.predict import Trained
+
+        trained = Trained.load(checkpoint)
+    except ImportError as error:
+        console.error(f"{error.name} is needed: pip install 'ipman_rs[train]'")
+        sys.exit(1)
+    except ValueError as error:
+        console.error(str(error))
+        sys.exit(1)
+    paths = [found for path in images for found in (_inside(path, IMAGES) if path.is_dir() else [path])]
+    studies: list[Study] = []
+    failures: list[tuple[str, str]] = []
+    with console.progress("looking", len(paths)) as step:
+        for number, path in enumerate(paths):
+            try:
+                studies.append(_predicted(trained, path, output, number < pictures, seen))
+            except FileError as error:
+                failures.append((str(path), error.what))
+                console.error(str(error))
+            step.one()
+    if studies:
+        from .commands import write
+
+        page = write(studies, output, failures, own_folders=True)
+        console.print_table(studies)
+        console.say(f"report: {page}")
+    sys.exit(1 if failures or not paths else 0)
+
+
+def _inside(folder: Path, endings: tuple[str, ...]) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.suffix.lower() in endings)
+
+
+def _predicted(trained: Trained, path: Path, output: Path, pictured: bool, seen: dict[str, Any]) -> Study:
+    """The analysed body of one image, whose files are written. FileError if it cannot be read or has an empty box."""
+    from dataclasses import replace
+
+    import numpy as np
+    from PIL import Image
+
+    import ipman_rs as ip
+
+    from .. import view
+    from ..fitting import photo
+    from ..view.fitted import camera_of
+    from . import fit_outputs, mesh_files
+
+    try:
+        pixels = photo.read(path)
+        height, width = pixels.shape[:2]
+        box = seen["box"] or (0.0, 0.0, float(width), float(height))
+        found = trained.predict(Image.fromarray(pixels), box, seen["focal"], seen["pitch"])
+    except ValueError as error:
+        raise FileError(path, str(error)) from error
+    body = trained.posing.body.body
+    vertices = np.asarray(body(found.pose, found.betas, found.transl).vertices)
+    camera = {
+        "camera_rotation": found.rotation, "camera_translation": np.zeros(3),
+        "focal": np.full(2, found.focal), "center": found.center,
+    }  # fmt: skip
+    arrays: dict[str, Any] = {
+        "global_orient": found.pose[:1], "body_pose": found.pose[None, 1:].reshape(1, -1), "betas": found.betas[None],
+        "transl": found.transl[None], "image_size": np.array([[width, height]], float), "model": np.array(body.name),
+        **{name: value[None] for name, value in camera.items()},
+    }  # fmt: skip
+    files = {f"{path.stem}.npz": arrays, f"{path.stem}.glb": mesh_files.glb(vertices, body.faces)}
+    fit_outputs.write_files(output / path.stem, files, {"name": path.stem, "source": str(path)})
+    ground = ip.Ground.y_up(vertices[:, 1].min())
+    note = "predicted in one look; the floor lies under the lowest vertex"
+    study = view.study(path.stem, vertices, body.template, ground, source=str(path), notes=[note])
+    fitted = view.Fitted(
+        camera=camera_of(*camera.values()), size=(width, height), seen=np.zeros((0, 3)), projected=np.zeros((0, 2)),
+        photo=pixels if pictured else None, pictured=pictured, record={"box": [float(side) for side in box]},
+    )  # fmt: skip
+    return replace(study, fitted=fitted)

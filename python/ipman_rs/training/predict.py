@@ -1,0 +1,97 @@
+"""Bodies for images from a trained regressor: parameters in a world whose up is the camera's, but for its pitch."""
+
+from __future__ import annotations
+
+import os
+import pickle
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+import ipman_rs.torch as ipt
+
+from .augment import ROOM, Augmentation, crop, to_crop
+from .lifting.views import KEYPOINTS
+from .model import HMR
+from .model.made import made
+from .posing import Posing
+from .trainer.config import Config, config
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """pose (J, 3), the root's turn in the world first, betas (b,), transl (3,) m: the body in a world with y up whose
+    origin is the camera. rotation (3, 3): world to camera. focal, center (2,): pixels."""
+
+    pose: Array
+    betas: Array
+    transl: Array
+    rotation: Array
+    focal: float
+    center: Array
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A regressor of images, its configuration, and its body."""
+
+    model: HMR
+    settings: Config
+    posing: Posing
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Trained:
+        """A checkpoint of `ipman train`. ValueError, naming the file, for another file or a regressor of keypoints."""
+        try:
+            content: Any = torch.load(path, map_location="cpu", weights_only=True)
+        except (OSError, RuntimeError, EOFError, ValueError, KeyError, pickle.UnpicklingError) as error:
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise ValueError(f"{path}: cannot be read as a checkpoint: {reason}") from None
+        if not isinstance(content, Mapping) or not {"settings", "state_dict"} <= set(content):
+            raise ValueError(f"{path}: expected a checkpoint of `ipman train`, which has settings and state_dict")
+        settings = config(content["settings"])
+        if settings.model.backbone == "keypoints":
+            raise ValueError(f"{path}: this regressor sees keypoints, not images")
+        posing = Posing(ipt.BodyModel(settings.body), KEYPOINTS)
+        model = made(settings, posing.body.body, start=False)
+        own = "model."
+        weights = {
+            name.removeprefix(own): value for name, value in content["state_dict"].items() if name.startswith(own)
+        }
+        model.load_state_dict(weights)
+        return cls(model.eval(), settings, posing)
+
+    @torch.no_grad()
+    def predict(self, image: Any, box: Sequence[float], focal: float | None = None, pitch: float = 0.0) -> Prediction:
+        """The person in a box (x, y, width, height) of a PIL image.
+
+        focal: pixels; None: the image's diagonal. pitch: degrees that the camera looks down. ValueError for an empty
+        box.
+        """
+        change = Augmentation()
+        whole = to_crop(box, change)
+        estimate = self.model(crop(image, box, change, self.settings.model.size)[None])
+        matrices = estimate.rotations[0].double().numpy()
+        betas = estimate.betas[0].double().numpy()
+        scale, *shift = estimate.camera[0].double().tolist()
+        focal = float(np.hypot(*image.size)) if focal is None else focal
+        center = 0.5 * np.array(image.size, float)
+        # The crop's camera is far away; the same size and place in the image, seen by this camera, is nearer.
+        half = 0.5 * ROOM * max(float(box[2]), float(box[3]))
+        depth = focal / (scale * half)
+        aside = (-whole[:, 2] * half - center) * depth / focal  # of the crop's middle from the image's
+        body = self.posing.body.body
+        pelvis = body.J_template[0] + body.J_shapedirs[0] @ betas
+        turn = Rotation.from_rotvec([np.radians(pitch), 0.0, 0.0]).as_matrix()
+        rotation = np.diag([1.0, -1.0, -1.0]) @ turn
+        in_camera = pelvis + [shift[0] + aside[0], shift[1] + aside[1], depth]
+        matrices[0] = rotation.T @ matrices[0]
+        pose = Rotation.from_matrix(matrices).as_rotvec()
+        return Prediction(pose, betas, rotation.T @ in_camera - pelvis, rotation, focal, center)
