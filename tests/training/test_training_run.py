@@ -252,3 +252,17 @@ accelerator: cpu
     # Perspectives differ in depth by the body's own: by a few pixels at its ends, none at its middle.
     assert np.abs(pixels - own).max() < 8
     assert np.linalg.norm((pixels - own)[0]) < 1
+
+
+def test_predicting_needs_a_checkpoint_of_images(whole, tmp_path):
+    (tmp_path / "wrong.ckpt").write_bytes(b"nothing")
+    torch.save({"model": {}}, tmp_path / "spin.pt")
+    for path, said in (
+        (tmp_path / "wrong.ckpt", "cannot be read as a checkpoint"),
+        (tmp_path / "spin.pt", "expected a checkpoint of `ipman train`"),
+        (whole / "last.ckpt", "sees keypoints, not images"),
+    ):
+        done = CliRunner().invoke(main, ["predict", "x.png", "--checkpoint", str(path), "-o", str(tmp_path / "out")])
+        assert done.exit_code == 1
+        assert said in done.output
+        assert path.name in done.output
