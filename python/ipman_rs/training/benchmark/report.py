@@ -44,7 +44,7 @@ def write(found: Found, run: Benchmark) -> Path:
         loader=jinja2.FileSystemLoader(Path(__file__).parent), trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True,
     )  # fmt: skip
-    environment.filters |= {"interval": _interval}
+    environment.filters |= {"interval": _interval, "signed": _signed}
     page = run.folder / f"{NAME}.md"
     page.write_text(
         environment.get_template(f"{NAME}.md.j2").render(
@@ -109,23 +109,24 @@ def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
                 )
         elif block["tilt"] == ASKED:
             title = f"labels that lean by {ASKED:g}°"
-            each = ", ".join(f"{value:+.1f}" for value in seeds["BoSE"]).replace("-", "−")
+            each = ", ".join(map(_signed, seeds["BoSE"]))
             judged.append((f"{title}: BoSE 4 points up in every seed", min(seeds["BoSE"]) >= 4, each))
             judged.append((f"{title}: PVE not above HMR*'s", pve[0] <= 0, f"{_interval(pve)} mm"))
-            lost = control["against baseline"]["BoSE"]
-            judged.append(
-                (
-                    f"{title}: the gain is lost with a shuffled camera",
-                    lost[1] <= 0,
-                    f"{_interval(lost)}, not {_interval(bose)}",
-                )
-            )
+            for key, gain, unit in (("PVE", pve, "mm"), ("BoSE", bose, "points")):
+                lost = control["against baseline"][key]
+                gone = lost[2] >= 0 if key == "PVE" else lost[1] <= 0
+                said = f"{_interval(lost)}, not {_interval(gain)} {unit}"
+                judged.append((f"{title}: the gain in {key} is lost with a shuffled camera", gone, said))
     return judged
 
 
 def _interval(interval: Sequence[float], digits: int = 1) -> str:
-    mean, low, high = (f"{value:+.{digits}f}".replace("-", "−") for value in interval)
+    mean, low, high = (_signed(value, digits) for value in interval)
     return f"{mean} [{low}, {high}]"
+
+
+def _signed(value: float, digits: int = 1) -> str:
+    return f"{value:+.{digits}f}".replace("-", "−")
 
 
 def _write_csv(found: Found, path: Path) -> None:
