@@ -1,11 +1,9 @@
-"""What the tests of training share. All of it needs the extra `train`."""
+"""What the tests of training share. They need the extra `train`; those of Lightning's are skipped without it."""
 
 from __future__ import annotations
 
 import pytest
 import torch
-
-pytest.importorskip("PIL", reason="pillow is not installed")
 
 from ipman_rs.training.lifting import bodies, views
 
