@@ -100,7 +100,7 @@ def without(name):
     ("change", "message"),
     [
         (without("campose_valid"), "no campose_valid in it; is it a sequence file of 3DPW"),
-        (changed(poses=lambda p: [each[:4] for each in p]), r"poses\[0\]: expected numbers of shape \(5, 72\), got .*\(4"),
+        (changed(poses=lambda p: [each[:4] for each in p]), r"poses\[0\]: expected numbers of shape \(5, 72\), got"),
         (changed(trans=lambda t: t[:1]), r"trans: expected a list with an entry a person, as many as in poses \(2\)"),
         (changed(genders=lambda _: ["m", "x"]), r"genders\[1\]: expected 'm' or 'f', got 'x'"),
         (changed(poses=lambda p: [each.astype(object) for each in p]), r"poses\[0\]: array of Python objects"),

@@ -25,5 +25,6 @@ def write(folder, name, count=6, eft=False, **changes):
     arrays["openpose"] = np.full((count, 25, 3), 0.5)
     if eft:
         arrays |= {"pose": np.zeros((count, 72)), "shape": np.zeros((count, 10))}
+        arrays["pose"][:, 0] = np.pi  # upright in a camera whose y points down
     truth["known"] = list(known)
     return spin.save(folder / name, arrays, changes), truth
