@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+BODY_MODEL, BODY_MODELS = "body model", "an unmodified SMPL, SMPL+H or SMPL-X file"
 MAX_BYTES = 1 << 30  # the largest upstream file (SMPL-X with 400 components, in float64) has about half of that
 
 
@@ -214,11 +215,13 @@ class RestrictedUnpickler(_Interpreter):
         code: run for code, run in _Interpreter.dispatch.items() if bytes([code]) not in FORBIDDEN_OPCODES
     }
 
-    needs = "body model"  # what does not need the names that are refused
+    def __init__(self, stream: io.BytesIO, what: str) -> None:
+        super().__init__(stream, encoding="latin1")
+        self.what = what
 
     def find_class(self, module: str, name: str) -> Callable[..., Any]:
         if (module, name) not in ALLOWED:
-            raise pickle.UnpicklingError(f"names {module}.{name}, which no {self.needs} needs; it is refused")
+            raise pickle.UnpicklingError(f"names {module}.{name}, which no {self.what} needs; it is refused")
         return ALLOWED[module, name]
 
     def load_build(self) -> None:
@@ -257,8 +260,6 @@ class RestrictedUnpickler(_Interpreter):
 class TolerantUnpickler(RestrictedUnpickler):
     """Classes of other programs become strangers, which do nothing; the standard library's functions stay refused."""
 
-    needs = "data set"
-
     def find_class(self, module: str, name: str) -> Callable[..., Any]:
         if (module, name) in ALLOWED:
             return ALLOWED[module, name]
@@ -266,7 +267,7 @@ class TolerantUnpickler(RestrictedUnpickler):
             harmless = name in HARMLESS_TYPES
         else:
             first = module.partition(".")[0]
-            harmless = first in HARMLESS or first not in (*sys.stdlib_module_names, "__builtin__", "posix", "nt")
+            harmless = first in HARMLESS or first not in sys.stdlib_module_names
         return Stranger if harmless else super().find_class(module, name)
 
     def load_additems(self) -> None:
@@ -284,33 +285,33 @@ class TolerantUnpickler(RestrictedUnpickler):
     }
 
 
-def read(path: Path, tolerant: bool = False) -> dict[str, Any]:
+def read(
+    path: Path, what: str = BODY_MODEL, expected: str = BODY_MODELS, tolerant: bool = False
+) -> dict[str, Any]:
     """The pickled dictionary in `path`: numbers and text as they are, arrays as records for `as_array`.
 
-    `tolerant`: objects of other programs' classes are passed over, as in a data set's file that has its program's
-    settings beside the arrays. Raises ValueError when the file is missing, too large, truncated, damaged, not a
+    `what` and `expected` name the file in messages. `tolerant`: objects of other programs' classes are passed over,
+    such as settings beside the arrays. Raises ValueError when the file is missing, too large, truncated, damaged, not a
     dictionary, or names anything not allowed.
     """
-    kind = TolerantUnpickler if tolerant else RestrictedUnpickler
     try:
         size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise ValueError(f"{path}: {size} bytes is more than any {what} has ({MAX_BYTES}); is it the right file?")
+        data = path.read_bytes()
     except OSError as error:
-        raise ValueError(f"{path}: {error.strerror}") from None
-    if size > MAX_BYTES:
-        raise ValueError(f"{path}: {size} bytes is more than any {kind.needs} has ({MAX_BYTES}); is it the right file?")
+        raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from error
     try:
-        content = kind(io.BytesIO(path.read_bytes()), encoding="latin1").load()
+        interpreter = TolerantUnpickler if tolerant else RestrictedUnpickler
+        content = interpreter(io.BytesIO(data), what).load()
     except Exception as error:  # damaged bytes can fail in any way
         reason = (
             f"the pickle {error}" if isinstance(error, pickle.UnpicklingError) else f"{type(error).__name__}: {error}"
         )
-        expected = (
-            "Expected an unmodified file of the data set; download it again"
-            if tolerant
-            else "Expected an unmodified SMPL, SMPL+H or SMPL-X file; download it again, or save its arrays with "
-            "numpy.savez and load that"
-        )
-        raise ValueError(f"{path}: cannot be read as a pickled {kind.needs}: {reason}. {expected}") from error
+        raise ValueError(
+            f"{path}: cannot be read as a pickled {what}: {reason}. Expected {expected}; download it again, or save "
+            "its arrays with numpy.savez and load that"
+        ) from error
     if not isinstance(content, dict):
         raise ValueError(f"{path}: expected a pickled dictionary of arrays, found a {type(content).__name__}")
     return content
