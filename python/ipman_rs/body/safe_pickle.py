@@ -285,9 +285,7 @@ class TolerantUnpickler(RestrictedUnpickler):
     }
 
 
-def read(
-    path: Path, what: str = BODY_MODEL, expected: str = BODY_MODELS, tolerant: bool = False
-) -> dict[str, Any]:
+def read(path: Path, what: str = BODY_MODEL, expected: str = BODY_MODELS, tolerant: bool = False) -> dict[str, Any]:
     """The pickled dictionary in `path`: numbers and text as they are, arrays as records for `as_array`.
 
     `what` and `expected` name the file in messages. `tolerant`: objects of other programs' classes are passed over,

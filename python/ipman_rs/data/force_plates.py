@@ -234,9 +234,7 @@ def _kistler(signals: Array, origin: Array) -> tuple[Array, Array]:
     x12, x34, y14, y23, z1, z2, z3, z4 = signals.T
     a, b = np.abs(origin[:2])
     forces = np.stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4], axis=1)
-    moments = np.stack(
-        [b * (z1 + z2 - z3 - z4), a * (-z1 + z2 + z3 - z4), b * (x34 - x12) + a * (y14 - y23)], axis=1
-    )
+    moments = np.stack([b * (z1 + z2 - z3 - z4), a * (-z1 + z2 + z3 - z4), b * (x34 - x12) + a * (y14 - y23)], axis=1)
     return forces, moments
 
 
@@ -300,7 +298,7 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         try:
             content = c3d.read(file)
             joints = of_file(content, file.stem, content.names).joints
-            found += sequences.judged(file.name, open(file))
+            found += sequences.judged([(file.name, lambda file=file: open(file)[:])])
             found += [] if joints is None else standing(file.name, joints, np.isfinite(joints).all(axis=-1), content.up)
             found.append(_loads(file))
         except (ValueError, ImportError) as error:
@@ -339,5 +337,7 @@ def _files(path: str | os.PathLike[str]) -> list[Path]:
     place = Path(path)
     files = sorted(place.glob("**/*.c3d")) if place.is_dir() else [place]
     if not files or not files[0].is_file():
-        raise ValueError(f"{path}: expected a .c3d file or a folder of them, {'none in it' if not files else 'not there'}")
+        raise ValueError(
+            f"{path}: expected a .c3d file or a folder of them, {'none in it' if not files else 'not there'}"
+        )
     return files

@@ -97,7 +97,9 @@ def storage(path: str | os.PathLike[str]) -> Storage:
 def _numbers(path: str, table: list[tuple[int, list[str]]], width: int) -> Array:
     for number, fields in table:
         if len(fields) != width:
-            raise ValueError(f"{path}: line {number}: expected {width} columns, got {len(fields)}: is the file complete?")
+            raise ValueError(
+                f"{path}: line {number}: expected {width} columns, got {len(fields)}: is the file complete?"
+            )
     try:
         return np.array([fields for _, fields in table], np.float64).reshape(len(table), width)
     except ValueError as error:
@@ -192,7 +194,9 @@ def center_of_mass(table: Storage) -> Array:
     points = table.vectors((f"{COM}_X", f"{COM}_Y", f"{COM}_Z"))
     away = float(np.median(np.abs(points).max(axis=1)))
     if away > FAR:
-        raise ValueError(f"{table.source}: looks like millimetres: a centre of mass {away:.4g} from the origin, in metres")
+        raise ValueError(
+            f"{table.source}: looks like millimetres: a centre of mass {away:.4g} from the origin, in metres"
+        )
     return points
 
 
@@ -270,7 +274,9 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         try:
             tracks = trc.read(file)
             frames = _frames(file.stem, tracks, list(tracks.names), forces, com)
-            found += sequences.judged(file.name, frames) + standing(file.name, tracks.points, tracks.confidence > 0, "y")
+            found += sequences.judged([(file.name, lambda frames=frames: frames)]) + standing(
+                file.name, tracks.points, tracks.confidence > 0, "y"
+            )
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
     return found
@@ -280,7 +286,9 @@ def _files(path: str | os.PathLike[str]) -> list[Path]:
     place = Path(path)
     files = sorted(place.glob("**/*.trc")) if place.is_dir() else [place]
     if not files or not files[0].is_file():
-        raise ValueError(f"{path}: expected a .trc file or a folder of them, {'none in it' if not files else 'not there'}")
+        raise ValueError(
+            f"{path}: expected a .trc file or a folder of them, {'none in it' if not files else 'not there'}"
+        )
     return files
 
 

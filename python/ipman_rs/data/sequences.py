@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from . import check
 from .frames import Cameras, Frames, PressureMaps, Rows
 
 KEPT = 4  # sequences that stay in memory: rows are mostly asked for one after the other
+SAMPLED = 16  # sequences, and frames of each, that are looked at
+ENOUGH = 8  # sequences, of which not everybody lies: only then the way from feet to head tells where up is
 
 
 class Sequences:
@@ -28,26 +31,31 @@ class Sequences:
     def __init__(
         self, lengths: Sequence[int], read: Callable[[int], Frames], source: str | os.PathLike[str] = "data set"
     ) -> None:
-        self._starts = np.concatenate([[0], np.cumsum(lengths, dtype=np.int64)])
+        self.starts = np.concatenate([[0], np.cumsum(lengths, dtype=np.int64)])
         self._read = lru_cache(KEPT)(read)
-        if self._starts[-1] == 0:
+        if self.starts[-1] == 0:
             raise ValueError(f"{source}: no frame at all: is the download complete?")
 
+    @property
+    def number(self) -> int:
+        """Of sequences."""
+        return len(self.starts) - 1
+
     def __len__(self) -> int:
-        return int(self._starts[-1])
+        return int(self.starts[-1])
 
     def __getitem__(self, rows: Rows) -> Frames:
         wanted = np.arange(len(self))[rows]
         if not len(wanted):
-            return self._read(int(np.diff(self._starts).argmax()))[:0]
+            return self._read(int(np.diff(self.starts).argmax()))[:0]
         order = np.argsort(wanted, kind="stable")
-        parts = [self._rows(int(index), part) for index, part in _runs(self._starts, wanted[order])]
+        parts = [self._rows(int(index), part) for index, part in _runs(self.starts, wanted[order])]
         frames = parts[0] if len(parts) == 1 else join(parts)
         return frames if (order == np.arange(len(order))).all() else frames[np.argsort(order, kind="stable")]
 
     def _rows(self, index: int, rows: NDArray[np.int64]) -> Frames:
         frames = self._read(index)
-        rows = rows - self._starts[index]
+        rows = rows - self.starts[index]
         return frames[slice(int(rows[0]), int(rows[-1]) + 1) if (np.diff(rows) == 1).all() else rows]
 
 
@@ -126,10 +134,52 @@ def _grounds(values: list[Ground | None], counts: list[int]) -> Ground | None:
 
 def numbered(name: str, count: int, first: int = 0, step: int = 1) -> NDArray[np.str_]:
     """Names of the frames of a sequence: "name/00000", "name/00001", ..."""
-    return np.array([f"{name}/{number:05d}" for number in range(first, first + step * count, step)] or np.empty(0, "U1"))
+    return np.array(
+        [f"{name}/{number:05d}" for number in range(first, first + step * count, step)] or np.empty(0, "U1")
+    )
 
 
-def judged(name: str, data: Any) -> list[check.Finding]:
-    """What can be told from a sample of the frames of `name`, in whose name the findings are."""
-    found = check.of_frames(check.sample(data))
-    return [check.Finding(each.level, f"{name}: {each.what}", each.advice) for each in found]
+def sample(data: Sequences) -> Frames:
+    """Some frames of some sequences, evenly spaced."""
+    chosen = _spread(data.number, SAMPLED)
+    starts = data.starts
+    rows = [starts[index] + _spread(int(starts[index + 1] - starts[index]), SAMPLED) for index in chosen]
+    return data[np.concatenate(rows)]
+
+
+def demanded(path: str | os.PathLike[str], data: Sequences) -> Sequences:
+    """`data`, if a sample of it has plausible units and, where it has enough sequences to tell, axes and ground."""
+    frames = sample(data)
+    check.demand(Path(path), check.of_frames(frames if data.number >= ENOUGH else replace(frames, ground=None)))
+    return data
+
+
+def plausible(file: Path, frames: Frames) -> Frames:
+    """The frames of one sequence, if their units can be right. Its axes do not tell: its person may lie throughout."""
+    check.demand(file, check.of_frames(replace(check.sample(frames), ground=None)))
+    return frames
+
+
+def judged(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Finding]:
+    """What can be told of sequences that are read one after the other: of each what is not right, of all the axes."""
+    found, some = [], []
+    for index, (name, read) in enumerate(parts):
+        try:
+            frames = read()
+        except ValueError as error:
+            found.append(check.Finding("wrong", str(error)))
+            continue
+        few = frames[_spread(len(frames), check.SAMPLE)]
+        for each in check.of_frames(replace(few, ground=None)):
+            if each.level != "ok":
+                found.append(check.Finding(each.level, f"{name}: {each.what}", each.advice))
+        if index in _spread(len(parts), SAMPLED**2):
+            some.append(frames[_spread(len(frames), SAMPLED)])
+    if some:
+        found += check.of_frames(join(some))
+    return found
+
+
+def _spread(count: int, most: int) -> NDArray[np.int64]:
+    """Up to `most` numbers from 0 to count - 1, evenly spaced."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
