@@ -195,7 +195,7 @@ def _allowed() -> dict[tuple[str, str], Callable[..., Any]]:
 
 
 ALLOWED = _allowed()
-# What other programs' settings are made of; all other names of the standard library mean that a file wants to do things.
+# What other programs' settings are made of; another name of the standard library means that a file wants to do things.
 HARMLESS = ("collections", "datetime", "enum", "pathlib", "typing", "copy_reg", "copyreg", "uuid")
 HARMLESS_TYPES = ("bool", "bytes", "complex", "dict", "float", "frozenset", "int", "list", "long", "object", "range",
                   "set", "slice", "str", "tuple", "type", "unicode")  # fmt: skip

@@ -3,8 +3,8 @@
     CMU/01/01_01_poses.npz            SMPL+H: poses (F, 156), betas (16,), trans (F, 3) m, mocap_framerate, gender
     CMU/01/01_01_stageii.npz          SMPL-X: poses (F, 165), betas (16,), trans, mocap_frame_rate, gender
 
-The folder of all of AMASS, or of any of its data sets, or one file; shape.npz and *_stagei.npz are passed over. Only the
-files' headers are read when it is opened.
+The folder of all of AMASS, or of any of its data sets, or one file; shape.npz and *_stagei.npz are passed over. Of the
+files only the headers are read when it is opened, and a sample of the frames.
 
 World: metres, z up, the floor at z = 0 (fitted by each capture, so by some centimetres). 60 to 250 Hz by file:
 `frame_rate=30` takes the nearest earlier frame of each thirtieth of a second. Hands are absolute: load the body with
@@ -69,7 +69,7 @@ def open(path: str | os.PathLike[str], split: str | None = None, *, frame_rate: 
         name = files[index].relative_to(base).with_suffix("").as_posix()
         return _frames(files[index], name, taken[index], frame_rate or motions[index][2])
 
-    return sequences.demanded(path, sequences.Sequences([len(rows) for rows in taken], sequence, path))
+    return sequences.demanded(path, sequences.sequences([len(rows) for rows in taken], sequence, path))
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:

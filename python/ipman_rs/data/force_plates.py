@@ -1,10 +1,10 @@
 """Force plates: forces, and the centre of pressure computed from the raw forces and moments of a `.c3d` file.
 
 Expected: a `.c3d` file, or a folder of them, with POINT (markers, in the unit that UNITS says, the vertical axis that
-Y_SCREEN says, z without it) and FORCE_PLATFORM (TYPE 2 or 4 with six channels Fx, Fy, Fz, Mx, My, Mz, or TYPE 3 with the
-eight of a Kistler plate; CORNERS, ORIGIN, CHANNEL) over ANALOG, in N and N mm or N m. Such files come from any motion
-capture laboratory. Frames have the file's axes and the rate of its points; `joints` are its markers, the ground is the
-plates' surface (the axis' zero without plates). No cameras. Needs the extra `c3d`.
+Y_SCREEN says, z without it) and FORCE_PLATFORM (TYPE 2 or 4 with six channels Fx, Fy, Fz, Mx, My, Mz, or TYPE 3 with
+the eight of a Kistler plate; CORNERS, ORIGIN, CHANNEL) over ANALOG, in N and N mm or N m. Such files come from any
+motion capture laboratory. Frames have the file's axes and the rate of its points; `joints` are its markers, the ground
+is the plates' surface (the axis' zero without plates). No cameras. Needs the extra `c3d`.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ipman_rs.ground import Ground
 from . import c3d, sequences
 from .check import Finding, demanded
 from .frames import DataSet, Frames
+from .joined import Joined
 from .tracks import METRES, TO_Y_UP
 
 NAME = "force-plates"
@@ -171,7 +172,7 @@ class _Plate:
         free = moments[:, 2] - x * forces[:, 1] + y * forces[:, 0]
         points = self.corners.mean(axis=0) + np.stack([x, y], axis=1) @ axes[:, :2].T
         force, moment = forces @ axes.T, free[:, None] * axes[:, 2]
-        # Some systems write the force on the plate, others that on the body. Nobody pulls at a plate as they step on it.
+        # Some systems write the force on the plate, others that on the body. Nobody pulls at a plate.
         loads = force @ up
         sign = -1.0 if loads.size and -loads.min() > max(loads.max(), LOADED) else 1.0
         return sign * force, np.where(np.isfinite(points), points, np.nan), sign * np.nan_to_num(moment)
@@ -250,10 +251,8 @@ def open(path: str | os.PathLike[str], split: str | None = None, *, up: str | No
     recordings = [c3d.read(file) for file in files]
     names = list(dict.fromkeys(name for found in recordings for name in found.names))
 
-    def sequence(index: int) -> Frames:
-        return of_file(recordings[index], files[index].stem, names, up)
-
-    return demanded(path, sequences.Sequences([len(found.times) for found in recordings], sequence, path))
+    parts = [of_file(found, file.stem, names, up) for file, found in zip(files, recordings, strict=True)]
+    return demanded(path, Joined(sequences.measured_alike(parts)))
 
 
 def of_file(found: c3d.Recording, name: str, markers: Sequence[str], up: str | None = None) -> Frames:

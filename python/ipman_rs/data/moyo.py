@@ -3,7 +3,7 @@
     20220923_20220926_with_hands/         or 20221004_with_com/: a session; the folder above both; or one of them
       mosh/{train,val}/NAME_stageii.pkl           SMPL-X: fullpose (F, 165), betas, trans (F, 3) m
       pressure/{train,val}/xml/NAME.xml           the mat's maps, N/cm²
-      pressure/{train,val}/single_csv/NAME.csv    force (N) and centre of pressure (mm) of the maps that belong to frames
+      pressure/{train,val}/single_csv/NAME.csv    force (N) and centre of pressure (mm) of those with a frame
       pressure/{train,val}/pressure_mat_c3d/NAME.c3d    the mat's corners SensorMat:M_1 to M_4, mm
       com/{train,val}/NAME.c3d                    CentreOfMass and CentreOfMassFloor of Vicon, mm (second session)
       cameras/**/cameras_param.json               cam_1 to cam_8: focal, princpt, rotation, position (mm)
@@ -46,6 +46,7 @@ RATE, IMAGE_RATE = 60.0, 30.0  # Hz
 SPLITS = ("train", "val")
 SUFFIX = "_stageii.pkl"
 UNIT = "N/cm2"  # of the maps
+CELLS, CELL = (110, 37), 0.0127  # the mat's rows and columns, and their size in m
 APART = 2  # frames by which recordings of one sequence may differ in length: an image's time
 IMAGE_SCALE = 0.5  # of released images to those that were calibrated
 CORNERS = tuple(f"SensorMat:M_{number}" for number in (1, 2, 3, 4))
@@ -102,7 +103,7 @@ def open(path: str | os.PathLike[str], split: str | None = None, *, camera: int 
         frames = _frames(found[index], *parts)
         return frames if camera is None else _seen(found[index], frames[rows[index]], camera, rows[index])
 
-    return sequences.demanded(root, sequences.Sequences([len(part) for part in rows], sequence, path))
+    return sequences.demanded(root, sequences.sequences([len(part) for part in rows], sequence, path))
 
 
 def _sequences(root: Path, split: str | None) -> list[Recorded]:
@@ -380,13 +381,14 @@ def _with_mat(files: Recorded, frames: Frames) -> Frames:
     maps_file, trace_file, corners_file = files.mat
     count = len(frames)
     if not maps_file.is_file():
-        nothing = np.full((count, 3), np.nan)
-        return replace(frames, center_of_pressure=nothing, forces=nothing[:, None])
+        nothing, nowhere = np.full((count, 3), np.nan), np.full(3, np.nan)
+        maps = PressureMaps(np.full((count, *CELLS), np.nan, np.float32), nowhere, nowhere, nowhere, CELL)
+        return replace(frames, center_of_pressure=nothing, forces=nothing[:, None], pressure=maps)
     mat, trace = read_maps(maps_file), read_trace(trace_file)
     if mat.rate != trace.rate or trace.maps[0] < 0 or trace.maps[-1] >= len(mat.maps):
         raise ValueError(
-            f"{trace_file}: expected times of the {len(mat.maps)} maps of {maps_file.name}, got maps {trace.maps[0]} to "
-            f"{trace.maps[-1]}"
+            f"{trace_file}: expected times of the {len(mat.maps)} maps of {maps_file.name} at {mat.rate:g} Hz, got "
+            f"maps {trace.maps[0]} to {trace.maps[-1]} at {trace.rate:g} Hz"
         )
     placed = _placed(mat, corners(corners_file), corners_file)
     center = placed.origin + trace.center[:, 1:] * placed.e1 + trace.center[:, :1] * placed.e2

@@ -25,6 +25,7 @@ from . import sequences, trc
 from .check import Finding, demanded
 from .force_plates import LOADED, UP, ForcePlates, standing
 from .frames import DataSet, Frames
+from .joined import Joined
 from .tracks import METRES, Tracks
 
 NAME = "opensim"
@@ -177,8 +178,8 @@ def _plausible(found: ForcePlates, up: str) -> None:
     away = float(np.nanmedian(np.abs(found.points[heavy]).max(axis=-1)))
     if away > FAR:
         raise ValueError(
-            f"{found.source}: looks like millimetres: centres of pressure {away:.4g} from the origin, expected metres up "
-            f"to {FAR:g}; say unit='mm'"
+            f"{found.source}: looks like millimetres: centres of pressure {away:.4g} from the origin, expected metres, "
+            f"up to {FAR:g}; say unit='mm' if so"
         )
     push = np.median(found.forces[heavy], axis=0)
     axis = "xyz"[int(np.abs(push).argmax())]
@@ -190,7 +191,7 @@ def _plausible(found: ForcePlates, up: str) -> None:
 
 
 def center_of_mass(table: Storage) -> Array:
-    """The whole body's centre of mass (T, 3) m, y up. ValueError, naming the file, if it is missing or in other units."""
+    """The whole body's centre of mass (T, 3) m, y up. ValueError, naming the file, if missing or in other units."""
     points = table.vectors((f"{COM}_X", f"{COM}_Y", f"{COM}_Z"))
     away = float(np.median(np.abs(points).max(axis=1)))
     if away > FAR:
@@ -210,12 +211,11 @@ def open(path: str | os.PathLike[str], split: str | None = None) -> DataSet:
     files = _files(path)
     tracks = [trc.read(file) for file in files]
     markers = list(dict.fromkeys(name for found in tracks for name in found.names))
-    beside = _beside(files)
-
-    def sequence(index: int) -> Frames:
-        return _frames(files[index].stem, tracks[index], markers, *beside[index])
-
-    return demanded(path, sequences.Sequences([len(found) for found in tracks], sequence, path))
+    parts = [
+        _frames(file.stem, found, markers, *beside)
+        for file, found, beside in zip(files, tracks, _beside(files), strict=True)
+    ]
+    return demanded(path, Joined(sequences.measured_alike(parts)))
 
 
 def _frames(name: str, tracks: Tracks, markers: list[str], forces: Path | None, com: Path | None) -> Frames:
@@ -274,9 +274,8 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         try:
             tracks = trc.read(file)
             frames = _frames(file.stem, tracks, list(tracks.names), forces, com)
-            found += sequences.judged([(file.name, lambda frames=frames: frames)]) + standing(
-                file.name, tracks.points, tracks.confidence > 0, "y"
-            )
+            found += sequences.judged([(file.name, lambda frames=frames: frames)])
+            found += standing(file.name, tracks.points, tracks.confidence > 0, "y")
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
     return found

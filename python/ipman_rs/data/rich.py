@@ -7,10 +7,10 @@
     multicam2world/Pavallion_multicam2world.json                 R, t, c: world = c · X R + t
     images/{train,val,test}/Pavallion_000_yoga1/cam_00/00045_00.jpeg
 
-World of the frames: camera 0's, metres, x right, y down, z forward, since the bodies are given in it; the ground is put
-into it. (The scan's own world is z up.) No `ground_mesh.ply`: no ground. 30 Hz where the numbers of the frames follow each
-other. Names are `SEQUENCE/00045_00`, the frame's number and the camera's, with `#1` for the second person; sequences are
-one camera's view of one person. Images keep their full size; the lenses' distortion is not in the intrinsics.
+World of the frames: camera 0's, metres, x right, y down, z forward, since the bodies are given in it; the ground is
+put into it. (The scan's own world is z up.) No `ground_mesh.ply`: no ground. 30 Hz where the numbers of the frames
+follow each other. Names are `SEQUENCE/00045_00`, the frame's number and the camera's, with `#1` for the second person;
+sequences are one camera's view of one person. Images keep their full size; the intrinsics know no distortion.
 
 Hands: 12 weights a hand of SMPL-X's components: `hands=load_body(...).hands` turns them into the fingers' absolute
 rotations (`flat_hand_mean=True`), without it fingers are straight.
@@ -118,7 +118,7 @@ def open(
     def sequence(index: int) -> Frames:
         return _frames(root, views[index], scenes[views[index].folder], hands, rate)
 
-    return sequences.demanded(root, sequences.Sequences([len(view.files) for view in views], sequence, path))
+    return sequences.demanded(root, sequences.sequences([len(view.files) for view in views], sequence, path))
 
 
 def _folders(root: Path, split: str | None) -> list[Path]:
