@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ def test_incomplete_folder(tmp_path):
     human36m.write(tmp_path, S=None)
     code, out = run("check", "human36m", tmp_path)
     assert code == 1
-    assert "h36m_train_world.npz: not in the folder (split 'train')" in out
+    assert "h36m_train_world.npz: not in the folder" in out
     assert "h36m_valid_protocol2.npz: S: no such array" in out
     assert "`ipman data layout human36m` says what is expected" in out
 
@@ -103,4 +104,5 @@ def test_every_data_set_says_what_it_expects():
         assert name == module(name).NAME
         code, out = run("layout", name)
         assert code == 0
-        assert "Where it comes from" in out
+        assert len(out.splitlines()) > 5
+        assert re.search(r"\bcomes? (from|with)\b", out)

@@ -60,21 +60,35 @@ def of_frames(frames: Frames) -> list[Finding]:
     """All that can be told from the frames alone: whatever they have is judged, whatever they lack is passed over."""
     if not len(frames):
         return [Finding("wrong", "no frame at all", "the file is empty: is the download complete?")]
-    found = names(frames.names)
+    found = names(frames.names) + _lengths(frames)
+    if frames.pose is not None:
+        found += finite("pose", frames.pose) + radians("pose", frames.pose)
+    if frames.betas is not None:
+        found += finite("betas", frames.betas)
+    if _any_wrong(found):  # floor and cameras would only repeat it
+        return found
+    standing = stance(frames, frames.ground) if frames.ground is not None else []
+    found += standing
+    if frames.ground is not None and not _any_wrong(standing):
+        found += _on_ground(frames, frames.ground)
+    if frames.cameras is not None:
+        found += cameras(frames.cameras)
+        found += [] if _any_wrong(standing) else _projections(frames, frames.cameras)
+    return found
+
+
+def _any_wrong(found: list[Finding]) -> bool:
+    return any(each.level == "wrong" for each in found)
+
+
+def _lengths(frames: Frames) -> list[Finding]:
+    found = []
     for what in ("joints", "vertices"):
         points = getattr(frames, what)
         if points is not None:
             found += finite_points(what, points) + size_of_body(what, points)
     if frames.transl is not None:
         found += finite("transl", frames.transl) + place("transl", frames.transl)
-    if frames.pose is not None:
-        found += finite("pose", frames.pose) + radians("pose", frames.pose)
-    if frames.betas is not None:
-        found += finite("betas", frames.betas)
-    if frames.ground is not None:
-        found += stance(frames, frames.ground) + _on_ground(frames, frames.ground)
-    if frames.cameras is not None:
-        found += cameras(frames.cameras) + _projections(frames, frames.cameras)
     return found
 
 
@@ -164,13 +178,13 @@ def upright(what: str, up: NDArray[Any], ground: Ground) -> list[Finding]:
         return []
     unit, normal = up[seen] / length[seen][:, None], normal[seen]
     agreement = float((unit * normal).sum(axis=-1).mean())
+    expected = f"({', '.join(f'{number:.2g}' for number in normal[0])})"
     if agreement > 0.5:
-        return [Finding("ok", f"{what}: people stand along the ground's normal")]
+        return [Finding("ok", f"{what}: people stand along up, {expected}")]
     mean = unit.mean(axis=0)
     axis = int(np.concatenate([mean, -mean]).argmax())
     if np.abs(mean).max() < 0.6 or agreement > 0.3:
         return []
-    expected = f"({', '.join(f'{number:.2g}' for number in normal[0])})"
     said = f"{what}: looks like {AXES[axis]} up: heads lie that way from the feet, but up is said to be {expected}"
     return [Finding("wrong", said, "these are other axes than the data set's own: were they turned or not turned?")]
 

@@ -233,9 +233,7 @@ def check(form: Form, path: str | os.PathLike[str]) -> list[Finding]:
         if (place / name).is_file():
             found += _check_file(form, place / name)
         else:
-            found.append(
-                Finding("missing", f"{name}: not in the folder (split {split!r})", "see the data set's own page")
-            )
+            found.append(Finding("missing", f"{name}: not in the folder", f"only the split {split!r} needs it"))
     return found
 
 
@@ -244,7 +242,8 @@ def _check_file(form: Form, file: Path) -> list[Finding]:
         data = Spin(file, form)
         found = [Finding("ok", f"{len(data)} rows with {', '.join(data.file)}"), *_plausible(data)]
         if data.world and "S" in data.file:
-            found += [each for each in _plausible(Spin(file, form, "camera")) if each not in found]
+            seen = _plausible(Spin(file, form, "camera"))
+            found += [Finding(each.level, f"in the camera's axes: {each.what}", each.advice) for each in seen]
         found += data.file.scan()
     except ValueError as error:
         return [Finding("wrong", str(error))]
