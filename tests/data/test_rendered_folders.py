@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tarfile
 import time
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
@@ -298,6 +299,16 @@ def test_without_embree(tmp_path, monkeypatch):
     done = CliRunner().invoke(main, command(tmp_path / "out", 1))
     assert done.exit_code == 1
     assert "pip install 'ipman_rs[render]'" in done.output
+
+
+def test_worker_that_dies(tmp_path, monkeypatch):
+    def die(*_):
+        raise BrokenProcessPool("a child process terminated abruptly")
+
+    monkeypatch.setattr(writer, "drawn", die)
+    done = CliRunner().invoke(main, command(tmp_path / "out", 1))
+    assert done.exit_code == 1
+    assert "a process ended too early" in done.output
 
 
 def test_reading_labels_needs_neither_torch_nor_embree(whole):
