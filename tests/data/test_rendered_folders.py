@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tarfile
 import time
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +66,7 @@ def test_goes_on_after_a_kill(whole, tmp_path):
     script = "from ipman_rs.cli import main; main()"
     process = subprocess.Popen([sys.executable, "-c", script, *command(folder, 2)], start_new_session=True)
     first = folder / "train-000000.tar"
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 240
     while not first.exists():
         assert time.monotonic() < deadline
         assert process.poll() is None
@@ -298,6 +299,16 @@ def test_without_embree(tmp_path, monkeypatch):
     done = CliRunner().invoke(main, command(tmp_path / "out", 1))
     assert done.exit_code == 1
     assert "pip install 'ipman_rs[render]'" in done.output
+
+
+def test_worker_that_dies(tmp_path, monkeypatch):
+    def die(*_):
+        raise BrokenProcessPool("a child process terminated abruptly")
+
+    monkeypatch.setattr(writer, "drawn", die)
+    done = CliRunner().invoke(main, command(tmp_path / "out", 1))
+    assert done.exit_code == 1
+    assert "a process ended too early" in done.output
 
 
 def test_reading_labels_needs_neither_torch_nor_embree(whole):

@@ -51,6 +51,8 @@ def render(
     The same options give the same bytes, whatever the number of processes. Interrupted, the same command goes on with
     the first shard that is not whole. Needs pip install 'ipman_rs[render]'.
     """
+    from concurrent.futures.process import BrokenProcessPool
+
     from ..data.rendered.samples import Settings
     from ..data.rendered.writer import write
     from . import console
@@ -69,6 +71,9 @@ def render(
         sys.exit(1)
     except OSError as error:
         console.error(f"{output}: cannot be written ({error.strerror or error}); choose another folder")
+        sys.exit(1)
+    except BrokenProcessPool:
+        console.error("a process ended too early, for want of memory perhaps; the same command, with fewer -j, goes on")
         sys.exit(1)
     listed = ", ".join(f"{count} {split}" for split, count in counts.items())
     console.say(f"{output}: {listed}; {drawn} drawn now")

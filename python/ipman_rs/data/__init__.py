@@ -31,6 +31,7 @@ DATASETS = {  # name -> module with NAME, open(path, split=None, **options) and 
     "opensim": "opensim",
     "rendered": "rendered",
     "rich": "rich",
+    "rich-ipman": "rich_ipman",
 }
 
 

@@ -6,7 +6,7 @@ the common form. `demand` makes an error of what is wrong.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -60,21 +60,35 @@ def of_frames(frames: Frames) -> list[Finding]:
     """All that can be told from the frames alone: whatever they have is judged, whatever they lack is passed over."""
     if not len(frames):
         return [Finding("wrong", "no frame at all", "the file is empty: is the download complete?")]
-    found = names(frames.names)
-    for what in ("joints", "vertices"):
-        points = getattr(frames, what)
-        if points is not None:
-            found += finite(what, points) + size_of_body(what, points)
-    if frames.transl is not None:
-        found += finite("transl", frames.transl) + place("transl", frames.transl)
+    found = names(frames.names) + _lengths(frames)
     if frames.pose is not None:
         found += finite("pose", frames.pose) + radians("pose", frames.pose)
     if frames.betas is not None:
         found += finite("betas", frames.betas)
-    if frames.ground is not None:
-        found += _upright(frames, frames.ground) + _on_ground(frames, frames.ground)
+    if _any_wrong(found):  # floor and cameras would only repeat it
+        return found
+    standing = stance(frames, frames.ground) if frames.ground is not None else []
+    found += standing
+    if frames.ground is not None and not _any_wrong(standing):
+        found += _on_ground(frames, frames.ground)
     if frames.cameras is not None:
-        found += cameras(frames.cameras) + _projections(frames, frames.cameras)
+        found += cameras(frames.cameras)
+        found += [] if _any_wrong(standing) else _projections(frames, frames.cameras)
+    return found
+
+
+def _any_wrong(found: list[Finding]) -> bool:
+    return any(each.level == "wrong" for each in found)
+
+
+def _lengths(frames: Frames) -> list[Finding]:
+    found = []
+    for what in ("joints", "vertices"):
+        points = getattr(frames, what)
+        if points is not None:
+            found += finite_points(what, points) + size_of_body(what, points)
+    if frames.transl is not None:
+        found += finite("transl", frames.transl) + place("transl", frames.transl)
     return found
 
 
@@ -83,20 +97,31 @@ def names(values: NDArray[np.str_]) -> list[Finding]:
     unique, counts = np.unique(values, return_counts=True)
     if len(unique) == len(values):
         return []
-    return [Finding("wrong", f"{len(values) - len(unique)} frames share a name, such as {unique[counts.argmax()]!r}")]
+    return [
+        Finding("wrong", f"{len(values) - len(unique)} frames share a name, such as {str(unique[counts.argmax()])!r}")
+    ]
 
 
 def finite(what: str, values: NDArray[Any]) -> list[Finding]:
-    """Frames that have a NaN or an infinity in some places only: a frame without the thing is NaN throughout."""
-    rows = np.asarray(values).reshape(len(values), -1)
-    good = np.isfinite(rows)
-    if good.all():
-        return []
-    if not good.any():
-        return [Finding("wrong", f"{what}: no finite number in any frame")]
-    return [
-        Finding("missing", f"{what}: {(~good.all(axis=1)).sum()} of {len(rows)} frames have NaN or infinity in them")
-    ]
+    """Whether every frame has the thing, values (F, …). A frame without it is NaN throughout: no figure needs it."""
+    good = np.isfinite(np.asarray(values).reshape(len(values), -1))
+    return _finite(what, good.any(axis=1), good.all(axis=1))
+
+
+def finite_points(what: str, points: NDArray[Any]) -> list[Finding]:
+    """The same for points (F, K, 3), of which a frame may lack some: those are NaN in x, y and z."""
+    good = np.isfinite(points)
+    return _finite(what, good.any(axis=(1, 2)), (good.all(axis=-1) | ~good.any(axis=-1)).all(axis=-1))
+
+
+def _finite(what: str, some: Any, whole: Any) -> list[Finding]:
+    found = []
+    if not some.all():
+        found.append(Finding("ok", f"{what}: {(~some).sum()} of {len(some)} frames have none"))
+    if (some & ~whole).any():
+        said = f"{what}: NaN or infinity among the numbers of {(some & ~whole).sum()} of {len(some)} frames"
+        found.append(Finding("missing", said, "no figure is computed for them"))
+    return found
 
 
 def size_of_body(what: str, points: NDArray[Any]) -> list[Finding]:
@@ -132,11 +157,11 @@ def place(what: str, positions: NDArray[Any]) -> list[Finding]:
 
 def radians(what: str, pose: NDArray[Any]) -> list[Finding]:
     """Whether rotation vectors (F, J, 3) can be radians."""
-    angles = np.linalg.norm(np.asarray(pose, np.float64), axis=-1)
-    angles = angles[np.isfinite(angles)]
-    if not len(angles) or np.quantile(angles, 0.95) <= 2 * np.pi:
+    largest = np.linalg.norm(np.asarray(pose, np.float64), axis=-1).max(axis=-1)
+    largest = largest[np.isfinite(largest)]
+    if not len(largest) or np.median(largest) <= 2 * np.pi:
         return []
-    said = f"{what}: looks like degrees: rotations by up to {angles.max():.4g}, expected radians"
+    said = f"{what}: looks like degrees: rotations by up to {largest.max():.4g}, expected radians"
     return [Finding("wrong", said, "multiply by π/180")]
 
 
@@ -153,15 +178,28 @@ def upright(what: str, up: NDArray[Any], ground: Ground) -> list[Finding]:
         return []
     unit, normal = up[seen] / length[seen][:, None], normal[seen]
     agreement = float((unit * normal).sum(axis=-1).mean())
+    expected = f"({', '.join(f'{number:.2g}' for number in normal[0])})"
     if agreement > 0.5:
-        return [Finding("ok", f"{what}: people stand along the ground's normal")]
+        return [Finding("ok", f"{what}: people stand along up, {expected}")]
     mean = unit.mean(axis=0)
     axis = int(np.concatenate([mean, -mean]).argmax())
     if np.abs(mean).max() < 0.6 or agreement > 0.3:
         return []
-    expected = f"({', '.join(f'{number:.2g}' for number in normal[0])})"
     said = f"{what}: looks like {AXES[axis]} up: heads lie that way from the feet, but up is said to be {expected}"
     return [Finding("wrong", said, "these are other axes than the data set's own: were they turned or not turned?")]
+
+
+def stance(frames: Frames, ground: Ground) -> list[Finding]:
+    """`upright` of the frames' joints, or else of the roots of their SMPL bodies; the ground's height is not needed."""
+    if frames.joints is not None and frames.joint_names is not None:
+        seen = dict(zip(frames.joint_names, np.moveaxis(frames.joints, 1, 0), strict=True))
+        heads = [seen[name] for name in HEADS if name in seen and np.isfinite(seen[name]).any()]
+        feet = [points for name, points in seen.items() if any(word in name for word in FEET)]
+        if heads and feet:
+            return upright("joints", heads[0] - _mean(np.stack(feet)), ground)
+    if frames.pose is not None and (frames.body or "").startswith("smpl"):
+        return upright("pose", from_axis_angle(np.asarray(frames.pose[:, 0], np.float64))[..., 1], ground)
+    return []
 
 
 def heights(what: str, lowest: NDArray[Any], allowed: tuple[float, float] = (-0.3, 0.5)) -> list[Finding]:
@@ -196,53 +234,46 @@ def cameras(given: Cameras) -> list[Finding]:
     return found or [Finding("ok", "cameras: rotations, focal lengths in pixels, positions in metres")]
 
 
-def _upright(frames: Frames, ground: Ground) -> list[Finding]:
-    if frames.joints is not None and frames.joint_names is not None:
-        head = next((frames.joint_names.index(name) for name in HEADS if name in frames.joint_names), None)
-        feet = _feet(frames.joint_names)
-        if head is not None and feet:
-            return upright("joints", frames.joints[:, head] - frames.joints[:, feet].mean(axis=1), ground)
-    if frames.pose is not None and (frames.body or "").startswith("smpl"):
-        return upright("pose", from_axis_angle(np.asarray(frames.pose[:, 0], np.float64))[..., 1], ground)
-    return []
+def _mean(points: NDArray[Any]) -> NDArray[np.float64]:
+    """Mean of points (K, F, 3) over those of the K that are known; NaN where none is."""
+    known = np.isfinite(points).all(axis=-1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        return np.where(known, points, 0.0).sum(axis=0) / known.sum(axis=0)
 
 
 def _on_ground(frames: Frames, ground: Ground) -> list[Finding]:
     for what, points in (("vertices", frames.vertices), ("joints", frames.joints)):
         if points is not None:
-            return heights(f"lowest of the {what}", ground.signed_height(points).min(axis=-1))
+            height = ground.signed_height(points)
+            lowest = np.where(np.isfinite(height), height, np.inf).min(axis=-1)
+            return heights(f"lowest of the {what}", lowest)
     if frames.transl is not None:  # the pelvis, give or take SMPL's offset of 0.2 to 0.4 m
         return heights("transl", ground.signed_height(frames.transl[:, None])[:, 0], (-0.5, 2.5))
     return []
 
 
-def _feet(joint_names: Sequence[str]) -> list[int]:
-    return [i for i, name in enumerate(joint_names) if any(word in name for word in FEET)]
-
-
 def _projections(frames: Frames, given: Cameras) -> list[Finding]:
-    """Joints seen through the camera against the keypoints of the same names."""
+    """Joints seen through the camera, against the keypoints of the same names."""
     if frames.joints is None or frames.joint_names is None:
         return []
     seen = np.einsum("fij,fkj->fki", given.rotation, frames.joints) + given.translation[:, None]
-    depth = np.nanmedian(seen[..., 2])
-    if np.isfinite(depth) and depth <= 0:
+    depth = seen[..., 2][np.isfinite(seen[..., 2])]
+    if len(depth) and np.median(depth) <= 0:
         advice = "is the camera's transform that of the world to the camera?"
-        return [Finding("wrong", f"joints lie behind the camera ({depth:.2f} m)", advice)]
-    if frames.keypoints is None or frames.keypoint_names is None:
+        return [Finding("wrong", f"joints lie behind the camera ({np.median(depth):.2f} m)", advice)]
+    shared = [name for name in frames.joint_names if name in (frames.keypoint_names or ())]
+    if frames.keypoints is None or frames.keypoint_names is None or not shared:
         return []
-    shared = [name for name in frames.joint_names if name in frames.keypoint_names]
-    if not shared:
-        return []
-    pixels = np.einsum("fij,fkj->fki", given.intrinsics, seen)
-    pixels = pixels[..., :2] / pixels[..., 2:]
     found = frames.keypoints[:, [list(frames.keypoint_names).index(name) for name in shared]]
-    off = pixels[:, [list(frames.joint_names).index(name) for name in shared]] - found[..., :2]
-    off = np.linalg.norm(np.where(found[..., 2:] > 0, off, np.nan), axis=-1)
-    if np.isnan(off).all():
+    seen = np.einsum("fij,fkj->fki", given.intrinsics, seen)
+    seen = seen[:, [list(frames.joint_names).index(name) for name in shared]]
+    known = (found[..., 2] > 0) & np.isfinite(seen).all(axis=-1) & np.isfinite(found).all(axis=-1) & (seen[..., 2] > 0)
+    if not known.any():
         return []
-    size = np.nanmedian(np.nanmax(found[..., :2], axis=(1, 2)) - np.nanmin(found[..., :2], axis=(1, 2)))
-    said = f"joints seen through the camera lie {np.nanmedian(off):.1f} pixels from the keypoints in the median"
-    if np.nanmedian(off) <= 0.25 * size:
+    pixels, labelled = seen[known], found[known]
+    off = np.median(np.linalg.norm(pixels[:, :2] / pixels[:, 2:] - labelled[:, :2], axis=-1))
+    size = np.linalg.norm(np.ptp(np.where(known[..., None], found[..., :2], found[..., :1, :2]), axis=1), axis=-1)
+    said = f"joints seen through the camera lie {off:.1f} pixels from the keypoints in the median"
+    if off <= max(0.25 * np.median(size), 5.0):
         return [Finding("ok", said)]
     return [Finding("wrong", said, "the camera, the joints or the image's size are of another frame")]

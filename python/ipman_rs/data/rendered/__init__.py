@@ -4,8 +4,9 @@ data = ipman_rs.data.open("rendered", "out/images", split="train")   # Frames: l
 data.image(5)                                                        # (S, S, 3) uint8
 images = RenderedImages(Path("out/images"), "train")                 # of .torch_images: for a torch DataLoader
 
-A folder with index.json and shards in WebDataset's layout (see `layout`); the world's y axis points up, the floor is
-y = 0, lengths are metres, pixels count from the image's upper left corner. A sample consists of
+The data set comes from `ipman data render`: a folder with index.json and shards in WebDataset's layout (see `layout`).
+The world's y axis points up, the floor is y = 0, lengths are metres, pixels count from the image's upper left corner;
+images have no frame rate. A sample consists of
 
 .jpg    RGB, square
 .npz    float32: pose (24, 3) rotation vectors, the root's in the world; betas (10,); transl (3,); joints (24, 3) in the

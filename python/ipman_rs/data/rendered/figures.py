@@ -49,10 +49,12 @@ class Figure:
 def draw_figure(draw: np.random.Generator, body: str, family: str, moving: float) -> Figure:
     """A new person in a pose of the family; `moving` is the probability that it is not at rest, where it can be."""
     model = load_body(body)
-    betas = draw.standard_normal(model.num_betas).clip(-LARGEST_BETA, LARGEST_BETA).astype(np.float32)
+    scene = None
+    while scene is None:  # a shape that does not find its balance is drawn again, pose and all
+        betas = draw.standard_normal(model.num_betas).clip(-LARGEST_BETA, LARGEST_BETA).astype(np.float32)
+        scene = at_rest(draw, shaped(model, betas.astype(np.float64)), family)
     upset = draw.random() < moving and family in UPSET
     kind = KINDS[draw.integers(1, len(KINDS))] if upset else "static"
-    scene = at_rest(draw, shaped(model, betas.astype(np.float64)), family)
     scene = disturbed(scene, kind, draw)
     heading = Rotation.from_rotvec([0.0, draw.uniform(-np.pi, np.pi), 0.0])
     pose, transl = scene.full_pose.copy(), scene.transl.copy()
@@ -61,15 +63,15 @@ def draw_figure(draw: np.random.Generator, body: str, family: str, moving: float
     return Figure(body, family, scene.name, kind, pose.astype(np.float32), betas, transl.astype(np.float32))
 
 
-def at_rest(draw: np.random.Generator, person: BodyModel, family: str) -> Scene:
-    """RuntimeError if none of many tries stands."""
+def at_rest(draw: np.random.Generator, person: BodyModel, family: str) -> Scene | None:
+    """The person in a pose of the family; None if many tries do not stand."""
     template = load_body(person.name).template
     name = FAMILIES[family][draw.integers(len(FAMILIES[family]))]
     for _ in range(TRIES):
         settled = settle(perturbed(poses.pose_of(person, name), person, draw), person, template)
         if settled is not None:
             return Scene(person, template, family, name, *settled)
-    raise RuntimeError(f"{name}: none of {TRIES} tries came to rest")
+    return None
 
 
 def shaped(model: BodyModel, betas: Array) -> BodyModel:

@@ -4,6 +4,7 @@ killed goes on behind it."""
 from __future__ import annotations
 
 import io
+import itertools
 import json
 import multiprocessing
 import os
@@ -11,6 +12,7 @@ import tarfile
 import threading
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -40,18 +42,16 @@ def write(
     missing = [shard for shard in shards if not (folder / shard.name).exists()]
     done = sum(shard.count for shard in shards) - sum(shard.count for shard in missing)
     progress(done)
-    drawn = packed(settings, missing, workers)
-    for shard in missing:
-        part = folder / f".{shard.name}.part"
-        with tarfile.open(part, "w", format=tarfile.USTAR_FORMAT) as archive:
-            for _ in range(shard.count):
-                key, contents = next(drawn)
-                for ending, content in contents.items():
-                    add(archive, f"{key}.{ending}", content)
-                done += 1
-                progress(done)
-        os.replace(part, folder / shard.name)
-    drawn.close()
+    with closing(packed(settings, missing, workers)) as samples:
+        for shard in missing:
+            part = folder / f".{shard.name}.part"
+            with tarfile.open(part, "w", format=tarfile.USTAR_FORMAT) as archive:
+                for key, contents in itertools.islice(samples, shard.count):
+                    for ending, content in contents.items():
+                        add(archive, f"{key}.{ending}", content)
+                    done += 1
+                    progress(done)
+            os.replace(part, folder / shard.name)
     return sum(shard.count for shard in missing)
 
 
