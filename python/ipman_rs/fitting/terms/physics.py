@@ -85,7 +85,7 @@ class Balance(Physics):
 
 
 @lru_cache(maxsize=16)
-def _loss(body: BodyModel, preset: str, samples: int | None, wrap: Wrap) -> ipt.IntuitivePhysicsLoss:
+def _loss(body: BodyModel, preset: str, samples: int | None, wrap: Wrap = "log") -> ipt.IntuitivePhysicsLoss:
     """One object for all terms of the same constants: by it they find each other's evaluation."""
     return ipt.IntuitivePhysicsLoss(_template(body, samples), preset=preset, reduction="none", wrap=wrap)
 
