@@ -1,4 +1,4 @@
-"""Penetration, hover, skating, tilt and the errors of both centres: plain loops and scipy's rotations are the judges."""
+"""Penetration, hover, skating, tilt and errors of both centres: plain loops and scipy's rotations are the judges."""
 
 from __future__ import annotations
 
