@@ -6,6 +6,7 @@ file of numpy.savez_compressed has to be unpacked: once, when it is opened, up t
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -61,10 +62,14 @@ class RowFile:
 
     def texts(self, name: str, rows: Rows) -> NDArray[np.str_]:
         """Rows of an array of text."""
+        values = np.asarray(self.arrays[name][rows]).reshape(-1)
         try:
-            return np.asarray(self.arrays[name][rows]).astype(np.str_).reshape(-1)
-        except ValueError as error:
+            texts = values.astype(np.str_)
+        except UnicodeDecodeError as error:
             raise ValueError(f"{self.path}: {name}: holds what is no text ({error})") from None
+        if texts.nbytes and texts.view(np.uint32).max() > sys.maxunicode:  # numpy and Python do not look
+            raise ValueError(f"{self.path}: {name}: holds what is no text (characters that Unicode does not have)")
+        return texts
 
     def scan(self) -> Iterator[Finding]:
         """Every number of the file, whether it is one."""
