@@ -76,18 +76,17 @@ class Form:
 
 
 class Spin:
-    """A data set in this form: rows of one file, as Frames."""
+    """A data set in this form: the rows of one file, as Frames."""
 
-    def __init__(self, path: Path, form: Form, frame: str | None = None, height: float | None = None) -> None:
-        self.file = RowFile(path, SHAPES, REQUIRED)
-        self.form = form
+    def __init__(self, file: RowFile, form: Form, frame: str | None = None, height: float | None = None) -> None:
+        self.file, self.form = file, form
         self.world = self._in_world(frame)
         self.height = form.height if height is None else height
         self.people = self._people()
         labels = [form.label(image) for image in self.file.texts("imgname", slice(0, 64)).tolist()]
         self.frame_rate = naming.frame_rate(labels, form.video_rate)
         if "ground_offset" in self.file and not np.isfinite(self.file.arrays["ground_offset"]).all():
-            raise ValueError(f"{path}: ground_offset: expected metres in every row, got NaN or infinity")
+            raise ValueError(f"{file.path}: ground_offset: expected metres in every row, got NaN or infinity")
 
     def __len__(self) -> int:
         return len(self.file)
@@ -216,7 +215,7 @@ def open(
     file for what is missing, damaged, of a wrong shape, or not metres, radians and the axes that are promised.
     """
     file = _file(form, Path(path), split)
-    data = Spin(file, form, frame, height)
+    data = Spin(RowFile(file, SHAPES, REQUIRED), form, frame, height)
     demand(file, _plausible(data))
     return data
 
@@ -239,10 +238,10 @@ def check(form: Form, path: str | os.PathLike[str]) -> list[Finding]:
 
 def _check_file(form: Form, file: Path) -> list[Finding]:
     try:
-        data = Spin(file, form)
+        data = Spin(RowFile(file, SHAPES, REQUIRED), form)
         found = [Finding("ok", f"{len(data)} rows with {', '.join(data.file)}"), *_plausible(data)]
         if data.world and "S" in data.file:
-            seen = _plausible(Spin(file, form, "camera"))
+            seen = _plausible(Spin(data.file, form, "camera"))
             found += [Finding(each.level, f"in the camera's axes: {each.what}", each.advice) for each in seen]
         found += data.file.scan()
     except ValueError as error:
