@@ -98,6 +98,12 @@ def judged(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Find
     return found + (check.of_frames(concatenated(some)) if some else [])
 
 
+def told(name: str, frames: Frames) -> list[check.Finding]:
+    """What can be told of one recording, under its name."""
+    found = check.of_frames(check.sample(frames))
+    return [check.Finding(each.level, f"{name}: {each.what}", each.advice) for each in found]
+
+
 def numbered(name: str, count: int) -> NDArray[np.str_]:
     """Names of the frames of a sequence: "name/00000", "name/00001", ..."""
     return np.array([f"{name}/{number:05d}" for number in range(count)], np.str_)
