@@ -10,11 +10,11 @@ import pytest
 
 pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
 
-from miniatures import moyo as miniature  # noqa: E402
+from miniatures import moyo as miniature
 
-import ipman_rs.data as data  # noqa: E402
-from ipman_rs.body import safe_pickle  # noqa: E402
-from ipman_rs.data import moyo  # noqa: E402
+import ipman_rs.data as data
+from ipman_rs.body import safe_pickle
+from ipman_rs.data import moyo
 
 NAME = miniature.names()[0]
 
@@ -151,7 +151,7 @@ def test_check_of_what_is_whole(whole):
     findings = moyo.check(whole[0])
     assert [each for each in findings if each.level == "wrong"] == []
     missing = [each.what for each in findings if each.level == "missing"]
-    assert missing == [f"{miniature.HANDS}: no com/"]
+    assert missing == [f"{miniature.HANDS}: no centres of mass (com/)"]
     assert any("20221004_with_com: 3 sequences (2 in train, 1 in val)" in each.what for each in findings)
 
 
@@ -259,7 +259,7 @@ def test_measurements_in_other_axes_and_units(one):
     refused(root, "c3d: looks like y up: CentreOfMassFloor is expected under CentreOfMass, on z = 0")
     miniature.com(files["com"], 24)
     miniature.corners(files["corners"], 24, up="y")
-    refused(root, r"c3d: expected the mat's corners on the floor, z = 0, .*; looks like y up")
+    refused(root, r"c3d: expected the mat's corners on the floor z = 0, .*; looks like y up")
     miniature.corners(files["corners"], 24)
     content = files["xml"].read_text()
     files["xml"].write_text(content.replace("12.7", "0.0127"))

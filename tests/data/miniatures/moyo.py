@@ -9,6 +9,7 @@ import json
 import pickle
 import sys
 import types
+from unittest import mock
 
 import numpy as np
 
@@ -22,14 +23,11 @@ HANDS, COM = "20220923_20220926_with_hands", "20221004_with_com"
 STANDING = np.array([np.pi / 2, 0, 0])  # turns SMPL-X's y up into the data set's z up
 
 
-class Settings:
-    """Stands for the class of the fitting program's settings, which no reader has: omegaconf.DictConfig."""
-
-
-def _settings():
+def _other_program():
+    """The class of the fitting program's settings, omegaconf.dictconfig.DictConfig, and the modules that it is in."""
     module = types.ModuleType("omegaconf.dictconfig")
-    module.DictConfig = type("DictConfig", (), {"__module__": "omegaconf.dictconfig", "__qualname__": "DictConfig"})
-    return module
+    module.DictConfig = type("DictConfig", (), {"__module__": module.__name__, "__qualname__": "DictConfig"})
+    return module.DictConfig, {"omegaconf": types.ModuleType("omegaconf"), "omegaconf.dictconfig": module}
 
 
 def body(path, frames, seed=0, lies=False, up="z", scale=1.0, **changes):
@@ -42,7 +40,7 @@ def body(path, frames, seed=0, lies=False, up="z", scale=1.0, **changes):
     )
     if up == "y":
         trans = trans[:, [0, 2, 1]]
-    module = _settings()
+    settings, modules = _other_program()
     content = {
         "fullpose": pose,
         "trans": trans * scale,
@@ -50,7 +48,7 @@ def body(path, frames, seed=0, lies=False, up="z", scale=1.0, **changes):
         "markers_latent": rng.normal(size=(4, 3)),
         "latent_labels": ["LKNE", "RKNE", "C7", "T10"],
         "stageii_debug_details": {
-            "cfg": module.DictConfig(),
+            "cfg": settings(),
             "mocap_frame_rate": 60.0,
             "markers_obs": [rng.normal(size=(4, 3)) for _ in range(frames)],
             "labels_obs": [["LKNE", "RKNE", "C7", "T10"]] * frames,
@@ -59,11 +57,8 @@ def body(path, frames, seed=0, lies=False, up="z", scale=1.0, **changes):
     }
     content |= changes
     content["stageii_debug_details"]["cfg"].settings = {"surface_model": {"type": "smplx", "gender": "female"}}
-    sys.modules["omegaconf.dictconfig"] = module  # only while the file is written
-    try:
+    with mock.patch.dict(sys.modules, modules):
         data = pickle.dumps({name: value for name, value in content.items() if value is not None})
-    finally:
-        del sys.modules["omegaconf.dictconfig"]
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(data)
     return pose, trans
@@ -166,7 +161,7 @@ def com(path, frames, up="z", unit="mm", lost=()):
 
 
 def camera(number):
-    """Focal length, principal point, rotation (3, 3) from the room to the camera, position (3,) m: it looks at the mat."""
+    """Focal length, principal point, rotation (3, 3) from the room to the camera, position (3,) m."""
     position = np.array([3 * np.cos(number), 3 * np.sin(number), 1.5])
     forward = np.array([0, 0, 0.8]) - position
     forward /= np.linalg.norm(forward)
