@@ -1,4 +1,4 @@
-"""RICH: bodies in camera 0's axes with the scan's ground in them, cameras, splits; and what can be wrong with its files."""
+"""RICH: bodies in camera 0's axes and the scan's ground in them, cameras, splits; and what can be wrong with its files."""
 
 from __future__ import annotations
 
@@ -93,6 +93,8 @@ def test_splits_and_cameras(whole):
     np.testing.assert_array_equal(second.cameras.intrinsics[0], intrinsics)
     np.testing.assert_array_equal(second.pose, train.pose)  # bodies stay in camera 0's axes
     assert second.images is None
+    assert sequences["ipman-test"].images[0].endswith("_00.jpeg")
+    assert sequences["ipman-train"].images is None
     with pytest.raises(ValueError, match="split: expected one of train, val, test, ipman-train, .* got 'all'"):
         data.open("rich", root, split="all")
     with pytest.raises(ValueError, match=r"007.xml: expected the calibration of camera 7, no such file"):
@@ -109,7 +111,7 @@ def test_check_of_what_is_whole(whole):
 
 def test_hands_of_components(one, rng):
     root, truth = one
-    hands = Hands(rng.normal(size=(30, 3)), rng.normal(size=(12, 45)), rng.normal(size=(12, 45)))
+    hands = Hands(*(rng.normal(scale=0.1, size=size) for size in ((30, 3), (12, 45), (12, 45))))
     frames = data.open("rich", root, hands=hands)[:]
     content = truth["018", 5]
     left = content["left_hand_pose"][0] @ hands.left_components + hands.mean[:15].ravel()
@@ -132,6 +134,14 @@ def test_two_people_and_gaps(tmp_path):
     assert f"{name}: no cameras" in missing
     miniature.sequence(tmp_path, name, "test", frames=(4, 6, 9), people=["009", "021"])
     assert data.open("rich", tmp_path)[:].frame_rate is None
+
+
+def test_scenes_of_which_some_have_no_ground(whole, tmp_path):
+    miniature.sequence(tmp_path, ONE, "val")
+    miniature.sequence(tmp_path, "ParkingLot1_005_pushup1", "val")
+    miniature.scene(tmp_path, "Pavallion")
+    with pytest.raises(ValueError, match="ground of ParkingLot1_005_pushup1: expected ground_mesh.ply, as other"):
+        data.open("rich", tmp_path)
 
 
 def test_the_ground_beside_the_bodies(one):
@@ -203,7 +213,7 @@ def test_ways_to_the_world_that_cannot_be(one):
         ({"c": 1000.0}, "c: looks like millimetres: expected a scale about 1"),
         ({"R": [[1, 0, 0], [0, 2, 0], [0, 0, 1]]}, r"R: expected a rotation \(3, 3\)"),
         ({"t": [1, 2]}, "expected R, t and c of the way to the scan's world"),
-        ({"c": None}, "expected R, t and c of the way to the scan's world"),
+        ({"c": None}, "c: expected a scale about 1, metres to metres, got nan"),
     ):
         path.write_text(json.dumps(said | change))
         refused(root, f"Pavallion_multicam2world.json: {message}")

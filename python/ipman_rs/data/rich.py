@@ -26,7 +26,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +56,7 @@ IPMAN = {
     ),
 }  # fmt: skip
 RATE = 30.0  # Hz
-FEMALE = (9, 10, 12, 13, 16, 17, 18, 19)  # of the subjects 0 to 21
+FEMALE = (9, 10, 12, 13, 16, 17, 18, 19, 21)  # of the subjects 0 to 21
 SUBJECTS = 22
 PARTS = {  # array -> the joints that it turns, in SMPL-X's order
     "global_orient": slice(0, 1),
@@ -113,12 +113,26 @@ def open(
     folders = _folders(root, split)
     views = [view for folder in folders for view in _views(root, folder, _cameras(root, folder, split, cameras))]
     scenes = {folder: _scene(root, folder) for folder in folders}
+    _alike(root, scenes)
     rate = _rate(views)
+    pictured = any(_image_folder(root, view).is_dir() for view in views)
 
     def sequence(index: int) -> Frames:
-        return _frames(root, views[index], scenes[views[index].folder], hands, rate)
+        frames = _frames(root, views[index], scenes[views[index].folder], hands, rate)
+        return frames if not pictured else replace(frames, images=_images(root, views[index]))
 
     return sequences.demanded(root, sequences.sequences([len(view.files) for view in views], sequence, path))
+
+
+def _alike(root: Path, scenes: dict[Path, Scene]) -> None:
+    """ValueError if some scenes lack what others have."""
+    for what, there, file in (
+        ("ground", {folder: scene.ground is not None for folder, scene in scenes.items()}, "ground_mesh.ply"),
+        ("cameras", {folder: bool(scene.cameras) for folder, scene in scenes.items()}, "calibration/*.xml"),
+    ):
+        lacking = [folder.name for folder, has in there.items() if not has]
+        if lacking and len(lacking) < len(there):
+            raise ValueError(f"{root}: {what} of {', '.join(lacking)}: expected {file}, as other sequences have")
 
 
 def _folders(root: Path, split: str | None) -> list[Path]:
@@ -192,7 +206,6 @@ def _frames(root: Path, view: View, scene: Scene, hands: Hands | None, rate: flo
         pose=pose,
         betas=betas,
         transl=transl,
-        images=_images(root, view),
         cameras=spread,
     )
     return sequences.plausible(view.folder, frames)
@@ -233,16 +246,16 @@ def _gender(subject: str) -> str:
     return "female" if int(subject) in FEMALE else "male"
 
 
-def _images(root: Path, view: View) -> NDArray[np.str_] | None:
-    """The images' paths; None if there is no folder of them."""
-    folder = root / "images" / view.folder.parent.name / view.sequence / f"cam_{view.camera:02d}"
-    first = (
-        next((file for file in folder.glob("*") if file.suffix.lower() in IMAGES), None) if folder.is_dir() else None
-    )
-    if first is None:
-        return None
-    names = (f"{file.parent.name}_{view.camera:02d}{first.suffix}" for file in view.files)
-    return np.array([str(folder / name) for name in names])
+def _image_folder(root: Path, view: View) -> Path:
+    return root / "images" / view.folder.parent.name / view.sequence / f"cam_{view.camera:02d}"
+
+
+def _images(root: Path, view: View) -> NDArray[np.str_]:
+    """The images' paths; empty if the view has none."""
+    folder = _image_folder(root, view)
+    first = next((file for file in folder.glob("*") if file.suffix.lower() in IMAGES), None)
+    names = (f"{file.parent.name}_{view.camera:02d}" for file in view.files)
+    return np.array(["" if first is None else str(folder / name) + first.suffix for name in names])
 
 
 def _calibration(root: Path, folder: Path) -> Path:

@@ -70,8 +70,8 @@ def calibration(path, number, scale=1.0, doctype="", cut=None):
         "Distortion": np.array([[0.01, -0.02, 0, 0, 0]]),
     }
     parts = [
-        f'<{name} type_id="opencv-matrix">\n  <rows>{len(values)}</rows>\n  <cols>{values.shape[1]}</cols>\n  <dt>d</dt>\n'
-        f"  <data>\n    {' '.join(repr(float(x)) for x in values.ravel())}</data></{name}>"
+        f'<{name} type_id="opencv-matrix">\n  <rows>{len(values)}</rows>\n  <cols>{values.shape[1]}</cols>\n'
+        f"  <dt>d</dt>\n  <data>\n    {' '.join(repr(float(x)) for x in values.ravel())}</data></{name}>"
         for name, values in matrices.items()
     ]
     path.parent.mkdir(parents=True, exist_ok=True)
