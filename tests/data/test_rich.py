@@ -1,4 +1,4 @@
-"""RICH: bodies in camera 0's axes and the scan's ground in them, cameras, splits; and what can be wrong with its files."""
+"""RICH: bodies in camera 0's axes, the scan's ground in them, cameras, splits; and what can be wrong with its files."""
 
 from __future__ import annotations
 
@@ -142,6 +142,9 @@ def test_scenes_of_which_some_have_no_ground(whole, tmp_path):
     miniature.scene(tmp_path, "Pavallion")
     with pytest.raises(ValueError, match="ground of ParkingLot1_005_pushup1: expected ground_mesh.ply, as other"):
         data.open("rich", tmp_path)
+    findings = rich.check(tmp_path)
+    assert [each for each in findings if each.level == "wrong"] == []
+    assert any("ParkingLot1_005_pushup1: no ground" in each.what for each in findings if each.level == "missing")
 
 
 def test_the_ground_beside_the_bodies(one):

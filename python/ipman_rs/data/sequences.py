@@ -95,7 +95,10 @@ def judged(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Find
                 found.append(check.Finding(each.level, f"{name}: {each.what}", each.advice))
         if index in _spread(len(parts), SAMPLED**2):
             some.append(frames[_spread(len(frames), SAMPLED)])
-    return found + (check.of_frames(concatenated(some)) if some else [])
+    try:
+        return found + (check.of_frames(concatenated(some)) if some else [])
+    except ValueError as error:  # they have other joints, or only some have a ground
+        return [*found, check.Finding("missing", str(error))]
 
 
 def told(name: str, frames: Frames) -> list[check.Finding]:
