@@ -216,7 +216,7 @@ def open(path: str | os.PathLike[str], split: str | None = None) -> DataSet:
         _frames(file.stem, found, markers, *beside)
         for file, found, beside in zip(files, tracks, _beside(files), strict=True)
     ]
-    return demanded(path, Joined(sequences.measured_alike(parts)))
+    return demanded(Path(path), Joined(sequences.measured_alike(parts)))
 
 
 def _frames(name: str, tracks: Tracks, markers: list[str], forces: Path | None, com: Path | None) -> Frames:

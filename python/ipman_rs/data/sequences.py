@@ -52,7 +52,7 @@ def measured_alike(parts: Sequence[Frames]) -> list[Frames]:
 
 
 def _with_nothing(part: Frames, parts: Sequence[Frames], plates: int) -> Frames:
-    lacking = {
+    lacking: dict[str, NDArray[np.floating]] = {
         name: np.full((len(part), 3), np.nan)
         for name in ("center_of_mass", "center_of_pressure")
         if getattr(part, name) is None and any(getattr(other, name) is not None for other in parts)
