@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import pickle
+import tracemalloc
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
 
@@ -422,6 +426,40 @@ def test_strangers_swallow_what_is_put_into_them(tmp_path):
     (tmp_path / "a.pkl").write_bytes(module.encode())
     found = safe_pickle.read(tmp_path / "a.pkl", tolerant=True)
     assert isinstance(found["a"], safe_pickle.Stranger)
+
+
+@pytest.mark.parametrize(
+    "data_",
+    [
+        b"\x80\x04\x8e" + (1 << 31).to_bytes(8, "little") + b"x.",  # bytes that are not there
+        b"\x80\x02Nr" + (1 << 31).to_bytes(4, "little") + b".",  # a memo index
+        b"ctorch\nTensor\n(J\xff\xff\xff\x7ftR.",  # a stranger of two billion elements
+        b"\x80\x02}(X\x01\x00\x00\x00acnumpy.core.multiarray\nscalar\n(I1\nI2\ntRu.",
+        b"\x80\x02cpandas\nX\n(K\x01\x85" + b"\x85" * 100_000 + b"e.",  # nested, put into a class
+    ],
+    ids=["bytes", "memo", "stranger", "scalar", "nested"],
+)
+def test_small_hostile_pickles_that_are_read_tolerantly(tmp_path, data_):
+    path = tmp_path / "a.pkl"
+    path.write_bytes(data_)
+    tracemalloc.start()
+    with pytest.raises(ValueError, match=r"a\.pkl|number without its type"):
+        safe_pickle.as_array(safe_pickle.read(path, tolerant=True)["a"])
+    assert tracemalloc.get_traced_memory()[1] < 20 << 20
+    tracemalloc.stop()
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(cuts=st.lists(st.tuples(st.integers(0, 3000), st.binary(max_size=6)), min_size=1, max_size=4))
+def test_damaged_bytes_are_read_or_refused(tmp_path, cuts):
+    miniature.body(tmp_path / "a.pkl", 1, fullpose=np.zeros((1, 3)), betas=np.zeros(2))
+    content = bytearray((tmp_path / "a.pkl").read_bytes())
+    for place, new in cuts:
+        place %= len(content)
+        content[place : place + len(new)] = new
+    (tmp_path / "a.pkl").write_bytes(bytes(content))
+    with contextlib.suppress(ValueError):  # and nothing else
+        assert isinstance(safe_pickle.read(tmp_path / "a.pkl", tolerant=True), dict)
 
 
 def test_cameras_that_cannot_be(whole, tmp_path):
