@@ -27,6 +27,7 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -112,7 +113,8 @@ def open(
     root = Path(path)
     folders = _folders(root, split)
     views = [view for folder in folders for view in _views(root, folder, _cameras(root, folder, split, cameras))]
-    scenes = {folder: _scene(root, folder) for folder in folders}
+    read = lru_cache(maxsize=None)(_scene)  # of a place, whose files are those of all its sequences
+    scenes = {folder: read(*_scene_files(root, folder)) for folder in folders}
     _alike(root, scenes)
     rate = _rate(views)
     pictured = any(_image_folder(root, view).is_dir() for view in views)
@@ -276,11 +278,15 @@ def _ground_mesh(root: Path, folder: Path) -> Path | None:
     return next((place for place in places if place.is_file()), None)
 
 
-def _scene(root: Path, folder: Path) -> Scene:
-    files = sorted(file for file in _calibration(root, folder).glob("*.xml") if file.stem.isdigit())
-    mesh = _ground_mesh(root, folder)
+def _scene_files(root: Path, folder: Path) -> tuple[Path | None, Path, Path]:
+    """Ground, way to the scan's world, and folder of the cameras' calibrations."""
+    return _ground_mesh(root, folder), _to_world(root, folder), _calibration(root, folder)
+
+
+def _scene(mesh: Path | None, to_world: Path, calibration: Path) -> Scene:
+    files = sorted(file for file in calibration.glob("*.xml") if file.stem.isdigit())
     return Scene(
-        ground=None if mesh is None else ground(mesh, _to_world(root, folder)),
+        ground=None if mesh is None else ground(mesh, to_world),
         cameras={int(file.stem): camera(file) for file in files},
     )
 
@@ -371,11 +377,11 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
             found.append(Finding("missing", f"{split}: {', '.join(lacking)}"))
         else:
             found.append(Finding("ok", f"{split}: all {len(names)} sequences"))
-    read = []
+    read, read_scene = [], lru_cache(maxsize=None)(_scene)
     for folder in folders:
         found += _around(root, folder)
         try:
-            scene = _scene(root, folder)
+            scene = read_scene(*_scene_files(root, folder))
             for view in _views(root, folder, (0,)):
                 read.append((view.sequence, lambda v=view, s=scene: _frames(root, v, s, None, None)))
         except ValueError as error:
