@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
@@ -202,7 +203,8 @@ def test_bad_input():
 def test_a_mat_that_was_moved():
     """A row of its place for each frame: as the frames one by one, each over its own mat."""
     samples, values = over(3, 200), np.random.default_rng(4).random((3, HEIGHT, WIDTH))
-    mats = [mat(values[f : f + 1], ip.Ground(SLOPE.normal, SLOPE.height + 0.01 * f)) for f in range(3)]
+    still = [mat(values[f : f + 1]) for f in range(3)]
+    mats = [replace(there, origin=there.origin + 0.02 * f * there.e1) for f, there in enumerate(still)]
     centers = samples.mean(axis=1)
     moved = PressureMaps(values, *(np.array([getattr(m, part) for m in mats]) for part in ("origin", "e1", "e2")), CELL)
     weights = np.random.default_rng(5).random((3, 200))
