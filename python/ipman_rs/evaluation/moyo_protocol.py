@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.checks import number
 
@@ -99,7 +99,9 @@ class _Frame:
     """One body over the mat. Pressure is 1 − αh below the ground and e^(−γh) above: sums of all samples are made of
     sums that know α alone, or γ alone, so the grid of both costs their sum and not their product."""
 
-    def __init__(self, body: Array, heights: Array, normal: Array, cells: Array, truth: Array, center: Array) -> None:
+    def __init__(
+        self, body: Array, heights: Array, normal: Array, cells: NDArray[np.int64], truth: Array, center: Array
+    ) -> None:
         self.body, self.normal, self.truth, self.center = body, normal, truth, center
         self.heights, self.below = heights, heights < 0
         self.cells = cells
