@@ -132,3 +132,12 @@ def test_reading_a_row_does_not_depend_on_its_neighbours(tmp_path):
         alone = frames[row : row + 1]
         for name in ("joints", "pose", "transl", "betas", "keypoints", "boxes"):
             assert getattr(alone, name)[0].tobytes() == getattr(every, name)[row].tobytes()
+
+
+def test_packed_files_that_unpack_to_too_much(tmp_path, monkeypatch):
+    file, _ = human36m.write(tmp_path, packed=True)
+    monkeypatch.setattr("ipman_rs.data.rows.UNPACKED", 5000)
+    with pytest.raises(ValueError, match="unpacks to more than .*save it again with numpy.savez"):
+        data.open("human36m", file)
+    file, _ = human36m.write(tmp_path)
+    assert len(data.open("human36m", file)) == 12

@@ -211,6 +211,8 @@ def turned(values):
         (spoilt(pose_world=lambda p: p.astype(str)), "pose_world: expected numbers, got type <U"),
         (spoilt(imgname=lambda i: i.astype(object)), "imgname.*Python objects, which are not loaded"),
         (spoilt(S=lambda s: s.astype(object)), "S.*Python objects, which are not loaded"),
+        (spoilt(imgname=lambda i: np.full(i.shape, b"\xff\xfe")), "imgname: holds what is no text"),
+        (spoilt(imgname=lambda i: np.full(12 * 4, 0x7FFFFFFF, np.int32).view("U4")), "imgname: holds what is no text"),
         (spoilt(imgname=lambda i: np.arange(12)), "imgname: expected text, got type int64"),
         (spoilt(S_world=lambda s: s * (1000, 1000, 1000, 1)), "joints: looks like millimetres: .*divide by 1000"),
         (spoilt(S_world=lambda s: s * (100, 100, 100, 1)), "joints: looks like centimetres"),

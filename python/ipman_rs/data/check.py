@@ -6,9 +6,9 @@ the common form. `demand` makes an error of what is wrong.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -38,14 +38,14 @@ class Finding:
     advice: str = ""
 
 
-def demand(path: Path | str, findings: Iterable[Finding]) -> None:
+def demand(path: str | os.PathLike[str], findings: Iterable[Finding]) -> None:
     """ValueError with the file's name and all that is wrong; what is merely missing passes."""
     wrong = [f"{each.what}; {each.advice}" if each.advice else each.what for each in findings if each.level == "wrong"]
     if wrong:
         raise ValueError(f"{path}: {'. '.join(wrong)}")
 
 
-def demanded(path: Path | str, data: DS) -> DS:
+def demanded(path: str | os.PathLike[str], data: DS) -> DS:
     """`data`, if a sample of its frames has plausible units, axes, ground and cameras; else ValueError."""
     demand(path, of_frames(sample(data)))
     return data
