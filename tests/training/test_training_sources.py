@@ -201,3 +201,29 @@ def test_bad_images_and_labels(frames, tmp_path):
     batch = Batch.of([images(dataclasses.replace(frames, pose=pose)).sample(0, None)]).sound()
     assert not batch.has_body.any()
     assert batch.pose.isfinite().all()
+
+
+def test_joints_that_mean_something_else_do_not_count(frames):
+    """Human3.6M's "head" is no joint of SMPL's; its hips are."""
+    own = tuple(name for name in joints.SMPL if name in ("head", "left_hip", "pelvis"))
+    rows = [joints.SMPL.index(name) for name in own]
+    other = dataclasses.replace(frames, joints=frames.joints[:, rows], joint_names=own)
+    confidence = images(other).sample(0, None)["joints"][:, 3]
+    assert {joints.SMPL[row] for row in confidence.nonzero().flatten()} == {"left_hip", "pelvis"}
+    assert images(frames).sample(0, None)["joints"][:, 3].sum() == 24
+
+
+def test_parameters_of_a_model_file(frames):
+    """What a data set calls smpl fits any file of SMPL's, and not the embedded body."""
+    smpl = dataclasses.replace(load_body("anny-lite"), name="SMPL_NEUTRAL")
+    told = dataclasses.replace(frames, body="smpl")
+    assert Images(People(told), smpl, KEYPOINTS, 60).sample(0, None)["has_body"]
+    assert not images(told).sample(0, None)["has_body"]
+
+
+def test_a_folder_of_images(frames, tmp_path):
+    bare = dataclasses.replace(frames, images=np.array([f"{number}.png" for number in range(COUNT)]))
+    inside = images(bare, folder=tmp_path).sample(0, None)["inputs"]
+    assert torch.equal(inside, images(frames).sample(0, None)["inputs"])
+    with pytest.raises(BadSample, match="No such file"):
+        images(bare).sample(0, None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ipman_rs.body import BodyModel, rotations
+from ipman_rs.body.embedded import NAMES
 from ipman_rs.data import DataSet, Frames
 
 from ..augment import Augmentation, Augmenting, crop, follow, to_crop
@@ -18,13 +20,20 @@ from .source import BadSample
 
 Array = NDArray[np.floating]
 
+# Data sets with joints of their own mean other points by "neck" or "head" than SMPL does; in these they agree.
+SHARED = ("pelvis", *(f"{side}_{name}" for side in ("left", "right") for name in (
+    "hip", "knee", "ankle", "shoulder", "elbow", "wrist",
+)))  # fmt: skip
+KINDS = {24: "smpl", 52: "smplh", 55: "smplx"}  # of a model file, by its joints
+
 
 class Images:
     """Frames of one data set for a body model.
 
     keypoints: names of those that are asked for; a data set's others are left out. size: pixels of a crop's side.
-    augmenting: how samples are changed where a generator is given. Pose and betas of another body model count as not
-    labelled. Frames without cameras give the body in camera axes, as SPIN's files do; they have no world.
+    folder: where the paths of images begin, unless the data set brings its images. augmenting: how samples are changed
+    where a generator is given. Pose and betas of another body model count as not labelled. Frames without cameras give
+    the body in camera axes, as SPIN's files do; they have no world.
     """
 
     def __init__(
@@ -34,8 +43,9 @@ class Images:
         keypoints: Sequence[str],
         size: int = 224,
         augmenting: Augmenting | None = None,
+        folder: Path = Path(),
     ) -> None:
-        self.data, self.body, self.keypoints, self.size = data, body, tuple(keypoints), size
+        self.data, self.body, self.keypoints, self.size, self.folder = data, body, tuple(keypoints), size, folder
         self.augmenting = augmenting or Augmenting()
 
     def __len__(self) -> int:
@@ -56,7 +66,7 @@ class Images:
 
     def labels(self, frame: Frames) -> dict[str, Tensor]:
         """Of the one image as it is: fields of `Batch`, keypoints in pixels. What is not labelled has zeros."""
-        labelled = frame.pose is not None and frame.betas is not None and frame.body == self.body.name
+        labelled = frame.pose is not None and frame.betas is not None and self._is_own(frame.body)
         camera = np.eye(3) if frame.cameras is None else np.asarray(frame.cameras.rotation[0], float)
         pose = np.tile(np.eye(3), (self.body.num_joints, 1, 1))
         betas = np.zeros(self.body.num_betas)
@@ -67,7 +77,8 @@ class Images:
             pose[0] = camera @ pose[0]
             count = min(len(betas), frame.betas.shape[1])
             betas[:count] = frame.betas[0, :count]
-        joints = _named(frame.joints, frame.joint_names, self.body.joint_names, 3)
+        own = tuple(frame.joint_names or ()) == self.body.joint_names
+        joints = _named(frame.joints, frame.joint_names, self.body.joint_names, 3, None if own else SHARED)
         pelvis = joints[0, :3].copy()
         joints[:, :3] = joints[:, :3] @ camera.T
         world = frame.cameras is not None and frame.ground is not None and joints[0, 3] > 0
@@ -87,6 +98,10 @@ class Images:
             "contact": torch.tensor(_flag(frame.contact)),
         }
 
+    def _is_own(self, name: str | None) -> bool:
+        """Whether parameters of the body `name` are those of this model."""
+        return name == self.body.name or (self.body.name not in NAMES and name == KINDS.get(self.body.num_joints))
+
     def _image(self, frame: Frames, row: int) -> Any:
         """A PIL image: the data set's own, or the file that the frame names."""
         from PIL import Image
@@ -96,18 +111,25 @@ class Images:
             return Image.fromarray(own(row))
         if frame.images is None:
             raise BadSample(f"{frame.names[0]}: no image")
-        with Image.open(str(frame.images[0])) as image:
+        with Image.open(self.folder / str(frame.images[0])) as image:
             return image.convert("RGB")
 
 
-def _named(points: Array | None, names: Sequence[str] | None, wanted: Sequence[str], size: int) -> Array:
-    """The wanted points of a frame (len(wanted), size + 1), confidence last, 0 for those it lacks."""
+def _named(
+    points: Array | None,
+    names: Sequence[str] | None,
+    wanted: Sequence[str],
+    size: int,
+    among: Sequence[str] | None = None,
+) -> Array:
+    """The wanted points of a frame (len(wanted), size + 1), confidence last, 0 for those it lacks or that are not
+    `among`."""
     found = np.zeros((len(wanted), size + 1))
     if points is None or names is None:
         return found
     rows = {name: row for row, name in enumerate(names)}
     for index, name in enumerate(wanted):
-        if name in rows:
+        if name in rows and (among is None or name in among):
             point = np.asarray(points[0, rows[name]], float)
             found[index, :size] = point[:size]
             found[index, size] = point[size] if len(point) > size else 1.0

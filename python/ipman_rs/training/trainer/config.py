@@ -17,11 +17,13 @@ from ..losses import Weights
 @dataclass(frozen=True)
 class DataSet:
     """One data set. name: of `ipman_rs.data`, or "people" (built ones, seen as keypoints; path is then their number).
-    share: of the training samples. options: of the data set, such as `split` or `images`."""
+    share: of the training samples. images: the folder in which the paths of images begin. options: of the data set,
+    such as `split`."""
 
     name: str
     path: str
     share: float = 1.0
+    images: str = ""
     options: dict[str, Any] = field(default_factory=dict)
 
 

@@ -42,7 +42,8 @@ def source(told: config.DataSet, settings: config.Config, body: BodyModel, seed:
         data = ipman_rs.data.open(told.name, Path(os.path.expanduser(told.path)), **told.options)
     except (OSError, TypeError, ValueError) as error:
         raise ValueError(f"data: {told.name}: {error}") from None
-    return Images(data, body, keypoint_names(), settings.model.size, settings.augment)
+    folder = Path(os.path.expanduser(told.images))
+    return Images(data, body, keypoint_names(), settings.model.size, settings.augment, folder)
 
 
 def training_loader(settings: config.Config, body: BodyModel, start: int, rank: int, processes: int) -> DataLoader:
