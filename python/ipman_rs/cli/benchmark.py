@@ -79,8 +79,8 @@ def train(
     """Training with and without intuitive physics: a regressor from keypoints, on people whose truth is known.
 
     Labels are clean, or lean against gravity as pseudo labels do. Writes training_benchmark.md, .json, .csv and .svg
-    into the folder, beside the trained regressors: interrupted, the same command goes on where it was. About 40 minutes
-    of one core. Needs the extra `fit`.
+    into the folder, beside the trained regressors: interrupted, the same command goes on where it was. About half an
+    hour of one core. Needs the extra `fit`.
     """
     from ..training.benchmark import report
     from ..training.benchmark.run import SPLITS, TILTS, TRAINING, Benchmark

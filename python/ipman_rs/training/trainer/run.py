@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import pickle
+import sys
 from pathlib import Path
 
 import lightning
-from lightning.pytorch.callbacks import ModelCheckpoint, TQDMProgressBar
+from lightning.pytorch.callbacks import ModelCheckpoint
 from lightning.pytorch.loggers import TensorBoardLogger
 
 from .checkpoints import WholeFiles
@@ -50,6 +51,7 @@ def train(settings: Config, folder: Path) -> Path:
         use_distributed_sampler=False,  # ours says which process takes what
         default_root_dir=folder,
         enable_model_summary=False,
+        enable_progress_bar=sys.stderr.isatty(),
     )
     try:
         trainer.fit(module, ckpt_path=str(last) if last.exists() else None, weights_only=True)
@@ -83,7 +85,7 @@ def _callbacks(settings: Config, folder: Path) -> list[lightning.Callback]:
         folder, LAST.removesuffix(".ckpt"), every_n_train_steps=settings.save, save_top_k=1, monitor=None,
         enable_version_counter=False, save_on_train_epoch_end=False,
     )  # fmt: skip
-    found: list[lightning.Callback] = [Curve(folder), last, TQDMProgressBar()]
+    found: list[lightning.Callback] = [Curve(folder), last]
     if settings.validation and settings.validate:
         found.append(ModelCheckpoint(folder, BEST, monitor="PVE", mode="min", enable_version_counter=False))
     return found
