@@ -12,6 +12,7 @@ from .benchmark import benchmark
 from .errors import FileError
 from .fit import fit
 from .options import GROUND, PRESETS, UP
+from .validate import validate
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -40,11 +41,13 @@ def main() -> None:
     ipman demo -o out               the named poses of the built-in body
     ipman analyze body.obj -o out   your own mesh; open out/report.html afterwards
     ipman fit photo.jpg -o out      a body for the person in a photo
+    ipman validate folder/ -o out   the engine against force plates and OpenSim
     """
 
 
 main.add_command(fit)
 main.add_command(benchmark)
+main.add_command(validate)
 
 
 @main.command()

@@ -1,0 +1,200 @@
+"""Pictures of a comparison: pressure on the floor, what happens over time, and the fitted bodies with their markers."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import ipman_rs as ip
+
+from ..body.sequence import PosedSequence
+from ..view import colors
+from .comparison import Comparison
+from .computed import ALPHA, GAMMA, carried, sole_vertices, under
+from .zero_moment_point import GRAVITY
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+CELL = 0.01  # m, of the map
+MARGIN = 0.12  # m around the feet
+OURS, REFERENCE = "#1f77b4", "#9aa1ad"
+
+
+def moments(one: Comparison) -> dict[str, int]:
+    """The frames that are worth a picture: one of each phase, the one in which the centre of mass is lowest."""
+    found = {}
+    for phase, mask in one.phases.items():
+        rows = np.flatnonzero(mask & np.isfinite(one.com[:, 1]))
+        if len(rows):
+            lowest = rows[int(one.com[rows, 1].argmin())]
+            found[phase] = int(lowest if one.kind == "movement in place" else rows[len(rows) // 2])
+    return found or {"all": len(one.times) // 2}
+
+
+def pressure_map(one: Comparison, bodies: PosedSequence, template: ip.BodyTemplate) -> bytes:
+    """A PNG of the engine's pressure on the floor, seen from above, with the plates and all centres."""
+    chosen = moments(one)
+    figure, axes = _canvas(1, len(chosen), (1.2 + 4.2 * len(chosen), 5.4))
+    for axis, (phase, frame) in zip(axes[0], chosen.items(), strict=True):
+        _draw_map(axis, one, np.asarray(bodies[frame], float), template, frame)
+        title = "" if phase == "all" else f"{phase}, "
+        axis.set_title(f"{one.name}, {title}{one.times[frame]:.2f} s", fontsize=10)
+    axes[0][0].set_ylabel("z, m")
+    handles, labels = axes[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
+    return _png(figure)
+
+
+def _draw_map(axis: Axes, one: Comparison, vertices: Array, template: ip.BodyTemplate, frame: int) -> None:
+    rho = np.asarray(ip.pressure(vertices, template, under(vertices), ALPHA, GAMMA), float)
+    points = np.asarray(ip.sample_surface(vertices, template), float)[:, [0, 2]]
+    soles = np.concatenate([vertices[rows] for rows in sole_vertices(template)])[:, [0, 2]]
+    marks = {name: (place[frame, [0, 2]], *look) for name, place, look in _places(one)}
+    around = np.concatenate([soles, *(place[None] for place, *_ in marks.values() if np.isfinite(place).all())])
+    low, high = around.min(axis=0) - MARGIN, around.max(axis=0) + MARGIN
+    edges = [np.arange(low[k], high[k] + CELL, CELL) for k in range(2)]
+    density, *_ = np.histogram2d(*points.T, bins=edges, weights=rho)
+    box = (edges[0][0], edges[0][-1], edges[1][-1], edges[1][0])
+    axis.imshow(colors.heat(density.T / density.max(), 1.0), extent=box, interpolation="bilinear")
+    if one.plates is not None:
+        _draw_plates(axis, one, frame)
+    for name, (place, mark, color, size) in marks.items():
+        axis.plot(*place, mark, color=color, ms=size, mec="white", label=name, zorder=5)
+    axis.set(xlim=(low[0], high[0]), ylim=(high[1], low[1]), xlabel="x, m", aspect="equal")
+
+
+def _places(one: Comparison) -> list[tuple[str, Array, tuple[str, str, float]]]:
+    found = [
+        ("CoM on the floor", one.com, ("o", colors.COM, 11)),
+        ("the paper's CoP, γ = 10", one.computed.cop[10], ("o", colors.COP, 11)),
+    ]
+    if one.measured is not None:
+        found.append(("measured CoP", one.measured, ("^", "black", 12)))
+        found.append(("ZMP by the CoM's acceleration", one.centers["moving: ZMP"], ("D", OURS, 8)))
+    if one.reference is not None:
+        found.append(("reference CoM", one.reference, ("s", REFERENCE, 8)))
+    return found  # type: ignore[return-value]
+
+
+def _draw_plates(axis: Axes, one: Comparison, frame: int) -> None:
+    """Each plate's outline, as far as it is known, its centre of pressure and its load."""
+    plates = one.plates
+    assert plates is not None
+    for outline in () if plates.corners is None else plates.corners[:, :, [0, 2]]:
+        axis.plot(*np.vstack([outline, outline[:1]]).T, color=colors.INK, lw=1, ls="--", zorder=2)
+    for plate in np.flatnonzero(carried(plates)[frame] > 0):
+        x, z = plates.points[frame, plate, [0, 2]]
+        axis.plot(x, z, "^", color="black", ms=6, mfc="white", zorder=4, label="CoP of a plate" if plate == 0 else None)
+        axis.annotate(f"{plates.loads[frame, plate]:.0f} N", (x, z), (6, 6), textcoords="offset points", fontsize=8)
+
+
+def over_time(one: Comparison) -> bytes:
+    """A PNG of the CoM's height, the centres along both axes of the floor, and the load, over time."""
+    rows = 4 if one.plates is not None else 3
+    figure, grid = _canvas(rows, 1, (9, 2.1 * rows), sharex=True)
+    axes = [row[0] for row in grid]
+    axes[0].plot(one.times, one.com[:, 1], color=OURS, lw=1.3, label="fitted body, whole volume")
+    if one.reference is not None:
+        axes[0].plot(one.times, one.reference[:, 1], color=REFERENCE, lw=2.5, zorder=1, label="reference")
+    axes[0].set_ylabel("CoM height, m")
+    axes[0].legend(frameon=False, fontsize=7, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1))
+    for axis, column, name in ((axes[1], 0, "x"), (axes[2], 2, "z")):
+        _draw_centers(axis, one, column)
+        axis.set_ylabel(f"{name} on the floor, mm")
+    axes[1].legend(frameon=False, fontsize=7, ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1))
+    if one.plates is not None:
+        _draw_loads(axes[3], one)
+    axes[-1].set_xlabel("s")
+    return _png(figure)
+
+
+def _draw_centers(axis: Axes, one: Comparison, column: int) -> None:
+    shown = [
+        ("CoM", one.com, {"color": colors.COM, "lw": 1.2}),
+        ("the paper's CoP, γ = 10", one.computed.cop[10], {"color": colors.COP, "lw": 1.2}),
+    ]
+    if one.measured is not None:
+        measured = np.where(one.complete[:, None], one.measured, np.nan)
+        shown.insert(0, ("measured CoP", measured, {"color": "black", "lw": 2}))
+        shown.append(("ZMP", one.centers["moving: ZMP"], {"color": OURS, "lw": 1.2}))
+    if one.reference is not None:
+        shown.append(("reference CoM", one.reference, {"color": REFERENCE, "lw": 2, "zorder": 1}))
+    for name, places, look in shown:
+        axis.plot(one.times, 1e3 * places[:, column], label=name, **look)
+    known = [1e3 * places[:, column] for name, places, _ in shown if name != "ZMP"]
+    low, high = min(np.nanmin(v) for v in known), max(np.nanmax(v) for v in known)
+    room = 0.15 * (high - low) + 5
+    axis.set_ylim(low - room, high + room)
+
+
+def _draw_loads(axis: Axes, one: Comparison) -> None:
+    assert one.plates is not None
+    for plate in range(one.plates.forces.shape[1]):
+        if carried(one.plates)[:, plate].any():
+            axis.plot(one.times, one.plates.forces[:, plate, 1], lw=0.9, label=f"plate {plate + 1}")
+    axis.plot(one.times, one.force[:, 1], color="black", lw=1.6, label="all plates")
+    asked = one.weight * (GRAVITY + one.acceleration[:, 1])
+    axis.plot(one.times, asked, color=OURS, lw=1.2, label="m (g + acceleration of the fitted CoM)")
+    axis.set_ylabel("upward force, N")
+    axis.set_ylim(bottom=-30)
+    axis.legend(frameon=False, fontsize=7, ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1))
+
+
+def people(one: Comparison, bodies: PosedSequence, faces: NDArray[np.int64], markers: Array) -> bytes:
+    """A PNG of three fitted bodies with their markers (T, M, 3), seen along z and one along x."""
+    spread = np.linspace(0, len(one.times) - 1, 5).round().astype(int)[[1, 2, 3]]
+    frames = [*spread, spread[1]] if one.kind != "movement in place" else [0, spread[1], *2 * [int(one.com[:, 1].argmin())]]
+    figure, grid = _canvas(1, 4, (11, 4.6), sharey=True)
+    for axis, frame, across in zip(grid[0], frames, (0, 0, 0, 2), strict=True):
+        _draw_body(axis, one, np.asarray(bodies[frame], float), faces, markers[frame], int(frame), across)
+    grid[0][0].set_ylabel("m")
+    return _png(figure)
+
+
+def _draw_body(
+    axis: Axes, one: Comparison, vertices: Array, faces: NDArray[np.int64], markers: Array, frame: int, across: int
+) -> None:
+    """A body seen along the axis that is neither up nor `across`."""
+    from matplotlib.collections import PolyCollection
+
+    away = 2 - across
+    sign = 1 if away == 2 else -1
+    corners = vertices[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    light = (normal / np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-12))[:, away] * sign
+    order = (sign * corners[:, :, away].mean(axis=1)).argsort()
+    order = order[light[order] > 0]
+    shade = np.repeat((0.45 + 0.45 * light[order])[:, None], 3, axis=1)
+    axis.add_collection(
+        PolyCollection(list(corners[order][:, :, [across, 1]]), facecolors=shade, edgecolors="face", linewidths=0.3)
+    )
+    axis.plot(markers[:, across], markers[:, 1], "o", ms=2.5, color="#d62728")
+    axis.plot(*one.com[frame, [across, 1]], "P", ms=9, color=colors.COM, mec="w")
+    if one.measured is not None and one.complete[frame]:
+        axis.plot(one.measured[frame, across], one.measured[frame, 1], "^", ms=7, color="k")
+    axis.axhline(float(one.floor.height), color="0.5", lw=0.8)
+    middle = vertices[:, across].mean()
+    axis.set(xlim=(middle - 0.6, middle + 0.6), xticks=[], aspect="equal")
+    axis.set_title(f"{one.times[frame]:.2f} s, {'along z' if across == 0 else 'along x'}", fontsize=9)
+
+
+def _canvas(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def _png(figure: Figure) -> bytes:
+    for axis in figure.axes:
+        axis.spines[["top", "right"]].set_visible(False)
+    stream = io.BytesIO()
+    figure.savefig(stream, dpi=110, format="png")
+    return stream.getvalue()
