@@ -20,8 +20,9 @@ def found(tmp_path):
         for name, content in files.items():
             stem, _, ending = name.rpartition("__")
             (tmp_path / f"{stem}.{ending}").write_text(content)
-        trials, notes = find(tmp_path, kind_of, lambda path: path.name in plates)
+        trials, notes, unreadable = find(tmp_path, kind_of, lambda path: path.name in plates)
         told = [(t.name, t.forces and t.forces.name, t.com and t.com.name) for t in trials]
+        assert not unreadable
         return told, notes
 
     return call

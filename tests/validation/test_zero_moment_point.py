@@ -7,7 +7,7 @@ import pytest
 
 from ipman_rs import Ground
 from ipman_rs.validation.acceleration import CUTOFF, accelerations
-from ipman_rs.validation.zero_moment_point import GRAVITY, along_force, zero_moment_point
+from ipman_rs.validation.zero_moment_point import GRAVITY, along_force, zero_moment_point, zero_moment_point_of_parts
 
 FLOOR = Ground.y_up(0.1)
 
@@ -80,3 +80,20 @@ def test_too_few_frames():
     assert np.isnan(accelerations(np.zeros((20, 3)), 60.0)).all()
     with pytest.raises(ValueError, match="rate: expected 24 points a second or more for accelerations, got 20"):
         accelerations(np.zeros((100, 3)), 20.0)
+
+
+def test_parts_that_move_together_are_one(rng):
+    masses, points = rng.uniform(1, 5, size=4), rng.normal(size=(6, 4, 3)) + [0, 2, 0]
+    acceleration = rng.normal(size=(6, 1, 3))
+    whole = (masses[:, None] * points).sum(1) / masses.sum()
+    found = zero_moment_point_of_parts(masses, points, np.broadcast_to(acceleration, (6, 4, 3)), FLOOR)
+    np.testing.assert_allclose(found, zero_moment_point(whole, acceleration[:, 0], FLOOR), atol=1e-14)
+
+
+def test_a_flywheel_moves_the_point():
+    """Two masses on a wheel that gains speed: the CoM rests, the point moves by I ω̇ / (m g)."""
+    radius, gain, height = 0.3, 4.0, 1.0
+    points = np.array([[radius, 0.1 + height, 0], [-radius, 0.1 + height, 0]])
+    accelerations_ = gain * np.array([[0, radius, 0], [0, -radius, 0]])  # about +z, from rest
+    found = zero_moment_point_of_parts([2.0, 2.0], points, accelerations_, FLOOR)
+    np.testing.assert_allclose(found, [4.0 * radius**2 * gain / (4.0 * GRAVITY), 0.1, 0], atol=1e-15)

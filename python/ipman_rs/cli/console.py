@@ -151,7 +151,7 @@ def print_validation(records: Sequence[Mapping[str, Any]]) -> None:
             lead = first if phase == next(iter(phases)) else [""] * len(first)
             if phase != "all":
                 lead[1] = phase
-            away = [found["distance"].get(name) for name in ("at rest: g(CoM)", "moving: ZMP", "γ = 10")]
+            away = [found["distance"].get(name) for name in ("at rest: g(CoM)", "moving: ZMP of the parts", "γ = 10")]
             table.add_row(*(Text(one_line(cell)) for cell in [*lead, *(_known(value, 1e3) for value in away)]))
     console = Console(highlight=False)
     if not console.is_terminal:

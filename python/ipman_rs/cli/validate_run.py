@@ -11,6 +11,7 @@ import numpy as np
 
 from ..data.tracks import Tracks
 from ..fitting import config, markers
+from ..fitting.recorded import FEWEST
 from ..validation import Comparison, computed, figures, measured, pictures, report
 from ..validation.folder import Trial, find
 from . import console
@@ -35,13 +36,14 @@ class Plan:
     rate: float
     resume: bool
     notes: list[str]
+    unreadable: dict[Path, str]
 
 
 def plan(folder: Path, output: Path, model: str, person: str, rate: float, resume: bool) -> Plan:
     """ValueError for a folder without recordings to compare, a recording or body model that is not there."""
     import ipman_rs as ip
 
-    trials, notes = find(folder, measured.kind_of, measured.has_plates)
+    trials, notes, unreadable = find(folder, measured.kind_of, measured.has_plates)
     still = next((trial.name for trial in trials if trial.still), None)
     chosen = {"auto": still, "none": None}.get(person, person)
     names = [trial.name for trial in trials]
@@ -49,13 +51,13 @@ def plan(folder: Path, output: Path, model: str, person: str, rate: float, resum
         raise ValueError(f"--person: expected auto, none or one of {', '.join(names)}, got {person!r}")
     trials.sort(key=lambda trial: trial.name != chosen)  # their shape is needed first
     ip.load_body(model)  # before anything is fitted
-    return Plan(folder, output, trials, Settings(config.load("markers"), model), chosen, rate, resume, notes)
+    return Plan(folder, output, trials, Settings(config.load("markers"), model), chosen, rate, resume, notes, unreadable)
 
 
 def run(plan: Plan) -> tuple[list[Record], list[str], list[FileError]]:
     """The figures of every recording that could be compared, what was assumed, and those that failed."""
     records: list[Record] = []
-    notes, failures = [*plan.notes], []
+    notes, failures = [*plan.notes], [FileError(path, what) for path, what in plan.unreadable.items()]
     person = None
     for trial in plan.trials:
         try:
@@ -96,19 +98,21 @@ def _compared(plan: Plan, trial: Trial, tracks: Tracks, fit: Record) -> Record:
     plates, reference = _measured(trial, times)
     with console.progress(f"measuring {trial.name}", len(times)) as step:
         found = computed(bodies, template, plates, step.to)
+    rows = np.abs(tracks.times[:, None] - times).argmin(axis=0)
+    confidence = tracks.confidence[rows]
+    enough = confidence.sum(axis=1) >= FEWEST
     try:
-        one = Comparison(trial.name, times, found, plates, reference)
+        one = Comparison(trial.name, times, found, plates, reference, enough)
     except ValueError as error:
         raise FileError(trial.com or trial.forces or trial.markers, str(error)) from error
-    rows = np.abs(tracks.times[:, None] - times).argmin(axis=0)
-    seen = np.where(tracks.confidence[rows, :, None] > 0, tracks.points[rows], np.nan)
+    points = np.where(confidence[..., None] > 0, tracks.points[rows], np.nan)
     series = report.series(one)
     with console.progress(f"drawing {trial.name}", 3) as step:
         files = {"series.npz": npz(series), "series.csv": report.table(series).encode()}
         for name, draw in (
             ("pressure.png", lambda: pictures.pressure_map(one, bodies, template)),
             ("over_time.png", lambda: pictures.over_time(one)),
-            ("bodies.png", lambda: pictures.people(one, bodies, stored.faces, seen)),
+            ("bodies.png", lambda: pictures.people(one, bodies, stored.faces, points)),
         ):
             files[name] = draw()
             step.one()

@@ -8,7 +8,7 @@ from .acceleration import accelerations
 from .comparison import Comparison
 from .computed import Computed, computed
 from .figures import figures
-from .zero_moment_point import along_force, zero_moment_point
+from .zero_moment_point import along_force, zero_moment_point, zero_moment_point_of_parts
 
 __all__ = [
     "Comparison",
@@ -18,4 +18,5 @@ __all__ = [
     "computed",
     "figures",
     "zero_moment_point",
+    "zero_moment_point_of_parts",
 ]

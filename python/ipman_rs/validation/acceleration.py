@@ -11,7 +11,7 @@ CUTOFF = 6.0  # Hz: gait has next to nothing above it, markers have noise
 
 
 def accelerations(points: ArrayLike, rate: float, cutoff: float = CUTOFF) -> Array:
-    """Second derivatives (T, 3), m/s², of a path (T, 3) at `rate` points a second, after a low pass.
+    """Second derivatives (T, ..., 3), m/s², of paths (T, ..., 3) m at `rate` points a second, after a low pass.
 
     The filter is Butterworth's of fourth order without lag, as gait laboratories use it. NaN for 1/cutoff s at both
     ends, where it has not settled. ValueError for a rate under four times the cutoff.

@@ -14,14 +14,13 @@ from ipman_rs.ground import Ground
 from ..data.force_plates import ForcePlates
 from .acceleration import CUTOFF, accelerations
 from .computed import Computed, carried
-from .zero_moment_point import GRAVITY, along_force, zero_moment_point
+from .zero_moment_point import GRAVITY, along_force, zero_moment_point, zero_moment_point_of_parts
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 STILL = 0.015  # m: rms of the centre of mass about its mean, of somebody who stands
-STEPS = 0.15  # share of the frames on one plate, and of those on two, of somebody who walks
-LOW, SLOW = 0.04, 1.0  # m, m/s: a foot on the floor is lower and slower
+LOW, SLOW = 0.04, 0.5  # m, m/s: what is on the floor is lower and slower
 ANYWHERE = 0.5  # m: a reference farther from the body is in other units or axes
 
 
@@ -29,7 +28,8 @@ ANYWHERE = 0.5  # m: a reference farther from the body is in other units or axes
 class Comparison:
     """T frames at `times`; `plates`, y up, and `reference`, a centre of mass (T, 3) m, at these times, NaN where there is none.
 
-    ValueError where what was measured is nowhere near the body: in other units or axes.
+    `seen` (T,): where enough markers were seen to say where the body is. ValueError where what was measured is nowhere
+    near the body: in other units or axes.
     """
 
     name: str
@@ -37,12 +37,13 @@ class Comparison:
     computed: Computed
     plates: ForcePlates | None = None
     reference: Array | None = None
+    seen: Mask | None = None
 
     def __post_init__(self) -> None:
         for what, points in (("centre of mass", self.reference), ("centre of pressure", self.measured)):
             if points is None or not np.isfinite(points).any():
                 continue
-            away = float(np.nanmedian(np.linalg.norm((points - self.com)[:, [0, 2]], axis=1)))
+            away = float(np.nanmedian(distances(points, self.com)))
             if away > ANYWHERE:
                 raise ValueError(
                     f"{self.name}: the measured {what} is {away:.2f} m beside the body fitted to the markers; expected "
@@ -66,8 +67,18 @@ class Comparison:
 
     @property
     def force(self) -> Array:
-        """Of all plates (T, 3) N, NaN without plates."""
-        return np.full_like(self.com, np.nan) if self.plates is None else self.plates.forces.sum(axis=1)
+        """Of all plates (T, 3) N, less what they read with nobody on them; NaN without plates."""
+        if self.plates is None:
+            return np.full_like(self.com, np.nan)
+        return self.plates.forces.sum(axis=1) - self.unloaded
+
+    @cached_property
+    def unloaded(self) -> Array:
+        """(3,) N: the median of all plates' force in the frames in which none carries a load; 0 if there are none."""
+        if self.plates is None:
+            return np.zeros(3)
+        empty = (carried(self.plates) == 0).all(axis=1) & np.isfinite(self.plates.forces).all(axis=(1, 2))
+        return np.median(self.plates.forces.sum(axis=1)[empty], axis=0) if empty.any() else np.zeros(3)
 
     @cached_property
     def floor(self) -> Ground:
@@ -79,28 +90,37 @@ class Comparison:
     @cached_property
     def acceleration(self) -> Array:
         """Of the centre of mass (T, 3) m/s²; NaN at both ends, and throughout if the frames are too far apart."""
-        if self.rate < 4 * CUTOFF:
-            return np.full_like(self.com, np.nan)
-        return accelerations(self.com, self.rate)
+        return self._accelerations(self.com)
+
+    def _accelerations(self, points: Array) -> Array:
+        return np.full_like(points, np.nan) if self.rate < 4 * CUTOFF else accelerations(points, self.rate)
+
+    @cached_property
+    def zmp(self) -> Array:
+        """The zero-moment point (T, 3) m of the body's parts, each as heavy as its mean volume × 985 kg/m³."""
+        centers = self.computed.part_centers
+        masses = self.computed.part_masses.mean(axis=0)
+        return zero_moment_point_of_parts(masses, centers, self._accelerations(centers), self.floor)
 
     @cached_property
     def complete(self) -> Mask:
-        """(T,): something is loaded, and no foot is on the floor beside the plates, as far as their outlines are known."""
+        """(T,): the body was seen, something is loaded, and no foot is on the floor beside the plates, as far as their
+        outlines are known."""
         if self.plates is None or self.measured is None:
             return np.zeros(len(self.times), bool)
         loaded = np.isfinite(self.measured[:, 0])
+        loaded = loaded if self.seen is None else loaded & self.seen
         return loaded & ~beside_plates(self.computed.soles, self.rate, self.floor, self.plates.corners)
 
     @cached_property
     def kind(self) -> str:
-        """"walking", where one plate carries all and then two share it; "quiet standing", or "movement in place"."""
-        if self.complete.any():
-            assert self.plates is not None
-            count = (carried(self.plates)[self.complete] > 0).sum(axis=1)
-            if min((count == 1).mean(), (count == 2).mean()) > STEPS:
+        """"walking", where plates carry all the load by turns; "quiet standing", or "movement in place"."""
+        if self.plates is not None:
+            loaded = carried(self.plates)[self.complete] > 0
+            if loaded[loaded.sum(axis=1) == 1].any(axis=0).sum() > 1:
                 return "walking"
-        spread = np.sqrt(np.nanvar(self.com, axis=0).sum())
-        return "quiet standing" if spread < STILL else "movement in place"
+        com = self.com if self.seen is None else self.com[self.seen]
+        return "quiet standing" if np.sqrt(np.nanvar(com, axis=0).sum()) < STILL else "movement in place"
 
     @cached_property
     def phases(self) -> Mapping[str, Mask]:
@@ -134,16 +154,17 @@ class Comparison:
         paper's formula for each γ."""
         found = {"at rest: g(CoM)": self.floor.project(self.com)}
         if self.plates is not None:
-            found["moving: ZMP"] = zero_moment_point(self.com, self.acceleration, self.floor)
-            found["moving: along the force"] = along_force(self.com, self.force, self.floor)
+            found["moving: ZMP of the CoM"] = zero_moment_point(self.com, self.acceleration, self.floor)
+            found["moving: ZMP of the parts"] = self.zmp
+            found["CoM along the force"] = along_force(self.com, self.force, self.floor)
         return {**found, **{f"γ = {gamma}": points for gamma, points in self.computed.cop.items()}}
 
 
 def beside_plates(soles: Array, rate: float, floor: Ground, outlines: Array | None) -> Mask:
-    """(T,): whether a foot, soles (T, 2, 3) m, is on the floor and on none of the plates' outlines (P, 4, 3) m."""
+    """(T,): whether points of the soles (T, n, 3) m are on the floor and on none of the plates' outlines (P, 4, 3) m."""
     if outlines is None or len(soles) < 2:
         return np.zeros(len(soles), bool)
-    speed = np.linalg.norm(np.gradient(soles[..., [0, 2]], 1 / rate, axis=0), axis=-1)
+    speed = np.linalg.norm(np.gradient(soles, 1 / rate, axis=0), axis=-1)
     down = (floor.signed_height(soles) < LOW) & (speed < SLOW)
     on_plate = np.stack([_within(soles[..., [0, 2]], outline[:, [0, 2]]) for outline in outlines]).any(axis=0)
     return (down & ~on_plate).any(axis=1)

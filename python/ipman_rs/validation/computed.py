@@ -26,15 +26,17 @@ SOLE = 0.03  # m
 class Computed:
     """Of T bodies: volume × 985 kg/m³, centres of mass by method and centres of pressure by γ.
 
-    `soles`: the middle of each foot's sole, left and right, and at the height of its lowest point. `shares`: how much of
-    the pressure, at γ = 10, is on the first plate's side where two carry a load; NaN elsewhere.
+    `soles`: the vertices of both soles. `shares`: how much of the pressure, at γ = 10, is on the first plate's side where
+    two carry a load; NaN elsewhere.
     """
 
     mass: Array  # (T,) kg
+    part_masses: Array  # (T, P) kg
+    part_centers: Array  # (T, P, 3) m
     lowest: Array  # (T,) m, of the lowest vertex
     com: Mapping[str, Array]  # (T, 3) m
     cop: Mapping[int, Array]  # (T, 3) m
-    soles: Array  # (T, 2, 3) m
+    soles: Array  # (T, n, 3) m
     shares: Array  # (T,)
 
 
@@ -58,6 +60,8 @@ def computed(
         progress(done)
     return Computed(
         np.concatenate([row.mass for row in rows]),
+        np.concatenate([row.part_masses for row in rows]),
+        np.concatenate([row.part_centers for row in rows]),
         np.concatenate([row.lowest for row in rows]),
         {method: np.concatenate([row.com[method] for row in rows]) for method in METHODS},
         {gamma: np.concatenate([row.cop[gamma] for row in rows]) for gamma in GAMMAS},
@@ -74,28 +78,23 @@ def _piece(
     cop = {
         gamma: np.asarray(ip.center_of_pressure(vertices, template, ground, ALPHA, gamma), float) for gamma in GAMMAS
     }
-    mass = np.asarray(ip.mass_properties(vertices, template).mass, float)
+    solid = ip.mass_properties(vertices, template)
+    assert solid.parts is not None
+    mass, masses, centers = (np.asarray(v, float) for v in (solid.mass, solid.parts.mass, solid.parts.center))
     shares = np.full(len(vertices), np.nan)
     if plates is not None:
         rho = np.asarray(ip.pressure(vertices, template, ground, ALPHA, GAMMA), float)
         shares = first_shares(np.asarray(ip.sample_surface(vertices, template), float), rho, *plates)
-    return Computed(mass, ground.height, com, cop, _soles(vertices, template), shares)
+    soles = np.asarray(vertices[:, sole_vertices(template)], float)
+    return Computed(mass, masses, centers, ground.height, com, cop, soles, shares)
 
 
-def _soles(vertices: NDArray[np.floating], template: ip.BodyTemplate) -> Array:
-    soles = [np.asarray(vertices[:, rows], float) for rows in sole_vertices(template)]
-    return np.stack([np.stack([s[..., 0].mean(1), s[..., 1].min(1), s[..., 2].mean(1)], axis=-1) for s in soles], axis=1)
-
-
-def sole_vertices(template: ip.BodyTemplate) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Of the left and the right lower leg: the vertices that are less than 3 cm above its lowest in the resting pose."""
-    found = []
-    for side in ("left", "right"):
-        part = template.part_names.index(f"{side}_lower_leg")
-        rows = np.unique(template.faces[template.face_parts == part])
-        height = template.vertices[rows, 1]
-        found.append(rows[height < height.min() + SOLE])
-    return found[0], found[1]
+def sole_vertices(template: ip.BodyTemplate) -> NDArray[np.int64]:
+    """The vertices of both lower legs that are less than 3 cm above the lowest in the resting pose."""
+    parts = [template.part_names.index(f"{side}_lower_leg") for side in ("left", "right")]
+    rows = np.unique(template.faces[np.isin(template.face_parts, parts)])
+    height = template.vertices[rows, 1]
+    return rows[height < height.min() + SOLE]
 
 
 def carried(plates: ForcePlates) -> Array:

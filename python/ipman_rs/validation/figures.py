@@ -20,7 +20,7 @@ Mask = NDArray[np.bool_]
 
 def figures(one: Comparison) -> dict[str, Any]:
     """All that `report` prints of a recording."""
-    mass = one.computed.mass
+    mass = one.computed.mass if one.seen is None else one.computed.mass[one.seen]
     return plain(
         {
             "name": one.name,
@@ -35,6 +35,7 @@ def figures(one: Comparison) -> dict[str, Any]:
                 "plates": one.weight,
                 "plates_std": _std(one.weights),
             },
+            "unloaded_force": one.unloaded,
             "force": _force(one),
             "com": _against_reference(one),
             "standing": _standing(one),
@@ -65,6 +66,7 @@ def _against_reference(one: Comparison) -> dict[str, Any] | None:
     if one.reference is None:
         return None
     used = np.isfinite(one.reference).all(axis=1)
+    used = used if one.seen is None else used & one.seen
     if not used.any():
         return None
     found = {}
@@ -108,7 +110,7 @@ def _centers(one: Comparison, mask: Mask) -> dict[str, Any]:
         known = mask & np.isfinite(one.reference).all(axis=1)
         there: Mapping[str, Array] = {
             "at rest: g(CoM)": one.floor.project(one.reference),
-            "moving: along the force": along_force(one.reference, one.force, one.floor),
+            "CoM along the force": along_force(one.reference, one.force, one.floor),
         }
         found["reference_frames"] = int(known.sum())
         found["reference"] = {name: _mean(distances(points, one.measured)[known]) for name, points in there.items()}

@@ -8,7 +8,7 @@ belongs to the only recording with forces.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,11 +34,12 @@ class Trial:
 
 def find(
     folder: Path, kind_of: Callable[[Path], str | None], has_plates: Callable[[Path], bool]
-) -> tuple[list[Trial], list[str]]:
-    """The recordings of a folder, by name, those of standing still first; and what was not used, and why.
+) -> tuple[list[Trial], list[str], dict[Path, str]]:
+    """The recordings of a folder, by name, those of standing still first; what was not used, and why; and what is wrong
+    with files that could not be read.
 
-    `kind_of` a table: "forces", "com", or None; `has_plates` of a `.c3d` file. ValueError, saying what was expected, if
-    the folder is none, has no markers, or nothing was measured beside them.
+    `kind_of` a table: "forces", "com", or None, ValueError if it cannot be read; `has_plates` of a `.c3d` file.
+    ValueError, saying what was expected, if the folder is none, has no markers, or nothing was measured beside them.
     """
     if not folder.is_dir():
         raise ValueError(f"{folder}: expected a folder of recordings, {'got a file' if folder.exists() else 'not there'}")
@@ -52,21 +53,29 @@ def find(
     for trial in trials:
         if trial.markers.suffix.lower() == ".c3d" and has_plates(trial.markers):
             trial.forces = trial.markers
-    notes = _tables([path for path in files if path.suffix.lower() in TABLES], trials, kind_of)
+    kinds, unreadable = {}, {}
+    for path in files:
+        if path.suffix.lower() in TABLES:
+            try:
+                kinds[path] = kind_of(path)
+            except ValueError as error:
+                unreadable[path] = str(error)
+    notes = _tables(kinds, trials)
     if not any(trial.forces or trial.com for trial in trials):
         raise ValueError(
             f"{folder}: markers of {', '.join(trial.name for trial in trials)}, but nothing to compare with; expected "
             f"forces (such as {trials[0].name}_grf.mot, or plates in a .c3d) or centres of mass (such as "
             f"{trials[0].name}_com.sto, with columns center_of_mass_X, Y, Z)"
+            + "".join(f"; {what}" for what in unreadable.values())
         )
-    return sorted(trials, key=lambda trial: (not trial.still, trial.name)), notes
+    return sorted(trials, key=lambda trial: (not trial.still, trial.name)), notes, unreadable
 
 
-def _tables(tables: Sequence[Path], trials: Sequence[Trial], kind_of: Callable[[Path], str | None]) -> list[str]:
-    """Gives each table to its recording; those that are left."""
+def _tables(kinds: Mapping[Path, str | None], trials: Sequence[Trial]) -> list[str]:
+    """Gives each table to its recording; says which are left."""
     notes, strangers = [], []
-    for path in tables:
-        kind, trial = kind_of(path), _named(path, trials)
+    for path, kind in kinds.items():
+        trial = _named(path, trials)
         if kind is None:
             notes.append(f"{path.name}: not used, for it has neither forces nor a centre of mass")
         elif trial is None and kind == "com":

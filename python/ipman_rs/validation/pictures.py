@@ -41,9 +41,11 @@ def moments(one: Comparison) -> dict[str, int]:
 def pressure_map(one: Comparison, bodies: PosedSequence, template: ip.BodyTemplate) -> bytes:
     """A PNG of the engine's pressure on the floor, seen from above, with the plates and all centres."""
     chosen = moments(one)
-    figure, axes = _canvas(1, len(chosen), (1.2 + 4.2 * len(chosen), 5.4))
-    for axis, (phase, frame) in zip(axes[0], chosen.items(), strict=True):
-        _draw_map(axis, one, np.asarray(bodies[frame], float), template, frame)
+    limits = [_limits(one, np.asarray(bodies[frame], float), template, frame) for frame in chosen.values()]
+    tallest = max((high - low)[1] / (high - low)[0] for low, high in limits)
+    figure, axes = _canvas(1, len(chosen), (1 + 4.2 * len(chosen), 1.5 + 4.2 * min(tallest, 1.6)))
+    for axis, (phase, frame), box in zip(axes[0], chosen.items(), limits, strict=True):
+        _draw_map(axis, one, np.asarray(bodies[frame], float), template, frame, box)
         title = "" if phase == "all" else f"{phase}, "
         axis.set_title(f"{one.name}, {title}{one.times[frame]:.2f} s", fontsize=10)
     axes[0][0].set_ylabel("z, m")
@@ -52,21 +54,30 @@ def pressure_map(one: Comparison, bodies: PosedSequence, template: ip.BodyTempla
     return _png(figure)
 
 
-def _draw_map(axis: Axes, one: Comparison, vertices: Array, template: ip.BodyTemplate, frame: int) -> None:
+def _limits(one: Comparison, vertices: Array, template: ip.BodyTemplate, frame: int) -> tuple[Array, Array]:
+    """Corners of the map: around the soles and all centres."""
+    centers = np.array([place[frame, [0, 2]] for _, place, _ in _places(one)])
+    around = np.concatenate([vertices[sole_vertices(template)][:, [0, 2]], centers[np.isfinite(centers).all(axis=1)]])
+    return around.min(axis=0) - MARGIN, around.max(axis=0) + MARGIN
+
+
+def _draw_map(
+    axis: Axes, one: Comparison, vertices: Array, template: ip.BodyTemplate, frame: int, limits: tuple[Array, Array]
+) -> None:
+    from scipy.ndimage import gaussian_filter
+
+    low, high = limits
     rho = np.asarray(ip.pressure(vertices, template, under(vertices), ALPHA, GAMMA), float)
     points = np.asarray(ip.sample_surface(vertices, template), float)[:, [0, 2]]
-    soles = np.concatenate([vertices[rows] for rows in sole_vertices(template)])[:, [0, 2]]
-    marks = {name: (place[frame, [0, 2]], *look) for name, place, look in _places(one)}
-    around = np.concatenate([soles, *(place[None] for place, *_ in marks.values() if np.isfinite(place).all())])
-    low, high = around.min(axis=0) - MARGIN, around.max(axis=0) + MARGIN
     edges = [np.arange(low[k], high[k] + CELL, CELL) for k in range(2)]
     density, *_ = np.histogram2d(*points.T, bins=edges, weights=rho)
+    density = gaussian_filter(density, 1.0)
     box = (edges[0][0], edges[0][-1], edges[1][-1], edges[1][0])
     axis.imshow(colors.heat(density.T / density.max(), 1.0), extent=box, interpolation="bilinear")
     if one.plates is not None:
         _draw_plates(axis, one, frame)
-    for name, (place, mark, color, size) in marks.items():
-        axis.plot(*place, mark, color=color, ms=size, mec="white", label=name, zorder=5)
+    for name, place, (mark, color, size) in _places(one):
+        axis.plot(*place[frame, [0, 2]], mark, color=color, ms=size, mec="white", label=name, zorder=5)
     axis.set(xlim=(low[0], high[0]), ylim=(high[1], low[1]), xlabel="x, m", aspect="equal")
 
 
@@ -77,7 +88,7 @@ def _places(one: Comparison) -> list[tuple[str, Array, tuple[str, str, float]]]:
     ]
     if one.measured is not None:
         found.append(("measured CoP", one.measured, ("^", "black", 12)))
-        found.append(("ZMP by the CoM's acceleration", one.centers["moving: ZMP"], ("D", OURS, 8)))
+        found.append(("ZMP of the parts", one.zmp, ("D", OURS, 8)))
     if one.reference is not None:
         found.append(("reference CoM", one.reference, ("s", REFERENCE, 8)))
     return found  # type: ignore[return-value]
@@ -111,8 +122,15 @@ def over_time(one: Comparison) -> bytes:
     axes[1].legend(frameon=False, fontsize=7, ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1))
     if one.plates is not None:
         _draw_loads(axes[3], one)
-    axes[-1].set_xlabel("s")
+    axes[-1].set(xlabel="s", xlim=_span(one))
     return _png(figure)
+
+
+def _span(one: Comparison) -> tuple[float, float]:
+    """The times of which there are measurements, and a little more."""
+    known = one.complete if one.reference is None else one.complete | np.isfinite(one.reference[:, 0])
+    times = one.times[known] if known.any() else one.times
+    return max(one.times[0], times[0] - 0.3), min(one.times[-1], times[-1] + 0.3)
 
 
 def _draw_centers(axis: Axes, one: Comparison, column: int) -> None:
@@ -123,12 +141,14 @@ def _draw_centers(axis: Axes, one: Comparison, column: int) -> None:
     if one.measured is not None:
         measured = np.where(one.complete[:, None], one.measured, np.nan)
         shown.insert(0, ("measured CoP", measured, {"color": "black", "lw": 2}))
-        shown.append(("ZMP", one.centers["moving: ZMP"], {"color": OURS, "lw": 1.2}))
+        shown.append(("ZMP of the parts", one.zmp, {"color": OURS, "lw": 1.2}))
     if one.reference is not None:
         shown.append(("reference CoM", one.reference, {"color": REFERENCE, "lw": 2, "zorder": 1}))
     for name, places, look in shown:
         axis.plot(one.times, 1e3 * places[:, column], label=name, **look)
-    known = [1e3 * places[:, column] for name, places, _ in shown if name != "ZMP"]
+    low, high = _span(one)
+    inside = (one.times >= low) & (one.times <= high)
+    known = [1e3 * places[inside, column] for name, places, _ in shown if not name.startswith("ZMP")]
     low, high = min(np.nanmin(v) for v in known), max(np.nanmax(v) for v in known)
     room = 0.15 * (high - low) + 5
     axis.set_ylim(low - room, high + room)
@@ -138,7 +158,7 @@ def _draw_loads(axis: Axes, one: Comparison) -> None:
     assert one.plates is not None
     for plate in range(one.plates.forces.shape[1]):
         if carried(one.plates)[:, plate].any():
-            axis.plot(one.times, one.plates.forces[:, plate, 1], lw=0.9, label=f"plate {plate + 1}")
+            axis.plot(one.times, one.plates.forces[:, plate, 1], lw=1, color=f"C{1 + plate}", label=f"plate {plate + 1}")
     axis.plot(one.times, one.force[:, 1], color="black", lw=1.6, label="all plates")
     asked = one.weight * (GRAVITY + one.acceleration[:, 1])
     axis.plot(one.times, asked, color=OURS, lw=1.2, label="m (g + acceleration of the fitted CoM)")
@@ -149,8 +169,9 @@ def _draw_loads(axis: Axes, one: Comparison) -> None:
 
 def people(one: Comparison, bodies: PosedSequence, faces: NDArray[np.int64], markers: Array) -> bytes:
     """A PNG of three fitted bodies with their markers (T, M, 3), seen along z and one along x."""
-    spread = np.linspace(0, len(one.times) - 1, 5).round().astype(int)[[1, 2, 3]]
-    frames = [*spread, spread[1]] if one.kind != "movement in place" else [0, spread[1], *2 * [int(one.com[:, 1].argmin())]]
+    usable = np.flatnonzero(one.complete) if one.complete.any() else np.arange(len(one.times))
+    spread = usable[np.linspace(0, len(usable) - 1, 5).round().astype(int)[[1, 2, 3]]]
+    frames = [*spread, spread[1]] if one.kind != "movement in place" else [usable[0], spread[1], *2 * [usable[one.com[usable, 1].argmin()]]]
     figure, grid = _canvas(1, 4, (11, 4.6), sharey=True)
     for axis, frame, across in zip(grid[0], frames, (0, 0, 0, 2), strict=True):
         _draw_body(axis, one, np.asarray(bodies[frame], float), faces, markers[frame], int(frame), across)

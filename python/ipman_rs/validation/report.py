@@ -28,7 +28,7 @@ WORDS = {
     "face_area": "faces by their area",
     "vertex_mean": "mean of the vertices",
 }
-MODELS = ("at rest: g(CoM)", "moving: ZMP", "moving: along the force")
+MODELS = ("at rest: g(CoM)", "moving: ZMP of the CoM", "moving: ZMP of the parts", "CoM along the force")
 
 
 def markdown(records: Sequence[Record], source: str, notes: Sequence[str], pictures: Sequence[str]) -> str:
@@ -129,7 +129,7 @@ def references(records: Iterable[Record]) -> Iterator[str]:
                 continue
             cells = [
                 _millimetres(found[whose][name])
-                for name in (MODELS[0], MODELS[2])
+                for name in (MODELS[0], MODELS[3])
                 for whose in ("on_reference_frames", "reference")
             ]
             yield f"| {one['name']} | {phase} | {one['body']} | {found['reference_frames']} | {' | '.join(cells)} |"
@@ -161,9 +161,10 @@ TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...]
     ("Quiet standing", "Centre of mass and measured centre of pressure on the floor, mm.", standing),
     (
         "Centre of pressure",
-        "Mean distance on the floor from the measured centre of pressure, mm: to where it is of a body at rest, to where "
-        "dynamics puts it (ZMP: by the fitted CoM's acceleration; along the force: by the measured force), and to the paper's "
-        "for each γ (1/m). In walking, frames on one plate and on two apart.",
+        "Mean distance on the floor from the measured centre of pressure, mm: to where it is of a body at rest; to the "
+        "zero-moment point (ZMP), where dynamics puts it, by the acceleration of the fitted centre of mass, and by those of the "
+        "ten parts, so that swinging limbs count; to where the measured force's line through the centre of mass meets the "
+        "floor; and to the paper's for each γ (1/m). In walking, frames on one plate and on two apart.",
         centers_of_pressure,
     ),
     ("The same of the reference's centre of mass", "On the frames that have one, mm.", references),
@@ -187,7 +188,8 @@ def series(one: Comparison) -> dict[str, NDArray[Any]]:
         assert one.measured is not None
         found |= {"force_N": one.force, "cop_measured_m": one.measured, "complete": one.complete}
         found |= {"loads_N": carried(one.plates), "first_share_computed": one.computed.shares}
-        found |= {"zmp_m": one.centers[MODELS[1]], "along_force_m": one.centers[MODELS[2]]}
+        names = ("zmp_com_m", "zmp_parts_m", "com_along_force_m")
+        found |= {name: one.centers[model] for name, model in zip(names, MODELS[1:], strict=True)}
     return found
 
 
