@@ -94,7 +94,9 @@ def finite(what: str, values: NDArray[Any]) -> list[Finding]:
         return []
     if not good.any():
         return [Finding("wrong", f"{what}: no finite number in any frame")]
-    return [Finding("missing", f"{what}: {(~good.all(axis=1)).sum()} of {len(rows)} frames have NaN or infinity in them")]
+    return [
+        Finding("missing", f"{what}: {(~good.all(axis=1)).sum()} of {len(rows)} frames have NaN or infinity in them")
+    ]
 
 
 def size_of_body(what: str, points: NDArray[Any]) -> list[Finding]:

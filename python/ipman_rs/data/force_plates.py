@@ -265,7 +265,8 @@ def of_file(found: c3d.Recording, name: str, markers: Sequence[str], up: str | N
         raise ValueError(f"{found.source}: up: expected x, y or z, got {axis!r}")
     joints = np.full((len(found.times), len(markers), 3), np.nan)
     if found.names:
-        joints[:, [list(markers).index(marker) for marker in found.names]] = found.positions(found.names)
+        column = {marker: index for index, marker in enumerate(markers)}
+        joints[:, [column[marker] for marker in found.names]] = found.positions(found.names)
         joints[(joints == 0).all(axis=-1)] = np.nan  # not seen, in some systems' files
     plates = of_recording(found, up) if found.values("FORCE_PLATFORM", "USED")[:1] not in ([], [0]) else None
     return _frames(name, found, joints, list(markers), plates, UP[axis])
@@ -297,11 +298,31 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
     found = [Finding("ok", f"{len(files)} .c3d {'file' if len(files) == 1 else 'files'}")]
     for file in files:
         try:
+            content = c3d.read(file)
+            joints = of_file(content, file.stem, content.names).joints
             found += sequences.judged(file.name, open(file))
+            found += [] if joints is None else standing(file.name, joints, np.isfinite(joints).all(axis=-1), content.up)
             found.append(_loads(file))
         except (ValueError, ImportError) as error:
             found.append(Finding("wrong", str(error)))
     return found
+
+
+def standing(what: str, markers: Array, seen: NDArray[np.bool_], up: str) -> list[Finding]:
+    """Whether the way in which markers (T, M, 3) m of a person are longest, and begin at a floor, is `up`.
+
+    Nothing is wrong in somebody who lies; so this is told, and is no error.
+    """
+    points = np.where(seen[..., None], markers, np.nan)[seen.sum(axis=1) > 2]
+    if not len(points):
+        return []
+    low, high = np.nanmin(points, axis=1), np.nanmax(points, axis=1)
+    extent, lowest = np.median(high - low, axis=0), np.median(low, axis=0)
+    axis = int(extent.argmax())
+    if "xyz"[axis] == up or extent["xyz".index(up)] > 0.8 or extent[axis] < 1.2 or not -0.3 < lowest[axis] < 0.5:
+        return []
+    said = f"{what}: looks like {'xyz'[axis]} up: markers reach from {lowest[axis]:.2f} m along {'xyz'[axis]} over "
+    return [Finding("wrong", f"{said}{extent[axis]:.2f} m, but up is said to be {up}", "or does this person lie?")]
 
 
 def _loads(file: Path) -> Finding:
