@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 STILL = 0.015  # m: rms of the centre of mass about its mean, of somebody who stands
-LOW, SLOW = 0.04, 0.5  # m, m/s: what is on the floor is lower and slower
+LOW, SLOW = 0.03, 0.5  # m, m/s: what is on the floor is lower and slower
 ANYWHERE = 0.5  # m: a reference farther from the body is in other units or axes
 
 

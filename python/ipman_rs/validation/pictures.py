@@ -28,13 +28,16 @@ OURS, REFERENCE = "#1f77b4", "#9aa1ad"
 
 
 def moments(one: Comparison) -> dict[str, int]:
-    """The frames that are worth a picture: one of each phase, the one in which the centre of mass is lowest."""
+    """The frames that are worth a picture: the middle of each phase's longest run, or where the body is lowest."""
     found = {}
     for phase, mask in one.phases.items():
-        rows = np.flatnonzero(mask & np.isfinite(one.com[:, 1]))
+        known = mask & np.isfinite(one.zmp[:, 0])
+        rows = np.flatnonzero(known if known.any() else mask)
         if len(rows):
+            runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+            longest = max(runs, key=len)
             lowest = rows[int(one.com[rows, 1].argmin())]
-            found[phase] = int(lowest if one.kind == "movement in place" else rows[len(rows) // 2])
+            found[phase] = int(lowest if one.kind == "movement in place" else longest[len(longest) // 2])
     return found or {"all": len(one.times) // 2}
 
 
@@ -49,6 +52,8 @@ def pressure_map(one: Comparison, bodies: PosedSequence, template: ip.BodyTempla
         title = "" if phase == "all" else f"{phase}, "
         axis.set_title(f"{one.name}, {title}{one.times[frame]:.2f} s", fontsize=10)
     axes[0][0].set_ylabel("z, m")
+    if one.plates is not None:
+        axes[0][0].plot([], [], "^", color="black", ms=6, mfc="white", label="CoP of a plate, with its load")
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
     return _png(figure)
@@ -84,13 +89,13 @@ def _draw_map(
 def _places(one: Comparison) -> list[tuple[str, Array, tuple[str, str, float]]]:
     found = [
         ("CoM on the floor", one.com, ("o", colors.COM, 11)),
-        ("the paper's CoP, γ = 10", one.computed.cop[10], ("o", colors.COP, 11)),
+        ("the paper's CoP, γ = 10", one.computed.cop[10], ("o", colors.COP, 9)),
     ]
     if one.measured is not None:
-        found.append(("measured CoP", one.measured, ("^", "black", 12)))
-        found.append(("ZMP of the parts", one.zmp, ("D", OURS, 8)))
+        found.append(("measured CoP", one.measured, ("^", "black", 10)))
+        found.append(("ZMP of the parts", one.zmp, ("D", OURS, 6)))
     if one.reference is not None:
-        found.append(("reference CoM", one.reference, ("s", REFERENCE, 8)))
+        found.append(("reference CoM", one.reference, ("s", REFERENCE, 6)))
     return found  # type: ignore[return-value]
 
 
@@ -101,9 +106,10 @@ def _draw_plates(axis: Axes, one: Comparison, frame: int) -> None:
     for outline in () if plates.corners is None else plates.corners[:, :, [0, 2]]:
         axis.plot(*np.vstack([outline, outline[:1]]).T, color=colors.INK, lw=1, ls="--", zorder=2)
     for plate in np.flatnonzero(carried(plates)[frame] > 0):
-        x, z = plates.points[frame, plate, [0, 2]]
-        axis.plot(x, z, "^", color="black", ms=6, mfc="white", zorder=4, label="CoP of a plate" if plate == 0 else None)
-        axis.annotate(f"{plates.loads[frame, plate]:.0f} N", (x, z), (6, 6), textcoords="offset points", fontsize=8)
+        place, told = plates.points[frame, plate, [0, 2]], f"{plates.loads[frame, plate]:.0f} N"
+        axis.plot(*place, "^", color="black", ms=6, mfc="white", zorder=4)
+        box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1}
+        axis.annotate(told, place, (9, -14), textcoords="offset points", fontsize=8, bbox=box, zorder=6)
 
 
 def over_time(one: Comparison) -> bytes:
