@@ -41,12 +41,13 @@ class Comparison:
 
     def __post_init__(self) -> None:
         for what, points in (("centre of mass", self.reference), ("centre of pressure", self.measured)):
-            if points is None or not np.isfinite(points).any():
+            if points is None:
                 continue
-            away = float(np.nanmedian(distances(points, self.com)))
-            if away > ANYWHERE:
+            away = distances(points, self.com)
+            away = away[np.isfinite(away) if self.seen is None else np.isfinite(away) & self.seen]
+            if len(away) and np.median(away) > ANYWHERE:
                 raise ValueError(
-                    f"{self.name}: the measured {what} is {away:.2f} m beside the body fitted to the markers; expected "
+                    f"{self.name}: the measured {what} is {np.median(away):.2f} m beside the body fitted to the markers; expected "
                     "both in the same axes, y up, and in metres (or a file that says its units)"
                 )
 
