@@ -195,7 +195,7 @@ def _allowed() -> dict[tuple[str, str], Callable[..., Any]]:
 
 
 ALLOWED = _allowed()
-# What other programs' settings are made of; all other names of the standard library mean that a file wants to do things.
+# What other programs' settings are made of; another name of the standard library means that a file wants to do things.
 HARMLESS = ("collections", "datetime", "enum", "pathlib", "typing", "copy_reg", "copyreg", "uuid")
 HARMLESS_TYPES = ("bool", "bytes", "complex", "dict", "float", "frozenset", "int", "list", "long", "object", "range",
                   "set", "slice", "str", "tuple", "type", "unicode")  # fmt: skip
@@ -285,9 +285,7 @@ class TolerantUnpickler(RestrictedUnpickler):
     }
 
 
-def read(
-    path: Path, what: str = BODY_MODEL, expected: str = BODY_MODELS, tolerant: bool = False
-) -> dict[str, Any]:
+def read(path: Path, what: str = BODY_MODEL, expected: str = BODY_MODELS, tolerant: bool = False) -> dict[str, Any]:
     """The pickled dictionary in `path`: numbers and text as they are, arrays as records for `as_array`.
 
     `what` and `expected` name the file in messages. `tolerant`: objects of other programs' classes are passed over,

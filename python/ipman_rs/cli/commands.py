@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .benchmark import benchmark
+from .data import data
 from .errors import FileError
 from .fit import fit
 from .options import GROUND, PRESETS, UP
@@ -48,6 +49,7 @@ def main() -> None:
 main.add_command(fit)
 main.add_command(benchmark)
 main.add_command(validate)
+main.add_command(data)
 
 
 @main.command()

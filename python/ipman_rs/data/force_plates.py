@@ -1,10 +1,10 @@
 """Force plates: forces, and the centre of pressure computed from the raw forces and moments of a `.c3d` file.
 
 Expected: a `.c3d` file, or a folder of them, with POINT (markers, in the unit that UNITS says, the vertical axis that
-Y_SCREEN says, z without it) and FORCE_PLATFORM (TYPE 2 or 4 with six channels Fx, Fy, Fz, Mx, My, Mz, or TYPE 3 with the
-eight of a Kistler plate; CORNERS, ORIGIN, CHANNEL) over ANALOG, in N and N mm or N m. Such files come from any motion
-capture laboratory. Frames have the file's axes and the rate of its points; `joints` are its markers, the ground is the
-plates' surface (the axis' zero without plates). No cameras. Needs the extra `c3d`.
+Y_SCREEN says, z without it) and FORCE_PLATFORM (TYPE 2 or 4 with six channels Fx, Fy, Fz, Mx, My, Mz, or TYPE 3 with
+the eight of a Kistler plate; CORNERS, ORIGIN, CHANNEL) over ANALOG, in N and N mm or N m. Such files come from any
+motion capture laboratory. Frames have the file's axes and the rate of its points; `joints` are its markers, the ground
+is the plates' surface (the axis' zero without plates). No cameras. Needs the extra `c3d`.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from ipman_rs.ground import Ground
 from . import c3d, sequences
 from .check import Finding, demanded
 from .frames import DataSet, Frames
+from .joined import Joined
 from .tracks import METRES, TO_Y_UP
 
 NAME = "force-plates"
@@ -29,6 +31,7 @@ NAME = "force-plates"
 Array = NDArray[np.float64]
 
 LOADED = 20.0  # N: with less, a plate's centre of pressure is noise
+LEVEL = 0.7  # cosine: of several plates, one at least lies level; others may be ramps or walls
 UP = {axis: TO_Y_UP[axis].T @ (0.0, 1.0, 0.0) for axis in TO_Y_UP}
 CHANNELS = {2: 6, 3: 8, 4: 6}  # of a plate, by its type
 NEWTON_METRES = {"nmm": 1e-3, "n.mm": 1e-3, "n*mm": 1e-3, "ncm": 1e-2, "nm": 1.0, "n.m": 1.0, "n*m": 1.0}
@@ -76,11 +79,12 @@ class ForcePlates:
         """
         wanted = np.asarray(times, float)
         loads = np.where((self.loads > least) & np.isfinite(self.points).all(axis=-1), self.loads, 0.0)
-        carried = self._between(loads[..., None], wanted)
-        weighted = self._between(np.where(loads[..., None] > 0, loads[..., None] * self.points, 0.0), wanted)
+        carried = between(self.times, loads[..., None], wanted)
+        pressed = np.where(loads[..., None] > 0, loads[..., None] * self.points, 0.0)
+        weighted = between(self.times, pressed, wanted)
         with np.errstate(invalid="ignore"):
             points = np.where(carried > 0, weighted / carried, np.nan)
-        forces, moments = self._between(self.forces, wanted), self._between(self.moments, wanted)
+        forces, moments = (between(self.times, values, wanted) for values in (self.forces, self.moments))
         return replace(self, times=wanted, forces=forces, points=points, moments=moments)
 
     def turned(self, rotation: ArrayLike) -> ForcePlates:
@@ -91,11 +95,18 @@ class ForcePlates:
             corners=None if self.corners is None else self.corners @ turn,
         )  # fmt: skip
 
-    def _between(self, values: Array, times: Array) -> Array:
-        """(T, ...) at other times: (n, ...)."""
-        rows = values.reshape(len(values), -1)
-        lines = [np.interp(times, self.times, column, left=np.nan, right=np.nan) for column in rows.T]
-        return np.stack(lines, axis=-1).reshape(len(times), *values.shape[1:])
+
+def between(times: Array, values: Array, wanted: ArrayLike) -> Array:
+    """Values (T, ...) at other times (n,), on straight lines between the samples: (n, ...).
+
+    NaN more than half a sample outside the recording: files round their times.
+    """
+    wanted, rows = np.asarray(wanted, float), values.reshape(len(values), -1)
+    slack = 0.5 * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    outside = (wanted < times[0] - slack) | (wanted > times[-1] + slack)
+    found = np.stack([np.interp(wanted, times, column) for column in rows.T], axis=-1)
+    found[outside] = np.nan
+    return found.reshape(len(wanted), *values.shape[1:])
 
 
 def read(path: str | os.PathLike[str], up: str | None = None) -> ForcePlates:
@@ -117,6 +128,13 @@ def of_recording(found: c3d.Recording, up: str | None = None) -> ForcePlates:
         raise ValueError(f"{found.source}: up: expected x, y or z, got {up or found.up!r}")
     vertical = UP[up or found.up]
     plates = [_Plate.of(found, index) for index in range(used)]
+    normals = np.abs([plate.axes[:, 2] for plate in plates])
+    if (normals @ np.abs(vertical)).max() < LEVEL:
+        axis = "xyz"[int(normals[0].argmax())]
+        raise ValueError(
+            f"{found.source}: looks like {axis} up: that is where its force plates face, up is said to be "
+            f"{up or found.up}; say up={axis!r} if so"
+        )
     wrenches = [plate.wrench(vertical) for plate in plates]
     forces, points, moments = (np.stack(part, axis=1) for part in zip(*wrenches, strict=True))
     count = len(found.analogs) // max(len(found.times), 1)
@@ -163,7 +181,7 @@ class _Plate:
 
     def wrench(self, up: Array) -> tuple[Array, Array, Array]:
         """Force on the body, centre of pressure and moment about it, each (T, 3), in the world."""
-        axes = self._axes()
+        axes = self.axes
         forces = self.forces
         moments = self.moments - np.cross(self.origin, forces)  # about the middle of the surface
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -171,12 +189,13 @@ class _Plate:
         free = moments[:, 2] - x * forces[:, 1] + y * forces[:, 0]
         points = self.corners.mean(axis=0) + np.stack([x, y], axis=1) @ axes[:, :2].T
         force, moment = forces @ axes.T, free[:, None] * axes[:, 2]
-        # Some systems write the force on the plate, others that on the body. Nobody pulls at a plate as they step on it.
+        # Some systems write the force on the plate, others that on the body. Nobody pulls at a plate.
         loads = force @ up
         sign = -1.0 if loads.size and -loads.min() > max(loads.max(), LOADED) else 1.0
         return sign * force, np.where(np.isfinite(points), points, np.nan), sign * np.nan_to_num(moment)
 
-    def _axes(self) -> Array:
+    @cached_property
+    def axes(self) -> Array:
         """(3, 3), the plate's axes in the world as columns."""
         first, second, third, fourth = self.corners
         x, y = (first + fourth) - (second + third), (first + second) - (third + fourth)
@@ -234,9 +253,7 @@ def _kistler(signals: Array, origin: Array) -> tuple[Array, Array]:
     x12, x34, y14, y23, z1, z2, z3, z4 = signals.T
     a, b = np.abs(origin[:2])
     forces = np.stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4], axis=1)
-    moments = np.stack(
-        [b * (z1 + z2 - z3 - z4), a * (-z1 + z2 + z3 - z4), b * (x34 - x12) + a * (y14 - y23)], axis=1
-    )
+    moments = np.stack([b * (z1 + z2 - z3 - z4), a * (-z1 + z2 + z3 - z4), b * (x34 - x12) + a * (y14 - y23)], axis=1)
     return forces, moments
 
 
@@ -252,10 +269,8 @@ def open(path: str | os.PathLike[str], split: str | None = None, *, up: str | No
     recordings = [c3d.read(file) for file in files]
     names = list(dict.fromkeys(name for found in recordings for name in found.names))
 
-    def sequence(index: int) -> Frames:
-        return of_file(recordings[index], files[index].stem, names, up)
-
-    return demanded(path, sequences.Sequences([len(found.times) for found in recordings], sequence, path))
+    parts = [of_file(found, file.stem, names, up) for file, found in zip(files, recordings, strict=True)]
+    return demanded(path, Joined(sequences.measured_alike(parts)))
 
 
 def of_file(found: c3d.Recording, name: str, markers: Sequence[str], up: str | None = None) -> Frames:
@@ -299,9 +314,10 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
     for file in files:
         try:
             content = c3d.read(file)
-            joints = of_file(content, file.stem, content.names).joints
-            found += sequences.judged(file.name, open(file))
-            found += [] if joints is None else standing(file.name, joints, np.isfinite(joints).all(axis=-1), content.up)
+            points = content.positions(content.names)
+            seen = np.isfinite(points).all(axis=-1) & (points != 0).any(axis=-1)
+            found += standing(file.name, points, seen, content.up)
+            found += sequences.told(file.name, open(file)[:])
             found.append(_loads(file))
         except (ValueError, ImportError) as error:
             found.append(Finding("wrong", str(error)))
@@ -339,5 +355,7 @@ def _files(path: str | os.PathLike[str]) -> list[Path]:
     place = Path(path)
     files = sorted(place.glob("**/*.c3d")) if place.is_dir() else [place]
     if not files or not files[0].is_file():
-        raise ValueError(f"{path}: expected a .c3d file or a folder of them, {'none in it' if not files else 'not there'}")
+        raise ValueError(
+            f"{path}: expected a .c3d file or a folder of them, {'none in it' if not files else 'not there'}"
+        )
     return files

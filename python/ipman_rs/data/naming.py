@@ -44,11 +44,12 @@ def numbered(names: Sequence[str] | NDArray[np.str_], people: NDArray[np.int64])
     return np.array([name if number == 0 else f"{name}#{number}" for name, number in pairs], dtype=np.str_)
 
 
-def frame_rate(names: Sequence[str], sequences: Sequence[str], rate: float | None) -> float | None:
-    """Hz of the rows, whose names end in the image's number: that of the video over the step from row to row."""
-    numbers = [int("0" + name[len(name.rstrip("0123456789")) :]) for name in names]
-    steps = [later - earlier for earlier, later in zip(numbers, numbers[1:], strict=False)]
-    inside = [
-        step for step, one, other in zip(steps, sequences, sequences[1:], strict=False) if one == other and step > 0
+def frame_rate(labels: Sequence[tuple[str, str]], rate: float | None) -> float | None:
+    """Hz of rows (name, sequence) whose names end in the image's number: the video's over the step from row to row."""
+    numbers = [int("0" + name[len(name.rstrip("0123456789")) :]) for name, _ in labels]
+    steps = [
+        number - before
+        for number, before, (_, sequence), (_, last) in zip(numbers[1:], numbers, labels[1:], labels, strict=False)
+        if sequence == last and number > before
     ]
-    return rate / min(inside) if rate is not None and inside else None
+    return rate / min(steps) if rate is not None and steps else None

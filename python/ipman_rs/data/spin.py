@@ -15,15 +15,13 @@ and what IPMAN adds, in the axes of the data set's world:
     in_bos_label (N,)       1 stable, 0 unstable, -1 unstable and without contact
     contact_label (N,)      1 where the body touches the floor
 
-Nothing is read at first but the names and shapes of the arrays: numpy.savez stores them as they are, so they are mapped
-into memory and a row costs what its own bytes cost, in a file of any length. A file of numpy.savez_compressed has to be
-unpacked, which is done once for each array, and up to 1 GB each.
+Nothing is read at first but the names and shapes of the arrays (see `rows`).
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -31,13 +29,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import safe_npz
 from ipman_rs.fitting.keypoints.openpose import BODY_25
 from ipman_rs.ground import Ground
 
 from . import naming
 from .check import Finding, demanded, of_frames, sample
 from .frames import Array, Cameras, Frames, Rows
+from .rows import TEXT, RowFile
 
 JOINTS = (
     "right_ankle", "right_knee", "right_hip", "left_hip", "left_knee", "left_ankle", "right_wrist", "right_elbow",
@@ -45,17 +43,16 @@ JOINTS = (
     "jaw", "head", "nose", "left_eye", "right_eye", "left_ear", "right_ear",
 )  # fmt: skip
 OPENPOSE = tuple(f"openpose_{name}" for name in BODY_25)
-COLUMNS: dict[str, tuple[int, ...]] = {  # of a row; dimensions of length one may be there or not
-    "imgname": (), "center": (2,), "scale": (), "part": (24, 3), "openpose": (25, 3), "S": (24, 4), "pose": (72,),
-    "shape": (10,), "has_smpl": (), "gender": (), "S_world": (24, 4), "pose_world": (72,), "transl_world": (3,),
+SHAPES: dict[str, tuple[int, ...] | str] = {
+    "imgname": TEXT, "center": (2,), "scale": (), "part": (24, 3), "openpose": (25, 3), "S": (24, 4), "pose": (72,),
+    "shape": (10,), "has_smpl": (), "gender": TEXT, "S_world": (24, 4), "pose_world": (72,), "transl_world": (3,),
     "has_smpl_world": (), "cam_r": (3, 3), "cam_t": (3,), "cam_k": (3, 3), "ground_offset": (), "in_bos_label": (),
     "contact_label": (),
 }  # fmt: skip
 REQUIRED = ("imgname", "center", "scale")
-TEXTS = ("imgname", "gender")
+CAMERA = ("cam_r", "cam_t", "cam_k")
 WORLD = ("S_world", "pose_world")  # either makes it a file with a world
 GENDERS = {"m": "male", "f": "female", "n": "neutral", "male": "male", "female": "female", "neutral": "neutral"}
-PIECE = 1 << 16  # rows that a scan holds in memory
 
 
 def image_by_itself(image: str) -> tuple[str, str]:
@@ -81,141 +78,128 @@ class Form:
 class Spin:
     """A data set in this form: rows of one file, as Frames."""
 
-    def __init__(self, path: Path, form: Form, frame: str | None, height: float | None) -> None:
-        self.path, self.form = path, form
-        self.columns = _columns(path)
-        self.world = _world_asked(path, self.columns, frame)
+    def __init__(self, path: Path, form: Form, frame: str | None = None, height: float | None = None) -> None:
+        self.file = RowFile(path, SHAPES, REQUIRED)
+        self.form = form
+        self.world = self._in_world(frame)
         self.height = form.height if height is None else height
         self.people = self._people()
-        self.frame_rate = self._frame_rate()
-        _finite_ground(path, self.columns)
+        labels = [form.label(image) for image in self.file.texts("imgname", slice(0, 64)).tolist()]
+        self.frame_rate = naming.frame_rate(labels, form.video_rate)
+        if "ground_offset" in self.file and not np.isfinite(self.file.arrays["ground_offset"]).all():
+            raise ValueError(f"{path}: ground_offset: expected metres in every row, got NaN or infinity")
 
     def __len__(self) -> int:
-        return len(self.columns["imgname"])
+        return len(self.file)
 
     def __getitem__(self, rows: Rows) -> Frames:
-        images = self._images(rows)
+        images = self.file.texts("imgname", rows)
         names, sequences = self._labels(images, rows)
-        has_body = "pose_world" in self.columns if self.world else "pose" in self.columns
         return Frames(
             names=names,
             sequences=sequences,
             ground=self._ground(len(images), rows),
             frame_rate=self.frame_rate,
-            body="smpl" if has_body else None,
-            genders=self._genders(rows) if has_body else None,
-            **(self._body(rows) if has_body else {}),
+            **self._body(rows),
             **self._joints(rows),
             images=images,
-            cameras=self._cameras(images, rows) if self.world else None,
+            cameras=self._cameras(images, rows),
             **self._keypoints(rows),
             boxes=self._boxes(rows),
             standing=self._label("in_bos_label", rows),
             contact=self._label("contact_label", rows),
         )
 
-    def scan(self) -> Iterator[Finding]:
-        """Every number of the file, whether it is one."""
-        for name, column in self.columns.items():
-            if name in TEXTS:
-                continue
-            starts = range(0, len(column), PIECE)
-            bad = sum(int((~_finite_rows(column[start : start + PIECE])).sum()) for start in starts)
-            if bad:
-                advice = "no figure is computed for them"
-                yield Finding("missing", f"{name}: NaN or infinity in {bad} of {len(column)} rows", advice)
-
-    def _rows(self, name: str, rows: Rows) -> NDArray[Any]:
-        values = np.asarray(self.columns[name][rows])
-        return values.reshape(len(values), *COLUMNS[name])
-
-    def _numbers(self, name: str, rows: Rows) -> Array:
-        return self._rows(name, rows).astype(np.float64)
-
-    def _images(self, rows: Rows) -> NDArray[np.str_]:
-        try:
-            return self._rows("imgname", rows).astype(np.str_)
-        except ValueError as error:
-            raise ValueError(f"{self.path}: imgname: holds what is no text ({error})") from None
+    def _in_world(self, frame: str | None) -> bool:
+        if frame not in (None, "world", "camera"):
+            raise ValueError(f"frame: expected 'world' or 'camera', got {frame!r}")
+        there = any(name in self.file for name in WORLD)
+        if frame == "world" and not there:
+            raise ValueError(
+                f"{self.file.path}: frame: 'world' needs {' or '.join(WORLD)}, which the file does not have"
+            )
+        return there and frame != "camera"
 
     def _labels(self, images: NDArray[np.str_], rows: Rows) -> tuple[NDArray[np.str_], NDArray[np.str_]]:
-        pairs = [self.form.label(str(image)) for image in images]
-        names = np.array([name for name, _ in pairs], np.str_)
-        sequences = np.array([sequence for _, sequence in pairs], np.str_)
+        names, sequences = zip(*map(self.form.label, images.tolist()), strict=True) if len(images) else ((), ())
         if self.people is None:
-            return names, sequences
+            return np.array(names, np.str_), np.array(sequences, np.str_)
         return naming.numbered(names, self.people[rows]), naming.numbered(sequences, self.people[rows])
 
     def _people(self) -> NDArray[np.int64] | None:
+        """The number of each row's person, which takes all names of the file: of data sets of single images."""
         if self.form.people is None:
             return None
-        images = self._images(slice(None))
-        sequences = np.array([self.form.label(str(image))[1] for image in images], np.str_)
+        images = self.file.texts("imgname", slice(None))
+        sequences = np.array([self.form.label(image)[1] for image in images.tolist()], np.str_)
         return self.form.people(images, sequences)
-
-    def _frame_rate(self) -> float | None:
-        names, sequences = zip(*map(self.form.label, map(str, self._images(slice(0, 64)))), strict=True) or ((), ())
-        return naming.frame_rate(names, sequences, self.form.video_rate)
 
     def _ground(self, count: int, rows: Rows) -> Ground | None:
         if not self.world or self.form.up is None:
             return None
-        if "ground_offset" in self.columns:
-            return Ground(np.tile(self.form.up, (count, 1)), self._numbers("ground_offset", rows))
+        if "ground_offset" in self.file:
+            return Ground(np.tile(self.form.up, (count, 1)), self.file.numbers("ground_offset", rows))
         return None if self.height is None else Ground(self.form.up, self.height)
 
-    def _genders(self, rows: Rows) -> NDArray[np.str_]:
-        if "gender" not in self.columns:
-            return np.full(len(self.columns["imgname"][rows]), "neutral")
-        given = self._rows("gender", rows).astype(np.str_)
-        unknown = set(given.tolist()) - set(GENDERS)
-        if unknown:
-            raise ValueError(f"{self.path}: gender: expected one of {', '.join(GENDERS)}, got {unknown.pop()!r}")
-        return np.array([GENDERS[gender] for gender in given.tolist()], np.str_)
+    def _body(self, rows: Rows) -> dict[str, Any]:
+        """SMPL's parameters; NaN where the file says that a row has none."""
+        pose, known = ("pose_world", "has_smpl_world") if self.world else ("pose", "has_smpl")
+        if pose not in self.file:
+            return {}
+        found = {"pose": self.file.numbers(pose, rows).reshape(-1, 24, 3)}
+        if "shape" in self.file:
+            found["betas"] = self.file.numbers("shape", rows)
+        if self.world and "transl_world" in self.file:
+            found["transl"] = self.file.numbers("transl_world", rows)
+        if known in self.file:
+            lacking = self.file.numbers(known, rows) == 0
+            found = {
+                name: np.where(lacking.reshape(-1, *[1] * (each.ndim - 1)), np.nan, each)
+                for name, each in found.items()
+            }
+        return {"body": "smpl", "genders": self._genders(rows), **found}
 
-    def _body(self, rows: Rows) -> dict[str, Array | None]:
-        pose, transl, known = (
-            ("pose_world", "transl_world", "has_smpl_world") if self.world else ("pose", "", "has_smpl")
-        )
-        found: dict[str, Array | None] = {
-            "pose": self._numbers(pose, rows).reshape(-1, 24, 3),
-            "betas": self._numbers("shape", rows) if "shape" in self.columns else None,
-            "transl": self._numbers(transl, rows) if transl in self.columns else None,
-        }
-        if known in self.columns:
-            unknown = self._rows(known, rows) == 0
-            for values in found.values():
-                if values is not None:
-                    values[unknown] = np.nan
-        return found
+    def _genders(self, rows: Rows) -> NDArray[np.str_]:
+        """SPIN's own fits are SMPL's neutral model."""
+        if "gender" not in self.file:
+            return np.full(len(self.file.arrays["imgname"][rows]), "neutral")
+        return genders(self.file, rows)
 
     def _joints(self, rows: Rows) -> dict[str, Any]:
         name = "S_world" if self.world else "S"
-        if name not in self.columns:
+        if name not in self.file:
             return {}
-        values = self._numbers(name, rows)
+        values = self.file.numbers(name, rows)
         return {"joints": np.where(values[..., 3:] > 0, values[..., :3], np.nan), "joint_names": JOINTS}
 
     def _keypoints(self, rows: Rows) -> dict[str, Any]:
-        there = [(name, names) for name, names in (("part", JOINTS), ("openpose", OPENPOSE)) if name in self.columns]
+        there = [(name, names) for name, names in (("part", JOINTS), ("openpose", OPENPOSE)) if name in self.file]
         if not there:
             return {}
-        points = np.concatenate([self._numbers(name, rows) for name, _ in there], axis=1)
+        points = np.concatenate([self.file.numbers(name, rows) for name, _ in there], axis=1)
         return {"keypoints": points, "keypoint_names": tuple(each for _, names in there for each in names)}
 
     def _boxes(self, rows: Rows) -> Array:
-        side = 200 * self._numbers("scale", rows)[:, None]
-        return np.concatenate([self._numbers("center", rows) - side / 2, side, side], axis=1)
+        side = 200 * self.file.numbers("scale", rows)[:, None]
+        return np.concatenate([self.file.numbers("center", rows) - side / 2, side, side], axis=1)
 
     def _cameras(self, images: NDArray[np.str_], rows: Rows) -> Cameras | None:
-        if self.form.camera_t is None or not {"cam_r", "cam_t", "cam_k"} <= set(self.columns):
+        if not self.world or self.form.camera_t is None or any(name not in self.file for name in CAMERA):
             return None
-        rotation = self._numbers("cam_r", rows)
-        translation = self.form.camera_t(rotation, self._numbers("cam_t", rows), images)
-        return Cameras(rotation, translation, self._numbers("cam_k", rows))
+        rotation, translation, intrinsics = (self.file.numbers(name, rows) for name in CAMERA)
+        return Cameras(rotation, self.form.camera_t(rotation, translation, images), intrinsics)
 
     def _label(self, name: str, rows: Rows) -> NDArray[np.bool_] | None:
-        return self._rows(name, rows) == 1 if name in self.columns else None
+        return self.file.numbers(name, rows) == 1 if name in self.file else None
+
+
+def genders(file: RowFile, rows: Rows) -> NDArray[np.str_]:
+    """The array `gender` in full words. ValueError for another word."""
+    given = file.texts("gender", rows).tolist()
+    unknown = set(given) - set(GENDERS)
+    if unknown:
+        raise ValueError(f"{file.path}: gender: expected one of {', '.join(GENDERS)}, got {unknown.pop()!r}")
+    return np.array([GENDERS[gender] for gender in given], np.str_)
 
 
 def open(
@@ -255,16 +239,14 @@ def check(form: Form, path: str | os.PathLike[str]) -> list[Finding]:
 
 def _check_file(form: Form, file: Path) -> list[Finding]:
     try:
-        data = Spin(file, form, None, None)
-        found = [Finding("ok", f"{len(data)} rows with {', '.join(data.columns)}")]
+        data = Spin(file, form)
+        found = [Finding("ok", f"{len(data)} rows with {', '.join(data.file)}")]
         found += of_frames(sample(data))
-        found += data.scan()
+        found += data.file.scan()
     except ValueError as error:
         return [Finding("wrong", str(error))]
     lacking = [
-        Finding("missing", f"{name}: no such array", why)
-        for name, why in form.wanted.items()
-        if name not in data.columns
+        Finding("missing", f"{name}: no such array", why) for name, why in form.wanted.items() if name not in data.file
     ]
     return [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in [*found, *lacking]]
 
@@ -280,46 +262,6 @@ def _file(form: Form, path: Path, split: str | None) -> Path:
         what = f"none of {', '.join(names)} in it" if path.is_dir() else "no such file or folder"
         raise ValueError(f"{path}: {what}; `ipman data check {form.name} {path}` tells what is expected")
     return found[0]
-
-
-def _columns(path: Path) -> dict[str, NDArray[Any]]:
-    """The arrays of the form that the file has, checked for type, rows and shape, but not read."""
-    there = safe_npz.names(path)
-    lacking = [name for name in REQUIRED if name not in there]
-    if lacking:
-        raise ValueError(f"{path}: no {', '.join(lacking)} among its arrays ({', '.join(sorted(there)) or 'none'})")
-    columns = {name: safe_npz.mapped(path, name) for name in COLUMNS if name in there}
-    rows = len(columns["imgname"]) if columns["imgname"].ndim else 0
-    for name, column in columns.items():
-        shape = tuple(size for size in column.shape[1:] if size != 1)
-        if column.ndim == 0 or shape != COLUMNS[name]:
-            raise ValueError(f"{path}: {name}: expected shape {(rows, *COLUMNS[name])}, got {column.shape}")
-        if len(column) != rows:
-            raise ValueError(f"{path}: {name}: expected {rows} rows, as imgname has, got {len(column)}")
-        if column.dtype.kind not in ("US" if name in TEXTS else "fiub"):
-            kind = "text" if name in TEXTS else "numbers"
-            raise ValueError(f"{path}: {name}: expected {kind}, got type {column.dtype}")
-    if not rows:
-        raise ValueError(f"{path}: no rows: every array is empty")
-    return columns
-
-
-def _world_asked(path: Path, columns: Mapping[str, Any], frame: str | None) -> bool:
-    if frame not in (None, "world", "camera"):
-        raise ValueError(f"frame: expected 'world' or 'camera', got {frame!r}")
-    there = any(name in columns for name in WORLD)
-    if frame == "world" and not there:
-        raise ValueError(f"{path}: frame: 'world' needs {' or '.join(WORLD)}, which the file does not have")
-    return there and frame != "camera"
-
-
-def _finite_ground(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
-    if "ground_offset" in columns and not np.isfinite(columns["ground_offset"]).all():
-        raise ValueError(f"{path}: ground_offset: expected metres in every row, got NaN or infinity")
-
-
-def _finite_rows(values: NDArray[Any]) -> NDArray[np.bool_]:
-    return np.isfinite(np.asarray(values).reshape(len(values), -1)).all(axis=1)
 
 
 def millimetres_or_metres(translation: Array) -> Array:

@@ -25,13 +25,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ipman_rs.body import joints, safe_pickle
 
 from . import naming, spin
-from .check import Finding, demanded, finite, of_frames, sample
-from .frames import Array, Cameras, Frames, Rows
+from .check import Finding, demanded, of_frames
+from .frames import Array, Cameras, Frames
+from .joined import concatenated
 
 NAME = "3dpw"
 SPLITS = ("test", "validation", "train")
@@ -63,20 +63,7 @@ FORM = spin.Form(
 )
 
 
-class ThreeDPW:
-    """The people of some sequence files, one after the other, as Frames."""
-
-    def __init__(self, frames: Frames) -> None:
-        self.frames = frames
-
-    def __len__(self) -> int:
-        return len(self.frames)
-
-    def __getitem__(self, rows: Rows) -> Frames:
-        return self.frames[rows]
-
-
-def open(path: str | os.PathLike[str], split: str | None = None) -> ThreeDPW | spin.Spin:
+def open(path: str | os.PathLike[str], split: str | None = None) -> Frames | spin.Spin:
     """Frames of a `.pkl` or `.npz` file, or of the split's `.pkl` files in the folder; None: "test".
 
     Raises ValueError naming the file for what is missing, damaged or hostile, of a wrong shape, or not metres and
@@ -90,7 +77,7 @@ def open(path: str | os.PathLike[str], split: str | None = None) -> ThreeDPW | s
         return spin.open(FORM, place, split)
     if not files:
         raise ValueError(f"{place}: no sequenceFiles/{split or 'test'}/*.pkl and no 3dpw_test.npz in it")
-    return demanded(place, ThreeDPW(_joined([person for file in files for person in _people(file)])))
+    return demanded(place, concatenated([person for file in files for person in _people(file)]))
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
@@ -118,14 +105,12 @@ def _check_files(files: list[Path]) -> list[Finding]:
     found: list[Finding] = []
     for file in files:
         try:
-            frames = _joined(_people(file))
+            frames = concatenated(_people(file))
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
             continue
         told = [Finding("ok", f"{len(frames)} frames of {len(set(frames.sequences))} people")]
-        told += of_frames(sample(ThreeDPW(frames)))
-        for what in ("pose", "betas", "transl", "joints"):
-            told += finite(what, getattr(frames, what))
+        told += of_frames(frames)
         found += [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in told]
     return found
 
@@ -196,22 +181,3 @@ def _array(file: Path, name: str, value: Any, shape: tuple[int, ...]) -> Array:
         wanted = ", ".join("any" if size == -1 else str(size) for size in shape)
         raise ValueError(f"{file}: {name}: expected numbers of shape ({wanted}), got {array.dtype} of {array.shape}")
     return array.astype(np.float64)
-
-
-def _joined(people: list[Frames]) -> Frames:
-    """All of them after the other."""
-
-    def column(name: str) -> NDArray[Any]:
-        return np.concatenate([getattr(each, name) for each in people])
-
-    columns = ("names", "sequences", "genders", "pose", "betas", "transl", "joints", "images", "keypoints")
-    cameras = [each.cameras for each in people if each.cameras is not None]
-    parts = ("rotation", "translation", "intrinsics")
-    return Frames(
-        **{name: column(name) for name in columns},
-        frame_rate=RATE,
-        body="smpl",
-        joint_names=joints.SMPL,
-        cameras=Cameras(*(np.concatenate([getattr(each, part) for each in cameras]) for part in parts)),
-        keypoint_names=COCO_18,
-    )
