@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -72,14 +73,13 @@ def trc(path, person, shift, scale=1.0, unit="m"):
 
 
 def mot(path, cop, upward, rate=10 * RATE, scale=1.0):
-    """Two plates: all the load is on the first, the second's centre is garbage. At ten times the rate of the markers."""
+    """Two plates: all load is on the first, the second's centre is garbage; ten times the markers' rate."""
     heads = ["time", *(f"ground_force_{plate}_{kind}{axis}" for plate in (1, 2) for kind in "vpm" for axis in "xyz")]
     times = np.arange(FRAMES * rate // RATE) / rate
-    rows = [
-        [t, 0, upward(t), 0, *(scale * cop), 0, 0, 0, 0, 1.5, 0, 99.0, 99.0, 99.0, 0, 0, 0] for t in times
-    ]
+    rows = [[t, 0, upward(t), 0, *(scale * cop), 0, 0, 0, 0, 1.5, 0, 99.0, 99.0, 99.0, 0, 0, 0] for t in times]
     header = ["grf", "version=1", f"nRows={len(rows)}", f"nColumns={len(heads)}", "inDegrees=yes", "endheader"]
-    path.write_text("\n".join([*header, "\t".join(heads), *("\t".join(f"{v:.6f}" for v in row) for row in rows)]) + "\n")
+    lines = [*header, "\t".join(heads), *("\t".join(f"{value:.6f}" for value in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
 
 
 @pytest.fixture(scope="module")
@@ -171,30 +171,23 @@ def copied(folder, to, *names):
     return to
 
 
-@pytest.mark.parametrize(
-    ("spoil", "told"),
-    [
-        (lambda lab: (lab / "static_grf.mot").write_text("hello"), "static_grf.mot: expected a storage of OpenSim"),
-        (lambda lab: cut(lab / "static_grf.mot"), r"static_grf.mot: .*: is the file complete\?"),
-        (lambda lab: (lab / "static.trc").write_text("hello"), "static.trc: line 1: expected PathFileType"),
-    ],
-)
-def test_a_bad_file_is_told_and_the_rest_goes_on(run, folder, tmp_path, spoil, told):
+def test_a_bad_file_is_told_and_the_rest_goes_on(run, folder, tmp_path):
     (tmp_path / "lab").mkdir()
     lab = copied(folder, tmp_path / "lab")
-    spoil(lab)
+    (lab / "static.trc").write_text("hello")
+    cut(lab / "lift_reference.csv")
     said = run(lab, "-o", tmp_path / "out", "--rate", "10")
     assert said.code == 1
-    import re
-
-    assert re.search(told, said.err.replace("\n", " ")), said.err
-    assert "lift" in records(tmp_path / "out")
-    assert "not compared" in (tmp_path / "out" / "validation.md").read_text()
+    assert "static.trc: line 1: expected PathFileType" in said.err
+    assert re.search(r"lift_reference.csv: line \d+: expected 4 columns, got \d: is the file complete", said.err)
+    assert "static could not be compared: the others found their shapes themselves" in said.out
+    assert records(tmp_path / "out").keys() == {"lift"}
+    assert (tmp_path / "out" / "validation.md").read_text().count("not compared: ") == 2
 
 
 def cut(path):
     text = path.read_text()
-    path.write_text(text[: len(text) // 2])
+    path.write_text(text[: text.rindex(",")])
 
 
 def test_forces_in_millimetres(run, person, folder, tmp_path):
@@ -236,7 +229,7 @@ def real():
 
 def test_somebody_walks(run, real, tmp_path):
     """OpenSim's example on a treadmill, markers in mm at 60 Hz, plates in m at 600 Hz; its model weighs 72.6 kg."""
-    said = run(real("gait2354"), "-o", tmp_path)
+    said = run(real("gait2354"), "-o", tmp_path, "--rate", "30")
     assert said.code == 0, said.err
     assert "g2354_bodykin.sto: taken as the centre of mass of subject01_walk1" in said.out
     walk = records(tmp_path)["subject01_walk1"]

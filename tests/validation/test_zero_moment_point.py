@@ -63,7 +63,8 @@ def test_acceleration_of_a_swing():
     settled = slice(150, -150)
     passed = 1 / (1 + (slow / CUTOFF) ** 4)
     wanted = -passed * 0.05 * (2 * np.pi * slow) ** 2 * np.sin(2 * np.pi * slow * t)
-    np.testing.assert_allclose(found[settled, 0], wanted[settled], atol=3e-4 * np.abs(wanted).max())  # of the digital filter
+    tolerance = 3e-4 * np.abs(wanted).max()  # of the digital filter
+    np.testing.assert_allclose(found[settled, 0], wanted[settled], atol=tolerance)
     np.testing.assert_allclose(found[settled, 1:], 0, atol=1e-8)  # even motion has none
     assert np.isnan(found[:33]).all()
     assert np.isnan(found[-33:]).all()

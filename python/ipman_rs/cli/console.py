@@ -152,7 +152,12 @@ def print_validation(records: Sequence[Mapping[str, Any]]) -> None:
         table.add_column(title, justify="right", no_wrap=True)
     for one in records:
         compared = one["com"]["methods"]["exact"]["distance"] if one["com"] else None
-        told = [(one["fit"]["markers"], 1e3), (one["mass"]["volume_mean"], 1), (one["mass"]["plates"], 1), (compared, 1e3)]
+        told = [
+            (one["fit"]["markers"], 1e3),
+            (one["mass"]["volume_mean"], 1),
+            (one["mass"]["plates"], 1),
+            (compared, 1e3),
+        ]
         first = [one["name"], one["kind"], *(_known(value, factor) for value, factor in told)]
         phases = one["cop"] or {"all": {"distance": {}}}
         for phase, found in phases.items():

@@ -21,8 +21,8 @@ from .fit import needs
 )  # fmt: skip
 @click.option(
     "--person", default="auto", show_default=True, metavar="auto|none|NAME",
-    help="The recording of standing still whose shape and places of markers are kept for all others; auto: the one whose "
-    "name says so (static, stand, neutral, calib), if there is one; none: every recording finds its own.",
+    help="The recording of standing still whose shape and places of markers are kept for all others; auto: the one "
+    "whose name says so (static, stand, neutral, calib), if there is one; none: every recording finds its own.",
 )  # fmt: skip
 @click.option(
     "--rate", type=click.FloatRange(min=0, min_open=True), default=50.0, show_default=True, metavar="HZ",
@@ -32,13 +32,14 @@ from .fit import needs
 def validate(folder: Path, output: Path, model: str, person: str, rate: float, fresh: bool) -> None:
     """Compare the engine's centre of mass, centre of pressure and pressure with measurements.
 
-    FOLDER holds recordings of one person: markers (.trc, or .c3d with the extra c3d), force plates (.mot, or those of the
-    .c3d) and centres of mass by others, such as OpenSim's (.sto, or .csv with columns time_s, com_x_m, com_y_m, com_z_m;
-    y up). A file belongs to the recording whose name is in its own: squats.trc, squats_grf.mot, squats_com.sto. Bodies
-    are fitted to the markers alone, as by `ipman fit`, and are kept: run it again and it goes on where it was.
+    FOLDER holds recordings of one person: markers (.trc, or .c3d with the extra c3d), force plates (.mot, or those of
+    the .c3d) and centres of mass by others, such as OpenSim's (.sto, or .csv with columns time_s, com_x_m, com_y_m,
+    com_z_m; y up). A file belongs to the recording whose name is in its own: squats.trc, squats_grf.mot,
+    squats_com.sto. Bodies are fitted to the markers alone, as by `ipman fit`, and are kept: run it again and it goes on
+    where it was.
 
     OUTPUT gets validation.md and validation.json with all tables, and a folder for every recording: series.csv and
-    series.npz over time, the fit, and pictures of the pressure on the floor, of what happens over time and of the bodies.
+    series.npz over time, the fit, and pictures of the pressure on the floor, of what happens over time, of the bodies.
 
     \b
     ipman validate gait2354 -o out

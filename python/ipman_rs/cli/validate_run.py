@@ -16,7 +16,7 @@ from ..validation import Comparison, computed, figures, measured, pictures, repo
 from ..validation.folder import Trial, find
 from . import console
 from .errors import FileError
-from .fit_outputs import npz, replace
+from .fit_outputs import npz, write_whole
 from .fit_recordings import Pace, Recording, kept
 from .fit_run import Settings
 from .parameters import read_npz
@@ -51,7 +51,9 @@ def plan(folder: Path, output: Path, model: str, person: str, rate: float, resum
         raise ValueError(f"--person: expected auto, none or one of {', '.join(names)}, got {person!r}")
     trials.sort(key=lambda trial: trial.name != chosen)  # their shape is needed first
     ip.load_body(model)  # before anything is fitted
-    return Plan(folder, output, trials, Settings(config.load("markers"), model), chosen, rate, resume, notes, unreadable)
+    return Plan(
+        folder, output, trials, Settings(config.load("markers"), model), chosen, rate, resume, notes, unreadable
+    )
 
 
 def run(plan: Plan) -> tuple[list[Record], list[str], list[FileError]]:
@@ -117,7 +119,7 @@ def _compared(plan: Plan, trial: Trial, tracks: Tracks, fit: Record) -> Record:
             files[name] = draw()
             step.one()
     for name, content in files.items():
-        replace(folder / name, content)
+        write_whole(folder / name, content)
     told = {"shape_from": fit["shape_from"], "markers": fit["mean_marker_error_m"], "converged": fit["converged"]}
     return {**figures(one), "body": plan.settings.model, "fit": told, "files": sorted(files)}
 
@@ -144,8 +146,8 @@ def write(plan: Plan, records: list[Record], notes: list[str], failures: list[Fi
     drawn = [f"{one['name']}/{name}" for one in records for name in one["files"] if name.endswith(".png")]
     told = [*notes, *(f"not compared: {failure}" for failure in failures)]
     page = plan.output / "validation.md"
-    replace(page, report.markdown(records, plan.folder.resolve().name, told, drawn).encode())
+    write_whole(page, report.markdown(records, plan.folder.resolve().name, told, drawn).encode())
     whole = {"folder": str(plan.folder), "body": plan.settings.model, "person": plan.person, "notes": told}
     content = json.dumps({**whole, "recordings": records}, allow_nan=False, ensure_ascii=False, indent=1)
-    replace(plan.output / "validation.json", f"{content}\n".encode())
+    write_whole(plan.output / "validation.json", f"{content}\n".encode())
     return page.resolve()

@@ -26,10 +26,10 @@ ANYWHERE = 0.5  # m: a reference farther from the body is in other units or axes
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """T frames at `times`; `plates`, y up, and `reference`, a centre of mass (T, 3) m, at these times, NaN where there is none.
+    """T frames at `times`; `plates`, y up, and `reference`, a centre of mass (T, 3) m, at these times.
 
-    `seen` (T,): where enough markers were seen to say where the body is. ValueError where what was measured is nowhere
-    near the body: in other units or axes.
+    NaN where nothing was measured. `seen` (T,): where enough markers were seen to say where the body is. ValueError
+    where what was measured is nowhere near the body: in other units or axes.
     """
 
     name: str
@@ -47,8 +47,8 @@ class Comparison:
             away = away[np.isfinite(away) if self.seen is None else np.isfinite(away) & self.seen]
             if len(away) and np.median(away) > ANYWHERE:
                 raise ValueError(
-                    f"{self.name}: the measured {what} is {np.median(away):.2f} m beside the body fitted to the markers; expected "
-                    "both in the same axes, y up, and in metres (or a file that says its units)"
+                    f"{self.name}: the measured {what} is {np.median(away):.2f} m beside the body fitted to the "
+                    "markers; expected both in the same axes, y up, and in metres (or a file that says its units)"
                 )
 
     @property
@@ -115,7 +115,7 @@ class Comparison:
 
     @cached_property
     def kind(self) -> str:
-        """"walking", where plates carry all the load by turns; "quiet standing", or "movement in place"."""
+        """ "walking", where plates carry all the load by turns; "quiet standing", or "movement in place"."""
         if self.plates is not None:
             loaded = carried(self.plates)[self.complete] > 0
             if loaded[loaded.sum(axis=1) == 1].any(axis=0).sum() > 1:
@@ -162,7 +162,7 @@ class Comparison:
 
 
 def beside_plates(soles: Array, rate: float, floor: Ground, outlines: Array | None) -> Mask:
-    """(T,): whether points of the soles (T, n, 3) m are on the floor and on none of the plates' outlines (P, 4, 3) m."""
+    """(T,): whether any point of the soles (T, n, 3) m is on the floor and within no plate's outline (P, 4, 3) m."""
     if outlines is None or len(soles) < 2:
         return np.zeros(len(soles), bool)
     speed = np.linalg.norm(np.gradient(soles, 1 / rate, axis=0), axis=-1)

@@ -26,8 +26,8 @@ SOLE = 0.03  # m
 class Computed:
     """Of T bodies: volume × 985 kg/m³, centres of mass by method and centres of pressure by γ.
 
-    `soles`: the vertices of both soles. `shares`: how much of the pressure, at γ = 10, is on the first plate's side where
-    two carry a load; NaN elsewhere.
+    `soles`: the vertices of both soles. `shares`: how much of the pressure, at γ = 10, is on the first plate's side
+    where two carry a load; NaN elsewhere.
     """
 
     mass: Array  # (T,) kg
@@ -55,7 +55,9 @@ def computed(
     done = 0
     for vertices in pieces(bodies, PIECE):
         part = slice(done, done + len(vertices))
-        rows.append(_piece(vertices, template, None if plates is None else (carried(plates)[part], plates.points[part])))
+        rows.append(
+            _piece(vertices, template, None if plates is None else (carried(plates)[part], plates.points[part]))
+        )
         done += len(vertices)
         progress(done)
     return Computed(
@@ -70,9 +72,7 @@ def computed(
     )
 
 
-def _piece(
-    vertices: NDArray[np.floating], template: ip.BodyTemplate, plates: tuple[Array, Array] | None
-) -> Computed:
+def _piece(vertices: NDArray[np.floating], template: ip.BodyTemplate, plates: tuple[Array, Array] | None) -> Computed:
     ground = under(vertices)
     com = {method: np.asarray(ip.center_of_mass(vertices, template, method), float) for method in METHODS}
     cop = {

@@ -42,7 +42,9 @@ def find(
     ValueError, saying what was expected, if the folder is none, has no markers, or nothing was measured beside them.
     """
     if not folder.is_dir():
-        raise ValueError(f"{folder}: expected a folder of recordings, {'got a file' if folder.exists() else 'not there'}")
+        raise ValueError(
+            f"{folder}: expected a folder of recordings, {'got a file' if folder.exists() else 'not there'}"
+        )
     files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
     trials = [Trial(path.stem, path) for path in files if path.suffix.lower() in MARKERS]
     if not trials:

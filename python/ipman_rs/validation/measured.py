@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data import c3d, force_plates, opensim
-from ..data.force_plates import ForcePlates
+from ..data.force_plates import ForcePlates, between
 from ..data.tracks import TO_Y_UP
 
 Array = NDArray[np.float64]
@@ -20,7 +20,10 @@ CSV_COLUMNS = ("time_s", "com_x_m", "com_y_m", "com_z_m")
 def kind_of(path: Path) -> str | None:
     """What a table holds: "forces", "com", or nothing of use. ValueError, naming the file, if it cannot be read."""
     if path.suffix.lower() == ".csv":
-        return "com" if set(CSV_COLUMNS) <= set(_heads(path)) else None
+        if not set(CSV_COLUMNS) <= set(_heads(path)):
+            return None
+        _csv(path)
+        return "com"
     table = opensim.storage(path)
     return "forces" if opensim.has_plates(table) else "com" if opensim.has_center_of_mass(table) else None
 
@@ -48,7 +51,7 @@ def center_of_mass(path: Path, times: Array) -> Array:
     else:
         table = opensim.storage(path)
         own, points = table.times, opensim.center_of_mass(table)
-    return np.stack([np.interp(times, own, column, left=np.nan, right=np.nan) for column in points.T], axis=1)
+    return between(own, points, times)
 
 
 def _heads(path: Path) -> list[str]:
@@ -67,7 +70,9 @@ def _csv(path: Path) -> tuple[Array, Array]:
         raise ValueError(f"{path}: expected rows of numbers, got none")
     for number, row in rows:
         if len(row) != len(heads):
-            raise ValueError(f"{path}: line {number}: expected {len(heads)} columns, got {len(row)}: is the file complete?")
+            raise ValueError(
+                f"{path}: line {number}: expected {len(heads)} columns, got {len(row)}: is the file complete?"
+            )
     try:
         numbers = np.array([[row[heads.index(name)] for name in CSV_COLUMNS] for _, row in rows], float)
     except ValueError as error:

@@ -164,7 +164,9 @@ def _draw_loads(axis: Axes, one: Comparison) -> None:
     assert one.plates is not None
     for plate in range(one.plates.forces.shape[1]):
         if carried(one.plates)[:, plate].any():
-            axis.plot(one.times, one.plates.forces[:, plate, 1], lw=1, color=f"C{1 + plate}", label=f"plate {plate + 1}")
+            axis.plot(
+                one.times, one.plates.forces[:, plate, 1], lw=1, color=f"C{1 + plate}", label=f"plate {plate + 1}"
+            )
     axis.plot(one.times, one.force[:, 1], color="black", lw=1.6, label="all plates")
     asked = one.weight * (GRAVITY + one.acceleration[:, 1])
     axis.plot(one.times, asked, color=OURS, lw=1.2, label="m (g + acceleration of the fitted CoM)")
@@ -177,7 +179,11 @@ def people(one: Comparison, bodies: PosedSequence, faces: NDArray[np.int64], mar
     """A PNG of three fitted bodies with their markers (T, M, 3), seen along z and one along x."""
     usable = np.flatnonzero(one.complete) if one.complete.any() else np.arange(len(one.times))
     spread = usable[np.linspace(0, len(usable) - 1, 5).round().astype(int)[[1, 2, 3]]]
-    frames = [*spread, spread[1]] if one.kind != "movement in place" else [usable[0], spread[1], *2 * [usable[one.com[usable, 1].argmin()]]]
+    frames = (
+        [*spread, spread[1]]
+        if one.kind != "movement in place"
+        else [usable[0], spread[1], *2 * [usable[one.com[usable, 1].argmin()]]]
+    )
     figure, grid = _canvas(1, 4, (11, 4.6), sharey=True)
     for axis, frame, across in zip(grid[0], frames, (0, 0, 0, 2), strict=True):
         _draw_body(axis, one, np.asarray(bodies[frame], float), faces, markers[frame], int(frame), across)

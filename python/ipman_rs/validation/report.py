@@ -47,8 +47,8 @@ def markdown(records: Sequence[Record], source: str, notes: Sequence[str], pictu
 
 def recordings(records: Iterable[Record]) -> Iterator[str]:
     yield (
-        "| recording | kind | body | shape from | frames | a second | markers, mm | volume × 985, kg | by the plates, kg "
-        "| off | upward force, rms |"
+        "| recording | kind | body | shape from | frames | a second | markers, mm | volume × 985, kg "
+        "| by the plates, kg | off | upward force, rms |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|---|"
     for one in records:
@@ -72,8 +72,8 @@ def centers_of_mass(records: Iterable[Record]) -> Iterator[str]:
         exact = one["com"]["methods"]["exact"]
         axes = [f"{1e3 * rms:.1f} ({1e3 * mean:+.1f})" for rms, mean in zip(exact["rms"], exact["mean"], strict=True)]
         yield (
-            f"| {one['name']} | {one['body']} | {one['fit']['shape_from']} | {one['com']['frames']} | {' | '.join(axes)} "
-            f"| {1e3 * exact['distance']:.1f} |"
+            f"| {one['name']} | {one['body']} | {one['fit']['shape_from']} | {one['com']['frames']} "
+            f"| {' | '.join(axes)} | {1e3 * exact['distance']:.1f} |"
         )
 
 
@@ -92,7 +92,10 @@ def formulations(records: Iterable[Record]) -> Iterator[str]:
 
 
 def standing(records: Iterable[Record]) -> Iterator[str]:
-    yield "| recording | body | shape from | CoM − CoP along x, z | means apart | distance, mean | sway of CoM | sway of CoP |"
+    yield (
+        "| recording | body | shape from | CoM − CoP along x, z | means apart | distance, mean | sway of CoM "
+        "| sway of CoP |"
+    )
     yield "|---|---|---|---|---|---|---|---|"
     for one in _with(records, "standing"):
         found = one["standing"]
@@ -121,7 +124,10 @@ def centers_of_pressure(records: Iterable[Record]) -> Iterator[str]:
 
 
 def references(records: Iterable[Record]) -> Iterator[str]:
-    yield "| recording | phase | body | frames | ours at rest | reference at rest | ours along the force | reference along the force |"
+    yield (
+        "| recording | phase | body | frames | ours at rest | reference at rest | ours along the force "
+        "| reference along the force |"
+    )
     yield "|---|---|---|---|---|---|---|---|"
     for one in records:
         for phase, found in one["cop"].items():
@@ -147,24 +153,24 @@ def shares(records: Iterable[Record]) -> Iterator[str]:
 TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...] = (
     (
         "Weight",
-        "Volume × 985 kg/m³ is the posed mesh's, mean over the frames and range. The plates' mass is the upward force over "
-        "g + the CoM's acceleration, ± over the frames; the last column is m (g + acceleration) against the force.",
+        "Volume × 985 kg/m³ is the posed mesh's, mean over the frames and range. The plates' mass is the upward force "
+        "over g + the CoM's acceleration, ± over the frames; the last column is m (g + acceleration) against the force.",
         recordings,
     ),
     ("Centre of mass", "Of the whole volume against the reference, mm.", centers_of_mass),
     (
         "Formulations of the centre of mass",
-        "Mean distance in space from the reference, mm; in brackets how much too high on average. The paper's figures are of "
-        "another data set.",
+        "Mean distance in space from the reference, mm; in brackets how much too high on average. The paper's figures "
+        "are of another data set.",
         formulations,
     ),
     ("Quiet standing", "Centre of mass and measured centre of pressure on the floor, mm.", standing),
     (
         "Centre of pressure",
         "Mean distance on the floor from the measured centre of pressure, mm: to where it is of a body at rest; to the "
-        "zero-moment point (ZMP), where dynamics puts it, by the acceleration of the fitted centre of mass, and by those of the "
-        "ten parts, so that swinging limbs count; to where the measured force's line through the centre of mass meets the "
-        "floor; and to the paper's for each γ (1/m). In walking, frames on one plate and on two apart.",
+        "zero-moment point (ZMP), where dynamics puts it, by the acceleration of the fitted centre of mass, and by "
+        "those of the ten parts, so that swinging limbs count; to where the measured force's line through the centre of mass "
+        "meets the floor; and to the paper's for each γ (1/m). In walking, frames on one plate and on two apart.",
         centers_of_pressure,
     ),
     ("The same of the reference's centre of mass", "On the frames that have one, mm.", references),
