@@ -176,7 +176,7 @@ def _within(points: Array, outline: Array) -> Mask:
     edges = np.roll(outline, -1, axis=0) - outline
     away = points[..., None, :] - outline
     side = edges[:, 0] * away[..., 1] - edges[:, 1] * away[..., 0]
-    return (side >= 0).all(axis=-1) | (side <= 0).all(axis=-1)
+    return np.asarray((side >= 0).all(axis=-1) | (side <= 0).all(axis=-1))
 
 
 def distances(points: Array, others: Array) -> Array:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+Bodies = PosedSequence | NDArray[np.floating]  # (T, V, 3) m
 
 CELL = 0.01  # m, of the map
 MARGIN = 0.12  # m around the feet
@@ -41,7 +42,7 @@ def moments(one: Comparison) -> dict[str, int]:
     return found or {"all": len(one.times) // 2}
 
 
-def pressure_map(one: Comparison, bodies: PosedSequence, template: ip.BodyTemplate) -> bytes:
+def pressure_map(one: Comparison, bodies: Bodies, template: ip.BodyTemplate) -> bytes:
     """A PNG of the engine's pressure on the floor, seen from above, with the plates and all centres."""
     chosen = moments(one)
     limits = [_limits(one, np.asarray(bodies[frame], float), template, frame) for frame in chosen.values()]
@@ -109,7 +110,7 @@ def _draw_plates(axis: Axes, one: Comparison, frame: int) -> None:
         place, told = plates.points[frame, plate, [0, 2]], f"{plates.loads[frame, plate]:.0f} N"
         axis.plot(*place, "^", color="black", ms=6, mfc="white", zorder=4)
         box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1}
-        axis.annotate(told, place, (9, -14), textcoords="offset points", fontsize=8, bbox=box, zorder=6)
+        axis.annotate(told, (place[0], place[1]), (9, -14), textcoords="offset points", fontsize=8, bbox=box, zorder=6)
 
 
 def over_time(one: Comparison) -> bytes:
@@ -175,7 +176,7 @@ def _draw_loads(axis: Axes, one: Comparison) -> None:
     axis.legend(frameon=False, fontsize=7, ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1))
 
 
-def people(one: Comparison, bodies: PosedSequence, faces: NDArray[np.int64], markers: Array) -> bytes:
+def people(one: Comparison, bodies: Bodies, faces: NDArray[np.int64], markers: Array) -> bytes:
     """A PNG of three fitted bodies with their markers (T, M, 3), seen along z and one along x."""
     usable = np.flatnonzero(one.complete) if one.complete.any() else np.arange(len(one.times))
     spread = usable[np.linspace(0, len(usable) - 1, 5).round().astype(int)[[1, 2, 3]]]

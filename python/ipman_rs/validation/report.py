@@ -169,8 +169,8 @@ TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...]
         "Centre of pressure",
         "Mean distance on the floor from the measured centre of pressure, mm: to where it is of a body at rest; to the "
         "zero-moment point (ZMP), where dynamics puts it, by the acceleration of the fitted centre of mass, and by "
-        "those of the ten parts, so that swinging limbs count; to where the measured force's line through the centre of mass "
-        "meets the floor; and to the paper's for each γ (1/m). In walking, frames on one plate and on two apart.",
+        "those of the ten parts, so that swinging limbs count; to where the measured force's line through the centre of "
+        "mass meets the floor; and to the paper's for each γ (1/m). In walking, frames on one plate and on two apart.",
         centers_of_pressure,
     ),
     ("The same of the reference's centre of mass", "On the frames that have one, mm.", references),
