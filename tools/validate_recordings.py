@@ -23,8 +23,9 @@ from ipman_rs.validation import report
 OUT = ROOT / "out" / "validation"
 IMAGES = ROOT / "docs" / "images"
 # Folder, body, and whether the standing recording's shape is kept (auto) or each finds its own (none).
-RUNS = [(folder, body, "auto") for body in ("anny-lite", "anny") for folder in ("squat_forceplates", "gait2354", "c3d")]
-RUNS += [("squat_forceplates", body, "none") for body in ("anny-lite", "anny")]
+RUNS = [(folder, "anny-lite", "auto") for folder in ("squat_forceplates", "gait2354", "c3d")]
+RUNS += [("squat_forceplates", "anny-lite", "none")]
+RUNS += [(folder, "anny", "auto") for folder in ("squat_forceplates", "gait2354")]
 SHOWN = RUNS[0][1:]  # of which the document has pictures
 PICTURES = {
     "squats-bodies.png": ("squat_forceplates", "squats1/bodies.png"),

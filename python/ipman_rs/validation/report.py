@@ -154,7 +154,7 @@ TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...]
     (
         "Weight",
         "Volume × 985 kg/m³ is the posed mesh's, mean over the frames and range. The plates' mass is the upward force "
-        "over g + the CoM's acceleration, ± over the frames; the last column is m (g + acceleration) against the force.",
+        "over g + the CoM's acceleration, ± over the frames; the last column: m (g + acceleration) against the force.",
         recordings,
     ),
     ("Centre of mass", "Of the whole volume against the reference, mm.", centers_of_mass),
@@ -169,8 +169,8 @@ TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...]
         "Centre of pressure",
         "Mean distance on the floor from the measured centre of pressure, mm: to where it is of a body at rest; to the "
         "zero-moment point (ZMP), where dynamics puts it, by the acceleration of the fitted centre of mass, and by "
-        "those of the ten parts, so that swinging limbs count; to where the measured force's line through the centre of "
-        "mass meets the floor; and to the paper's for each γ (1/m). In walking, frames on one plate and on two apart.",
+        "those of the ten parts, so that swinging limbs count; to where the measured force's line through the centre "
+        "of mass meets the floor; and to the paper's for each γ (1/m). In walking, one plate and two plates apart.",
         centers_of_pressure,
     ),
     ("The same of the reference's centre of mass", "On the frames that have one, mm.", references),
