@@ -89,6 +89,7 @@ def test_weight_of_somebody_who_bounces(lite, standing):
     assert found["mass"]["plates"] == pytest.approx(65.0, rel=1e-3)
     assert found["mass"]["plates_std"] < 0.02
     assert found["force"]["share"] < 1e-3
+    assert found["force"]["at_rest"] == pytest.approx(0.03 * omega**2 / GRAVITY / np.sqrt(2), rel=0.05)
     assert found["cop"]["all"]["frames"] == FRAMES - 2 * 9  # 1/6 s at both ends, without accelerations
 
 

@@ -50,15 +50,21 @@ def _std(values: Array) -> float | None:
 
 
 def _force(one: Comparison) -> dict[str, Any] | None:
-    """The upward force that the fitted body's acceleration asks for, m (g + a), against the plates'."""
+    """The upward force that the fitted body's acceleration asks for, m (g + a), against the plates'; and the weight m g,
+    which knows no acceleration (`at_rest`), as shares of the weight."""
     if one.plates is None:
         return None
     used = one.complete & np.isfinite(one.acceleration[:, 1])
     if not used.any():
         return None
-    asked = one.weight * (GRAVITY + one.acceleration[used, 1])
-    off = asked - one.force[used, 1]
-    return {"rms": _rms(off), "share": _rms(off) / (one.weight * GRAVITY), "frames": int(used.sum())}
+    weight, upward = one.weight * GRAVITY, one.force[used, 1]
+    off = one.weight * (GRAVITY + one.acceleration[used, 1]) - upward
+    return {
+        "rms": _rms(off),
+        "share": _rms(off) / weight,
+        "at_rest": _rms(weight - upward) / weight,
+        "frames": int(used.sum()),
+    }
 
 
 def _against_reference(one: Comparison) -> dict[str, Any] | None:

@@ -55,8 +55,8 @@ def pressure_map(one: Comparison, bodies: Bodies, template: ip.BodyTemplate) -> 
     axes[0][0].set_ylabel("z, m")
     if one.plates is not None:
         axes[0][0].plot([], [], "^", color="black", ms=6, mfc="white", label="CoP of a plate, with its load")
-    handles, labels = axes[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
+    told = {name: mark for axis in axes[0] for mark, name in zip(*axis.get_legend_handles_labels(), strict=True)}
+    figure.legend(list(told.values()), list(told), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
     return _png(figure)
 
 
@@ -83,7 +83,8 @@ def _draw_map(
     if one.plates is not None:
         _draw_plates(axis, one, frame)
     for name, place, (mark, color, size) in _places(one):
-        axis.plot(*place[frame, [0, 2]], mark, color=color, ms=size, mec="white", label=name, zorder=5)
+        if np.isfinite(place[frame]).all():
+            axis.plot(*place[frame, [0, 2]], mark, color=color, ms=size, mec="white", label=name, zorder=5)
     axis.set(xlim=(low[0], high[0]), ylim=(high[1], low[1]), xlabel="x, m", aspect="equal")
 
 

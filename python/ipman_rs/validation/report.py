@@ -58,7 +58,7 @@ def recordings(records: Iterable[Record]) -> Iterator[str]:
         if mass["plates"] is not None:
             plates = f"{_number(mass['plates'])} ± {_number(mass['plates_std'])}"
             off = f"{mass['volume_mean'] / mass['plates'] - 1:+.1%}"
-        pushed = f"{force['rms']:.0f} N, {force['share']:.1%}" if force else ""
+        pushed = f"{force['rms']:.0f} N, {force['share']:.1%} (at rest {force['at_rest']:.1%})" if force else ""
         yield (
             f"| {one['name']} | {one['kind']} | {one['body']} | {one['fit']['shape_from']} | {one['frames']} "
             f"| {one['rate_hz']:.0f} | {1e3 * one['fit']['markers']:.1f} | {spread} | {plates} | {off} | {pushed} |"
@@ -154,7 +154,8 @@ TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...]
     (
         "Weight",
         "Volume × 985 kg/m³ is the posed mesh's, mean over the frames and range. The plates' mass is the upward force "
-        "over g + the CoM's acceleration, ± over the frames; the last column: m (g + acceleration) against the force.",
+        "over g + the CoM's acceleration, ± over the frames; the last column: m (g + acceleration) against the "
+        "force, and the weight m g alone (at rest).",
         recordings,
     ),
     ("Centre of mass", "Of the whole volume against the reference, mm.", centers_of_mass),
