@@ -104,7 +104,7 @@ def carried(plates: ForcePlates) -> Array:
 
 def under(vertices: NDArray[np.floating]) -> ip.Ground:
     """The level ground under the lowest vertex of each body (..., V, 3)."""
-    lowest = np.asarray(vertices[..., 1].min(axis=-1), float)
+    lowest = np.nan_to_num(np.asarray(vertices[..., 1].min(axis=-1), float))  # a ground is finite
     return ip.Ground(np.broadcast_to([0.0, 1.0, 0.0], (*lowest.shape, 3)), lowest)
 
 
