@@ -50,8 +50,8 @@ def _std(values: Array) -> float | None:
 
 
 def _force(one: Comparison) -> dict[str, Any] | None:
-    """The upward force that the fitted body's acceleration asks for, m (g + a), against the plates', N and as a share of
-    the weight; `at_rest`: the weight itself against the plates'."""
+    """The upward force that the fitted body's acceleration asks for, m (g + a), against the plates', N and as a share
+    of the weight; `at_rest`: the weight itself against the plates'."""
     if one.plates is None:
         return None
     used = one.complete & np.isfinite(one.acceleration[:, 1])
