@@ -106,7 +106,7 @@ def test_real_walking(shared):
         opensim.center_of_mass(table)[0], [table.columns[f"center_of_mass_{x}"][0] for x in "XYZ"]
     )
     among = np.nanmean(walking.joints[np.isfinite(com).all(axis=1)], axis=1) - com[np.isfinite(com).all(axis=1)]
-    assert np.linalg.norm(among, axis=1).max() < 0.2
+    assert np.abs(among[:, [0, 2]]).max() < 0.06  # most markers are on the legs
     plates = opensim.plates(opensim.storage(folder / "subject01_walk1_grf.mot"))
     assert plates.forces.shape == (1501, 2, 3)
     np.testing.assert_array_equal(plates.forces[0, 0], [101.5119767, 745.4661142, -47.44870554])
@@ -189,10 +189,8 @@ def test_forces_and_centres_of_mass_in_other_units(folder):
     miniature.center_of_mass(folder / "sway_com.sto", scale=1000.0)
     with pytest.raises(ValueError, match=r"sway_com.sto: looks like millimetres: a centre of mass 9[0-9]+ from"):
         data.open("opensim", folder)
-    miniature.center_of_mass(folder / "sway_com.sto", scale=2.0)
-    with pytest.raises(
-        ValueError, match=r"sway_com.sto: the centre of mass is 1\.\d+ m from the middle of the markers"
-    ):
+    miniature.center_of_mass(folder / "sway_com.sto", scale=3.0)
+    with pytest.raises(ValueError, match=r"sway_com.sto: the centre of mass is 1.15 m outside the markers of"):
         data.open("opensim", folder)
 
 

@@ -106,7 +106,7 @@ def between(times: Array, values: Array, wanted: ArrayLike) -> Array:
     outside = (wanted < times[0] - slack) | (wanted > times[-1] + slack)
     found = np.stack([np.interp(wanted, times, column) for column in rows.T], axis=-1)
     found[outside] = np.nan
-    return found.reshape(len(wanted), *values.shape[1:])
+    return found.astype(np.float64).reshape(len(wanted), *values.shape[1:])
 
 
 def read(path: str | os.PathLike[str], up: str | None = None) -> ForcePlates:
@@ -270,7 +270,7 @@ def open(path: str | os.PathLike[str], split: str | None = None, *, up: str | No
     names = list(dict.fromkeys(name for found in recordings for name in found.names))
 
     parts = [of_file(found, file.stem, names, up) for file, found in zip(files, recordings, strict=True)]
-    return demanded(path, Joined(sequences.measured_alike(parts)))
+    return demanded(Path(path), Joined(sequences.measured_alike(parts)))
 
 
 def of_file(found: c3d.Recording, name: str, markers: Sequence[str], up: str | None = None) -> Frames:

@@ -97,8 +97,8 @@ def _pressure(maps: list[PressureMaps]) -> PressureMaps:
     first = maps[0]
     if any((each.cell, each.values.shape[1:]) != (first.cell, first.values.shape[1:]) for each in maps):
         raise ValueError("pressure: the mats have other cells; open the files one by one")
-    placed = [
+    origin, e1, e2 = (
         np.concatenate([np.broadcast_to(getattr(each, name), (len(each.values), 3)) for each in maps])
         for name in ("origin", "e1", "e2")
-    ]
-    return PressureMaps(np.concatenate([each.values for each in maps]), *placed, first.cell)[:]
+    )
+    return PressureMaps(np.concatenate([each.values for each in maps]), origin, e1, e2, first.cell)[:]

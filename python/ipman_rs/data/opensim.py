@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 COM = "center_of_mass"  # begins the columns of the whole body's centre of mass
 FAR = 20.0  # m: no plate or person is farther from the origin of a laboratory
-BESIDE = 0.5  # m: a centre of mass farther than that from all markers is in other units or axes
+BESIDE = 0.5  # m: a centre of mass farther than that outside the markers is in other units or axes
 # ground_force_vx beside ground_torque_x; ground_force_1_vx beside ground_force_1_mx; f1_1 beside p1_1 and m1_1.
 OPENSIM_FORCE = re.compile(r"(.*)vx$")
 C3D_FORCE = re.compile(r"f(\d+)_1$")
@@ -216,7 +216,7 @@ def open(path: str | os.PathLike[str], split: str | None = None) -> DataSet:
         _frames(file.stem, found, markers, *beside)
         for file, found, beside in zip(files, tracks, _beside(files), strict=True)
     ]
-    return demanded(path, Joined(sequences.measured_alike(parts)))
+    return demanded(Path(path), Joined(sequences.measured_alike(parts)))
 
 
 def _frames(name: str, tracks: Tracks, markers: list[str], forces: Path | None, com: Path | None) -> Frames:
@@ -243,14 +243,15 @@ def _com_at(table: Storage, tracks: Tracks) -> Array:
     """(T, 3) m at the markers' times; NaN outside the storage's. ValueError if it is nowhere near the markers."""
     points = center_of_mass(table)
     found = between(table.times, points, tracks.times)
-    weights = tracks.confidence[..., None]
-    with np.errstate(invalid="ignore"):
-        middle = (weights * tracks.points).sum(axis=1) / weights.sum(axis=1)
-    away = np.linalg.norm(found - middle, axis=1)
+    seen = tracks.confidence.any(axis=1)
+    shown = tracks.confidence[seen][..., None] > 0
+    low = np.where(shown, tracks.points[seen], np.inf).min(axis=1)
+    high = np.where(shown, tracks.points[seen], -np.inf).max(axis=1)
+    away = np.linalg.norm(np.maximum(0, np.maximum(low - found[seen], found[seen] - high)), axis=1)
     if np.isfinite(away).any() and np.nanmedian(away) > BESIDE:
         raise ValueError(
-            f"{table.source}: the centre of mass is {np.nanmedian(away):.2f} m from the middle of the markers of "
-            f"{tracks.source}; expected it among them: both in metres, y up, of one recording?"
+            f"{table.source}: the centre of mass is {np.nanmedian(away):.2f} m outside the markers of {tracks.source}; "
+            "expected it among them: are both in metres, y up, and of one recording?"
         )
     return found
 
