@@ -34,7 +34,6 @@ PICTURES = {
     "standing-pressure.png": ("squat_forceplates", "static1/pressure.png"),
     "walking-over-time.png": ("gait2354", "subject01_walk1/over_time.png"),
     "walking-pressure.png": ("gait2354", "subject01_walk1/pressure.png"),
-    "walking-bodies.png": ("gait2354", "subject01_walk1/bodies.png"),
 }
 TABLES = {
     "recordings": report.recordings,

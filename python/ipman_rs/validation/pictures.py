@@ -231,5 +231,5 @@ def _png(figure: Figure) -> bytes:
     for axis in figure.axes:
         axis.spines[["top", "right"]].set_visible(False)
     stream = io.BytesIO()
-    figure.savefig(stream, dpi=110, format="png")
+    figure.savefig(stream, dpi=90, format="png")
     return stream.getvalue()

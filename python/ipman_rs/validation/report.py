@@ -125,10 +125,10 @@ def centers_of_pressure(records: Iterable[Record]) -> Iterator[str]:
 
 def references(records: Iterable[Record]) -> Iterator[str]:
     yield (
-        "| recording | phase | body | frames | ours at rest | reference at rest | ours along the force "
+        "| recording | phase | body | shape from | frames | ours at rest | reference at rest | ours along the force "
         "| reference along the force |"
     )
-    yield "|---|---|---|---|---|---|---|---|"
+    yield "|---|---|---|---|---|---|---|---|---|"
     for one in records:
         for phase, found in one["cop"].items():
             if not found.get("reference_frames"):
@@ -138,7 +138,10 @@ def references(records: Iterable[Record]) -> Iterator[str]:
                 for name in (MODELS[0], MODELS[3])
                 for whose in ("on_reference_frames", "reference")
             ]
-            yield f"| {one['name']} | {phase} | {one['body']} | {found['reference_frames']} | {' | '.join(cells)} |"
+            yield (
+                f"| {one['name']} | {phase} | {one['body']} | {one['fit']['shape_from']} | {found['reference_frames']} "
+                f"| {' | '.join(cells)} |"
+            )
 
 
 def shares(records: Iterable[Record]) -> Iterator[str]:
