@@ -206,7 +206,7 @@ class _Plate:
             hint = "; looks like millimetres" if area > 100 else ""
             raise ValueError(f"{self.place}: CORNERS: expected a plate of a decimetre to two metres, got {sides}{hint}")
         x, z = x / np.linalg.norm(x), z / area
-        return np.stack([x, np.cross(z, x), z], axis=1)
+        return np.stack([x, np.cross(z, x), z], axis=1).astype(np.float64)
 
 
 def _of_plate(found: c3d.Recording, name: str, index: int, size: int) -> list[float]:
