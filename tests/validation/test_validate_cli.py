@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -213,23 +211,9 @@ def test_wrong_usage(run, folder, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.fixture
-def real():
-    """real("gait2354") -> that folder of measured data."""
-    root = os.environ.get("IPMAN_SHARED_DATA") or Path(__file__).resolve().parents[3] / "shared" / "data"
-
-    def folder(name):
-        path = Path(root) / name
-        if not path.is_dir():
-            pytest.skip(f"{name} is not at {root}: set IPMAN_SHARED_DATA")
-        return path
-
-    return folder
-
-
-def test_somebody_walks(run, real, tmp_path):
+def test_somebody_walks(run, shared, tmp_path):
     """OpenSim's example on a treadmill, markers in mm at 60 Hz, plates in m at 600 Hz; its model weighs 72.6 kg."""
-    said = run(real("gait2354"), "-o", tmp_path, "--rate", "30")
+    said = run(shared("gait2354"), "-o", tmp_path, "--rate", "30")
     assert said.code == 0, said.err
     assert "g2354_bodykin.sto: taken as the centre of mass of subject01_walk1" in said.out
     walk = records(tmp_path)["subject01_walk1"]
