@@ -15,6 +15,7 @@ from .fit import fit
 from .options import GROUND, PRESETS, UP
 from .predict import predict
 from .train import train
+from .validate import validate
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -43,6 +44,7 @@ def main() -> None:
     ipman demo -o out               the named poses of the built-in body
     ipman analyze body.obj -o out   your own mesh; open out/report.html afterwards
     ipman fit photo.jpg -o out      a body for the person in a photo
+    ipman validate folder/ -o out   the engine against force plates and OpenSim
     """
 
 
@@ -50,6 +52,7 @@ main.add_command(fit)
 main.add_command(benchmark)
 main.add_command(train)
 main.add_command(predict)
+main.add_command(validate)
 main.add_command(data)
 
 
