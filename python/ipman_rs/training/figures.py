@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 import ipman_rs.torch as ipt
-from ipman_rs.evaluation import mpjpe, pa_mpjpe, pve
+from ipman_rs.evaluation import mpjpe, pa_mpjpe, pve, root_tilt
 
 from .batch import Batch
 from .model import Estimate
@@ -72,7 +72,7 @@ def figures(estimate: Estimate, truth: Batch, posing: Posing) -> Figures:
         bose=np.where(world, balanced.numpy(), np.nan),
         strict=np.where(world, strict.numpy(), np.nan),
         lowest=np.where(world, lowest.numpy(), np.nan),
-        tilt=np.where(body & world, _tilt(estimate.rotations[:, 0].double(), truth).numpy(), np.nan),
+        tilt=np.where(body & world, _tilt(estimate.rotations[:, 0].double(), truth), np.nan),
     )
 
 
@@ -89,8 +89,8 @@ def _columns(rotations: Tensor) -> Tensor:
     return torch.cat([rotations[..., 0], rotations[..., 1]], dim=-1)
 
 
-def _tilt(root: Tensor, truth: Batch) -> Tensor:
-    """The angle between the directions that the two pelvises have for up. Both are (B, 3, 3) in camera axes."""
-    up = torch.einsum("bij,bj->bi", truth.camera.double(), truth.up.double())
-    own, true = (torch.einsum("bij,bi->bj", turn, up) for turn in (root, truth.pose[:, 0].double()))
-    return torch.atan2(torch.linalg.cross(own, true).norm(dim=1), (own * true).sum(dim=1))
+def _tilt(root: Tensor, truth: Batch) -> Array:
+    """Radians (B,) between up as the estimated pelvis, turned by (B, 3, 3) in camera axes, has it, and as the true one."""
+    to_world = truth.camera.double().transpose(1, 2)
+    turns = (to_world @ turn for turn in (root, truth.pose[:, 0].double()))
+    return np.asarray(root_tilt(*(turn.numpy() for turn in turns), truth.ground))
