@@ -90,7 +90,7 @@ def _columns(rotations: Tensor) -> Tensor:
 
 
 def _tilt(root: Tensor, truth: Batch) -> Array:
-    """Radians (B,) between up as the estimated pelvis, turned by (B, 3, 3) in camera axes, has it, and as the true one."""
+    """Radians (B,) between true and estimated up, as seen by pelvises that turn (B, 3, 3) in camera axes."""
     to_world = truth.camera.double().transpose(1, 2)
     turns = (to_world @ turn for turn in (root, truth.pose[:, 0].double()))
     return np.asarray(root_tilt(*(turn.numpy() for turn in turns), truth.ground))
