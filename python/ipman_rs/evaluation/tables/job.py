@@ -1,0 +1,214 @@
+"""One evaluation: predictions against a data set, in pieces that are done once and kept.
+
+A piece is a file of the figures of some thousand frames. It is named by its number, appears when it is whole, and says
+what it was made of. So an evaluation that is killed goes on where it was, any part of the pieces can be done elsewhere,
+and what comes out is the same: the final figures are made of all pieces, however they came about.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ipman_rs import __version__, data
+from ipman_rs.body import safe_npz
+from ipman_rs.data.frames import DataSet, Frames
+
+from . import joints
+from . import predictions as predicted
+from .columns import Columns, columns
+from .models import Models
+from .rows import being_written
+
+PIECE = 4096  # frames: some seconds of work, and small in memory
+OWN = "own"  # the data set of the user's own files, in the form of predictions
+
+
+@dataclass(frozen=True)
+class Source:
+    """Which data set: plain words, so that another process, or another machine, can open the same."""
+
+    name: str
+    path: str
+    split: str | None = None
+
+    def open(self, unpacked: Path) -> DataSet:
+        """ValueError naming the file where there is none or something is wrong."""
+        if self.name == OWN:
+            return predicted.read(self.path, unpacked)
+        options = {} if self.split is None else {"split": self.split}
+        return data.open(self.name, self.path, **options)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Number `index` of `count`, from 1: every count-th piece."""
+
+    index: int = 1
+    count: int = 1
+
+    def of(self, pieces: int) -> range:
+        return range(self.index - 1, pieces, self.count)
+
+
+@dataclass(frozen=True)
+class Job:
+    """The figures of one file of predictions. All words are plain: it travels to other processes.
+
+    folder: of the pieces. models: folder of model files. partial: frames without prediction are left out instead of
+    being an error.
+    """
+
+    name: str
+    predictions: str
+    source: Source
+    folder: str
+    models: str | None = None
+    regressor: str | None = None
+    preset: str = "paper-r"
+    partial: bool = False
+    piece: int = PIECE
+
+    @cached_property
+    def place(self) -> Path:
+        return Path(self.folder) / "methods" / self.name
+
+    @cached_property
+    def unpacked(self) -> Path:
+        return Path(self.folder) / "unpacked"
+
+    @cached_property
+    def data(self) -> DataSet:
+        return self.source.open(self.unpacked)
+
+    @cached_property
+    def estimates(self) -> predicted.Predictions:
+        return predicted.read(self.predictions, self.unpacked)
+
+    @cached_property
+    def bodies(self) -> Models:
+        return Models(None if self.models is None else Path(self.models))
+
+    @cached_property
+    def joint_regressor(self) -> NDArray[np.floating] | None:
+        return None if self.regressor is None else joints.read_regressor(Path(self.regressor))
+
+    @property
+    def pieces(self) -> int:
+        return -(-len(self.data) // self.piece)
+
+    def frames(self, number: int) -> int:
+        """How many frames a piece has."""
+        return min(self.piece, len(self.data) - number * self.piece)
+
+    def begin(self) -> None:
+        """Makes the folder; ValueError where it holds the figures of something else, or lengths cannot fit."""
+        self.place.mkdir(parents=True, exist_ok=True)
+        file = self.place / "made_of.json"
+        if file.exists():
+            self._compare(json.loads(file.read_text()))
+        if len(self.estimates) < len(self.data) and not self.partial:
+            raise ValueError(
+                f"{self.predictions}: has {len(self.estimates):,} frames, but {self.source.name} has {len(self.data):,}; "
+                "--partial leaves out those without prediction"
+            )
+        with being_written(file) as out:
+            out.write((json.dumps(self.made_of, indent=1) + "\n").encode())
+
+    @cached_property
+    def made_of(self) -> dict[str, Any]:
+        """All that decides the figures."""
+        return {
+            "predictions": predicted.fingerprint(Path(self.predictions)),
+            "data": self.source.name,
+            "path": str(Path(self.source.path).resolve()) if self.source.name != OWN else "",
+            "content": predicted.fingerprint(Path(self.source.path)) if self.source.name == OWN else "",
+            "split": self.source.split,
+            "frames": len(self.data),
+            "regressor": None if self.regressor is None else predicted.fingerprint(Path(self.regressor)),
+            "preset": self.preset,
+            "partial": self.partial,
+            "piece": self.piece,
+            "version": __version__,
+        }
+
+    @cached_property
+    def key(self) -> str:
+        return hashlib.sha256(json.dumps(self.made_of, sort_keys=True).encode()).hexdigest()
+
+    def _compare(self, stored: dict[str, Any]) -> None:
+        other = [name for name, value in self.made_of.items() if stored.get(name) != value]
+        if other:
+            raise ValueError(
+                f"{self.place}: holds figures of another evaluation ({', '.join(other)} differ); choose another folder "
+                "with -o, or delete this one"
+            )
+
+    def run(self, shard: Shard = Shard(), progress: Callable[[int], None] = lambda frames: None) -> None:
+        """Does the pieces of a shard that are not there yet; `progress` is told how many frames were done more."""
+        for number in shard.of(self.pieces):
+            if not self.done(number):
+                self.measure(number)
+            progress(self.frames(number))
+
+    def measure(self, number: int) -> None:
+        """Does a piece. ValueError where frames have no prediction or something does not fit."""
+        start = number * self.piece
+        found = columns(self, start, start + self.frames(number))
+        with being_written(self.file(number)) as file:
+            np.savez(file, key=np.str_(self.key), **found)
+
+    def file(self, number: int) -> Path:
+        return self.place / f"{number:06d}.npz"
+
+    def done(self, number: int) -> bool:
+        """Whether a piece is there, whole, and of this evaluation."""
+        try:
+            return self.file(number).exists() and str(safe_npz.read(self.file(number), "key")) == self.key
+        except ValueError:
+            return False
+
+    def missing(self) -> list[int]:
+        return [number for number in range(self.pieces) if not self.done(number)]
+
+    def results(self) -> Iterator[Columns]:
+        """The figures of all pieces, in the order of the frames. ValueError where one is missing."""
+        for number in range(self.pieces):
+            yield self.result(number)
+
+    def result(self, number: int) -> Columns:
+        names = safe_npz.names(self.file(number)) - {"key"}
+        return {name: safe_npz.read(self.file(number), name) for name in sorted(names)}
+
+    def pair(self, rows: slice) -> tuple[Frames, Frames, NDArray[np.int64]]:
+        """True and estimated frames of the same names, and their numbers. ValueError where some have no estimate."""
+        true = self.data[rows]
+        where = self.estimates.index.find(true.names)
+        if (where < 0).any() and not self.partial:
+            lacking = true.names[where < 0]
+            raise ValueError(
+                f"{self.predictions}: no prediction for {len(lacking)} of the frames {true.names[0]} to "
+                f"{true.names[-1]} of {self.source.name}, such as {lacking[0]!r}; the file's names are like "
+                f"{self.estimates.columns['names'][:1][0]!r}; --partial leaves them out"
+            )
+        there = np.flatnonzero(where >= 0)
+        return true[there], self.estimates[where[there]], rows.start + there
+
+
+def methods(files: Sequence[Path]) -> list[str]:
+    """A name for each file of predictions, its own where no other has it."""
+    found: list[str] = []
+    for path in files:
+        name, number = path.stem, 2
+        while name in found:
+            name, number = f"{path.stem}-{number}", number + 1
+        found.append(name)
+    return found

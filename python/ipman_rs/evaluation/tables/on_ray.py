@@ -1,0 +1,55 @@
+"""The shards of an evaluation as tasks of Ray (the extra `ray`), on this machine or a cluster.
+
+The tasks write their pieces into the evaluation's folder, so on a cluster it must lie on a disk that all machines see,
+as must the predictions, the data and the models. What comes out is the same to the bit, for it is made of the pieces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from .job import Job, Shard
+
+
+def run(jobs: list[Job], progress: Callable[[int], None], address: str | None = None) -> None:
+    """Does what is missing. `progress` is told how many frames were done more. ValueError without ray, and for what the
+    tasks raise; their pieces are kept."""
+    try:
+        import ray
+    except ImportError as error:
+        raise ValueError("--ray needs ray: pip install 'ipman_rs[ray]'") from error
+    begun_here = not ray.is_initialized()
+    if begun_here:
+        ray.init(address=address, include_dashboard=False, log_to_driver=False, configure_logging=False)
+    try:
+        _run(ray, jobs, progress)
+    finally:
+        if begun_here:
+            ray.shutdown()
+
+
+def _run(ray: Any, jobs: list[Job], progress: Callable[[int], None]) -> None:
+    tasks = ray.remote(num_cpus=1, max_retries=2)(_shard)
+    workers = max(1, int(ray.cluster_resources().get("CPU", 1)))
+    waiting = {}
+    for job in jobs:
+        # Several a worker: they end at about the same time although pieces differ.
+        count = max(1, min(4 * workers, job.pieces))
+        waiting |= {tasks.remote(job, Shard(index + 1, count)): (job, Shard(index + 1, count)) for index in range(count)}
+    while waiting:
+        done, _ = ray.wait(list(waiting), num_returns=1)
+        for each in done:
+            try:
+                ray.get(each)
+            except ray.exceptions.RayTaskError as error:
+                raise error.cause if isinstance(error.cause, ValueError) else ValueError(str(error.cause)) from None
+            job, shard = waiting.pop(each)
+            progress(sum(job.frames(number) for number in shard.of(job.pieces)))
+
+
+def _shard(job: Job, shard: Shard) -> None:
+    import ipman_rs
+
+    ipman_rs.set_num_threads(1)  # each task has one core
+    job.run(shard)
