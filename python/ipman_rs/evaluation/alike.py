@@ -1,0 +1,66 @@
+"""numpy and torch alike: a metric is written once, on arrays, and given tensors it returns tensors.
+
+Metrics are no losses: the numbers of a tensor are copied to the CPU, computed there in float64 as those of an array
+are, so to the same bits, and the results go back to the tensor's device without a gradient.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Callable
+from typing import Any, ParamSpec, TypeAlias, TypeVar
+
+import numpy as np
+
+AnyGround: TypeAlias = Any  # ipman_rs.Ground or ipman_rs.torch.Ground
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
+
+
+def alike(metric: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """The metric for arrays and for tensors; a ground may be that of `ipman_rs` or of `ipman_rs.torch`."""
+
+    @functools.wraps(metric)
+    def either(*args: Parameters.args, **options: Parameters.kwargs) -> Result:
+        given = [*args, *options.values()]
+        if not any(map(is_torch, given)):
+            return metric(*args, **options)
+        arrays = [as_array(value) for value in args]
+        found = metric(*arrays, **{name: as_array(value) for name, value in options.items()})  # type: ignore[arg-type]
+        tensors = [value for value in given if hasattr(value, "device") and is_torch(value)]
+        return _as_tensors(found, tensors[0].device) if tensors else found
+
+    return either
+
+
+def is_torch(value: Any) -> bool:
+    """Whether it is a tensor or a ground of tensors. Never imports torch."""
+    torch = sys.modules.get("torch")
+    return torch is not None and (isinstance(value, torch.Tensor) or type(value).__module__ == "ipman_rs.torch.ground")
+
+
+def as_array(value: Any) -> Any:
+    """A tensor's numbers, a ground on arrays; anything else as it is."""
+    if not is_torch(value):
+        return value
+    import torch
+
+    from ipman_rs.torch.ground import Ground as TorchGround
+    from ipman_rs.torch.ground import as_numpy_ground
+    from ipman_rs.torch.threads import follow_torch
+
+    follow_torch()  # the core is going to compute on as many threads
+    if isinstance(value, TorchGround):
+        return as_numpy_ground(value)
+    return (value.float() if value.dtype == torch.bfloat16 else value).numpy(force=True)
+
+
+def _as_tensors(found: Any, device: Any) -> Any:
+    import torch
+
+    if isinstance(found, tuple):
+        parts = [_as_tensors(part, device) for part in found]
+        return type(found)(*parts) if hasattr(found, "_fields") else tuple(parts)
+    return torch.from_numpy(np.array(found)).to(device)
