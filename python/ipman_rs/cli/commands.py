@@ -10,6 +10,7 @@ import click
 
 from .benchmark import benchmark
 from .errors import FileError
+from .evaluate import evaluate
 from .fit import fit
 from .options import GROUND, PRESETS, UP
 
@@ -40,11 +41,13 @@ def main() -> None:
     ipman demo -o out               the named poses of the built-in body
     ipman analyze body.obj -o out   your own mesh; open out/report.html afterwards
     ipman fit photo.jpg -o out      a body for the person in a photo
+    ipman evaluate pred.npz --data own --path true.npz -o out   predictions against the truth
     """
 
 
 main.add_command(fit)
 main.add_command(benchmark)
+main.add_command(evaluate)
 
 
 @main.command()

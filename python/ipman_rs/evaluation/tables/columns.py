@@ -17,7 +17,7 @@ from ipman_rs.body import BodyModel
 from ipman_rs.data.frames import Frames
 from ipman_rs.ground import Ground
 
-from .. import bose, com_error, cop_error, foot_skating, hover, moyo, mpjpe, pa_mpjpe, penetration, pve, tilt
+from .. import bose, com_error, cop_error, foot_skating, hover, moyo, mpjpe, pa_mpjpe, penetration, pve, reasons, tilt
 from .joints import joints_of
 from .models import Bodies
 
@@ -48,7 +48,8 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
     """Of frames that belong together row by row. ValueError where a body model is missing or shapes do not fit."""
     truth, guess = job.bodies.posed(true), job.bodies.posed(estimated)
     ground = true.ground if estimated.ground is None else estimated.ground
-    found: Columns = {"names": true.names, "sequences": true.sequences}
+    unknown = {"prediction not finite": ~_finite(guess), "truth not finite": ~_finite(truth)}
+    found: Columns = {"names": true.names, "sequences": true.sequences, "why": reasons(unknown)}
     found |= _points(truth, guess, job.joint_regressor)
     if ground is not None:
         found |= _tilt(truth, guess, ground, true.ground or ground)
@@ -58,6 +59,13 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
             found |= _pressure(guess.vertices, guess.model, ground, true, job.preset)
             found["skating"] = foot_skating(guess.vertices[:, soles(guess.model)], ground, true.sequences)
     return found
+
+
+def _finite(bodies: Bodies) -> NDArray[np.bool_]:
+    points = bodies.joints if bodies.vertices is None else bodies.vertices
+    if points is None:
+        return np.array(True)  # there is none in any frame: no reason of single ones
+    return np.isfinite(points).all(axis=(1, 2))
 
 
 def _points(truth: Bodies, guess: Bodies, regressor: NDArray[Any] | None) -> Columns:

@@ -39,12 +39,15 @@ class Source:
     name: str
     path: str
     split: str | None = None
+    options: tuple[tuple[str, str | float], ...] = ()
 
     def open(self, unpacked: Path) -> DataSet:
         """ValueError naming the file where there is none or something is wrong."""
         if self.name == OWN:
             return predicted.read(self.path, unpacked)
-        options = {} if self.split is None else {"split": self.split}
+        options = dict(self.options) if self.split is None else {"split": self.split, **dict(self.options)}
+        if not Path(self.path).exists():
+            raise ValueError(f"{self.path}: there is no such file or folder; it should hold the data set {self.name}")
         return data.open(self.name, self.path, **options)
 
 
@@ -132,6 +135,7 @@ class Job:
             "path": str(Path(self.source.path).resolve()) if self.source.name != OWN else "",
             "content": predicted.fingerprint(Path(self.source.path)) if self.source.name == OWN else "",
             "split": self.source.split,
+            "options": [list(each) for each in self.source.options],
             "frames": len(self.data),
             "regressor": None if self.regressor is None else predicted.fingerprint(Path(self.regressor)),
             "preset": self.preset,
@@ -152,12 +156,12 @@ class Job:
                 "with -o, or delete this one"
             )
 
-    def run(self, shard: Shard = Shard(), progress: Callable[[int], None] = lambda frames: None) -> None:
+    def run(self, shard: Shard, progress: Callable[[int], None] = lambda frames: None) -> None:
         """Does the pieces of a shard that are not there yet; `progress` is told how many frames were done more."""
         for number in shard.of(self.pieces):
             if not self.done(number):
                 self.measure(number)
-            progress(self.frames(number))
+                progress(self.frames(number))
 
     def measure(self, number: int) -> None:
         """Does a piece. ValueError where frames have no prediction or something does not fit."""
@@ -175,6 +179,10 @@ class Job:
             return self.file(number).exists() and str(safe_npz.read(self.file(number), "key")) == self.key
         except ValueError:
             return False
+
+    def damaged(self) -> list[int]:
+        """Pieces that are there, but not whole or not of this evaluation: `run` does them again."""
+        return [number for number in range(self.pieces) if self.file(number).exists() and not self.done(number)]
 
     def missing(self) -> list[int]:
         return [number for number in range(self.pieces) if not self.done(number)]

@@ -32,20 +32,28 @@ def run(jobs: list[Job], progress: Callable[[int], None], address: str | None = 
 def _run(ray: Any, jobs: list[Job], progress: Callable[[int], None]) -> None:
     tasks = ray.remote(num_cpus=1, max_retries=2)(_shard)
     workers = max(1, int(ray.cluster_resources().get("CPU", 1)))
-    waiting = {}
+    waiting = []
     for job in jobs:
         # Several a worker: they end at about the same time although pieces differ.
         count = max(1, min(4 * workers, job.pieces))
-        waiting |= {tasks.remote(job, Shard(index + 1, count)): (job, Shard(index + 1, count)) for index in range(count)}
+        waiting += [tasks.remote(job, Shard(index + 1, count)) for index in range(count)]
+    before = _there(jobs)
     while waiting:
-        done, _ = ray.wait(list(waiting), num_returns=1)
+        done, _ = ray.wait(list(waiting), num_returns=1, timeout=1.0)
         for each in done:
+            waiting.remove(each)
             try:
                 ray.get(each)
             except ray.exceptions.RayTaskError as error:
-                raise error.cause if isinstance(error.cause, ValueError) else ValueError(str(error.cause)) from None
-            job, shard = waiting.pop(each)
-            progress(sum(job.frames(number) for number in shard.of(job.pieces)))
+                raise ValueError(str(error.cause)) from None
+        now = _there(jobs)
+        progress(now - before)
+        before = now
+
+
+def _there(jobs: list[Job]) -> int:
+    """Frames whose piece is there, whichever task wrote it."""
+    return sum(job.frames(number) for job in jobs for number in range(job.pieces) if job.file(number).exists())
 
 
 def _shard(job: Job, shard: Shard) -> None:

@@ -50,7 +50,7 @@ class _Sums:
 
     def add(self, piece: Columns) -> None:
         figures = {name: value for name, value in piece.items() if name in FIGURES}
-        self.sums.add(figures, piece["names"], piece["sequences"])
+        self.sums.add(figures, piece["names"], piece["sequences"], piece["why"])
         self.frames += len(piece["names"])
         for name, value in figures.items():
             if FIGURES[name].unit in ("mm", "°"):
