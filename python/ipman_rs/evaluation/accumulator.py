@@ -133,7 +133,7 @@ class Accumulator:
         }
         rows = np.fromiter(order.values(), np.int64)
         arrays = [column.arrays(rows) for column in columns.values()]
-        stacked = {name: np.array([each[name] for each in arrays]) for name in ARRAYS} if arrays else {}
+        stacked: dict[str, Any] = {name: np.array([each[name] for each in arrays]) for name in ARRAYS} if arrays else {}
         part = target.with_name(target.name + ".part")
         with part.open("wb") as file:
             np.savez(file, head=np.frombuffer(json.dumps(head).encode(), np.uint8), **stacked)

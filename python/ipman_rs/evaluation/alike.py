@@ -24,26 +24,20 @@ def alike(metric: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
 
     @functools.wraps(metric)
     def either(*args: Parameters.args, **options: Parameters.kwargs) -> Result:
-        given = [*args, *options.values()]
-        if not any(map(is_torch, given)):
+        given: list[Any] = [*args, *options.values()]
+        if not any(map(_is_torch, given)):
             return metric(*args, **options)
         arrays = [as_array(value) for value in args]
         found = metric(*arrays, **{name: as_array(value) for name, value in options.items()})  # type: ignore[arg-type]
-        tensors = [value for value in given if hasattr(value, "device") and is_torch(value)]
-        return _as_tensors(found, tensors[0].device) if tensors else found
+        devices = [value.device for value in given if _is_tensor(value)]
+        return _as_tensors(found, devices[0]) if devices else found
 
     return either
 
 
-def is_torch(value: Any) -> bool:
-    """Whether it is a tensor or a ground of tensors. Never imports torch."""
-    torch = sys.modules.get("torch")
-    return torch is not None and (isinstance(value, torch.Tensor) or type(value).__module__ == "ipman_rs.torch.ground")
-
-
 def as_array(value: Any) -> Any:
     """A tensor's numbers, a ground on arrays; anything else as it is."""
-    if not is_torch(value):
+    if not _is_torch(value):
         return value
     import torch
 
@@ -55,6 +49,16 @@ def as_array(value: Any) -> Any:
     if isinstance(value, TorchGround):
         return as_numpy_ground(value)
     return (value.float() if value.dtype == torch.bfloat16 else value).numpy(force=True)
+
+
+def _is_tensor(value: Any) -> bool:
+    torch = sys.modules.get("torch")  # never imported for arrays
+    return torch is not None and isinstance(value, torch.Tensor)
+
+
+def _is_torch(value: Any) -> bool:
+    """A tensor, or a ground of tensors."""
+    return _is_tensor(value) or type(value).__module__ == "ipman_rs.torch.ground"
 
 
 def _as_tensors(found: Any, device: Any) -> Any:

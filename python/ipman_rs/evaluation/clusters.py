@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from hashlib import blake2b
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,13 +21,13 @@ def fingerprints(names: Sequence[str]) -> NDArray[np.uint64]:
 
 
 def pooled(names: Sequence[str]) -> NDArray[np.int64]:
-    """The cluster 0 … CLUSTERS − 1 of each name where there are too many names: chance, but the same everywhere."""
+    """The cluster, 0 … CLUSTERS − 1 of each name where there are too many names: chance, but the same everywhere."""
     return (fingerprints(names) % np.uint64(CLUSTERS)).astype(np.int64)
 
 
 def differences(
     values: ArrayLike, baseline: ArrayLike, sequences: ArrayLike | None
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """values (n,) − baseline (n,) where both are numbers: each one's, and each cluster's sum (G,) and count (G,)."""
     first, second = (np.asarray(as_array(value), float) for value in (values, baseline))
     if first.shape != second.shape or first.ndim != 1 or not len(first):
@@ -44,4 +45,4 @@ def differences(
     found, rows = np.unique(labels, return_inverse=True)
     if len(found) > CLUSTERS:
         rows = np.unique(pooled(found.tolist())[rows], return_inverse=True)[1]
-    return difference, np.bincount(rows, difference), np.bincount(rows).astype(float)
+    return difference, np.bincount(rows, difference), np.bincount(rows).astype(np.float64)

@@ -38,13 +38,15 @@ def compare(
 def _compared(
     first: Accumulator, second: Accumulator, metric: str, level: float, resamples: int, seed: int
 ) -> Comparison:
-    own, others = ({name: rest for name, *rest in zip(*each.clusters(metric))} for each in (first, second))  # noqa: B905
-    same = [name for name in own if name in others and own[name][1:] == others[name][1:]]
-    left_out = len(own.keys() | others.keys()) - len(same)
+    one, other = first.clusters(metric), second.clusters(metric)
+    rows = {name: row for row, name in enumerate(other.names)}
+    found = [(i, rows[name]) for i, name in enumerate(one.names) if name in rows]
+    same = [(i, j) for i, j in found if one.counts[i] == other.counts[j] and one.prints[i] == other.prints[j]]
+    left_out = len(one.names) + len(other.names) - len(found) - len(same)
     if not same:
         return Comparison(Interval(np.nan, np.nan, np.nan), np.nan, 0, 0, left_out)
-    sums = np.array([own[name][0] - others[name][0] for name in same])
-    counts = np.array([own[name][1] for name in same])
+    i, j = np.transpose(same)
+    sums, counts = one.sums[i] - other.sums[j], one.counts[i]
     frames = int(counts.sum())
     interval = bootstrap(sums, counts, float(sums.sum() / frames), level, resamples, seed)
     return Comparison(interval, sign_flip(sums, resamples, seed), frames, len(same), left_out)
