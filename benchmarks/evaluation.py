@@ -82,7 +82,10 @@ def _named() -> tuple[np.ndarray, np.ndarray]:
 def _called(start: int, stop: int) -> dict[str, np.ndarray]:
     numbers = range(start, stop)
     sequences = np.array([f"seq{number // SEQUENCE:06d}" for number in numbers], "U9")
-    return {"names": np.array([f"seq{n // SEQUENCE:06d}/{n % SEQUENCE:06d}" for n in numbers], "U16"), "sequences": sequences}
+    return {
+        "names": np.array([f"seq{n // SEQUENCE:06d}/{n % SEQUENCE:06d}" for n in numbers], "U16"),
+        "sequences": sequences,
+    }
 
 
 def _write(path: Path, frames: int, block: Any, ground: bool = True) -> None:
@@ -166,7 +169,9 @@ def _measured(made: Path, frames: int, same: int, ray: bool) -> dict[str, Any]:
     for count in sorted({frames // 10, frames}):
         found = run(command(made, made / f"out-{count}", frames=count))
         result["runs"].append({"frames": count, **found, "frames_a_second": count / found["seconds"]})
-        click.echo(f"{count:9,} frames: {count / found['seconds']:6,.0f} a second; peak {found['peak_megabytes']:,.0f} MB")
+        click.echo(
+            f"{count:9,} frames: {count / found['seconds']:6,.0f} a second; peak {found['peak_megabytes']:,.0f} MB"
+        )
     expected = _expected(made, same, frames)
     for name, way in _ways(made, same, ray).items():
         way(made / name)

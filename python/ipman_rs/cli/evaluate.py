@@ -72,7 +72,9 @@ class Setting(click.ParamType):
 @click.option("--partial", is_flag=True, help="Leave out frames without prediction (otherwise an error).")
 @click.option("--shard", type=ShardOf(), help="Do this part only, such as 2/7; the last one writes the report.")
 @click.option("--ray", is_flag=True, help="Do the shards on Ray (RAY_ADDRESS: a cluster; else this machine).")
-def evaluate(predictions: tuple[Path, ...], output: Path, shard: tuple[int, int] | None, ray: bool, **given: Any) -> None:
+def evaluate(
+    predictions: tuple[Path, ...], output: Path, shard: tuple[int, int] | None, ray: bool, **given: Any
+) -> None:
     """Measure predictions against a data set: errors, balance, contact and pressure, with intervals.
 
     PRED is an .npz or .parquet file: names (F,) of the frames as the data set calls them, in any order, and pose (F, J, 3)

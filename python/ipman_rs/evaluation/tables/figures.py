@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Figure:
     """A number a frame, in the files in metres, radians or shares; shown times `factor` in `unit`.
 
-    better: −1 where less is better, 1 where more is, 0 where neither.
+    better: −1 where less is better, 1 where more is. undefined: why a finite body may have no such figure.
     """
 
     title: str
@@ -18,14 +18,15 @@ class Figure:
     digits: int
     better: int
     what: str
+    undefined: str = "not measured"
 
 
-def _mm(title: str, what: str) -> Figure:
-    return Figure(title, "mm", 1e3, 1, -1, what)
+def _mm(title: str, what: str, undefined: str = "not measured") -> Figure:
+    return Figure(title, "mm", 1e3, 1, -1, what, undefined)
 
 
-def _percent(title: str, what: str, better: int = 1) -> Figure:
-    return Figure(title, "%", 100.0, 1, better, what)
+def _percent(title: str, what: str) -> Figure:
+    return Figure(title, "%", 100.0, 1, 1, what, "no label")
 
 
 FIGURES = {
@@ -41,7 +42,10 @@ FIGURES = {
     "tilt": Figure("tilt", "°", 57.29577951308232, 2, -1, "of the pelvis, against gravity"),
     "penetration": _mm("penetration", "of the lowest vertex into the ground"),
     "hover": _mm("hover", "of the lowest vertex above the ground"),
-    "skating": _mm("skating", "way of the soles on the ground from the frame before, while they touch it"),
+    "skating": _mm(
+        "skating", "way of the soles on the ground from the frame before, while they touch it",
+        "soles not on the ground in both frames",
+    ),
     "com_error": _mm("CoM error", "centre of mass (pCoM) against the measured one, in space"),
     "com_error_exact": _mm("CoM exact", "the same, centre of mass of the uniform solid"),
     "com_error_vertex_mean": _mm("CoM vertices", "the same, mean of the vertices"),
@@ -51,4 +55,4 @@ FIGURES = {
     "pressure_iou": Figure("mIoU", "", 1.0, 3, 1, "pressure against the mat's, fixed parameters"),
     "cop_error_chosen": _mm("CoP chosen", "parameters chosen a frame for the best CoP, as the MoYo protocol does"),
     "pressure_iou_chosen": Figure("mIoU chosen", "", 1.0, 3, 1, "parameters chosen a frame for the best IoU"),
-}
+}  # fmt: skip

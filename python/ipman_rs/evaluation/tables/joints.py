@@ -67,9 +67,7 @@ def _regressed(bodies: Bodies, regressor: NDArray[Any]) -> Bodies:
     if bodies.vertices is None:
         return bodies
     if bodies.vertices.shape[1] != regressor.shape[1]:
-        raise ValueError(
-            f"regressor: is for {regressor.shape[1]} vertices, but a body has {bodies.vertices.shape[1]}"
-        )
+        raise ValueError(f"regressor: is for {regressor.shape[1]} vertices, but a body has {bodies.vertices.shape[1]}")
     # einsum sums in one order whatever the number of bodies; a matrix product does not.
     joints = np.einsum("kv,fvc->fkc", regressor, bodies.vertices.astype(np.float64))
     return Bodies(bodies.vertices, joints, HUMAN36M, bodies.model)

@@ -108,9 +108,7 @@ def _on_joints(pose: NDArray[Any], model: BodyModel) -> NDArray[Any]:
     if given == wanted:
         return pose
     if not _BODY_JOINTS <= given < wanted:
-        raise ValueError(
-            f"pose: has {given} joints, but the body {model.name} has {wanted}; is the right body named?"
-        )
+        raise ValueError(f"pose: has {given} joints, but the body {model.name} has {wanted}; is the right body named?")
     # Of SMPL's 24 joints the last two are the hands, which other models have as fingers, or not at all.
     kept = given if given != 24 else _BODY_JOINTS
     filled = np.zeros((len(pose), wanted, 3), pose.dtype)

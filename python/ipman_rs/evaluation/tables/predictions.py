@@ -138,7 +138,9 @@ def _check(where: str, name: str, column: RowsOnDisk, frames: int) -> None:
     if not column.shape or column.shape[0] != frames:
         raise ValueError(f"{where}: expected {frames} rows, one for each of names, got shape {column.shape}")
     row = column.shape[1:]
-    if name in POINTS and not (len(row) in (1, 2) and row[-1] and (row[-1] == 3 or (len(row) == 1 and row[0] % 3 == 0))):
+    if name in POINTS and not (
+        len(row) in (1, 2) and row[-1] and (row[-1] == 3 or (len(row) == 1 and row[0] % 3 == 0))
+    ):
         raise ValueError(f"{where}: expected ({frames}, n, 3) or ({frames}, 3 n), got {column.shape}")
     expected = {"betas": row[:1], "ground": (4,), "transl": (3,), "center_of_mass": (3,), "center_of_pressure": (3,)}
     if name not in POINTS and row != expected.get(name, ()):

@@ -1,4 +1,4 @@
-"""What an evaluation writes: evaluation.md, .json, .csv, .svg, .png, and frames.parquet with each frame's figures."""
+"""What an evaluation writes: evaluation.md, .json, .csv, .svg, .png, sequences.csv and frames.parquet."""
 
 from __future__ import annotations
 
@@ -51,6 +51,7 @@ def write(report: Report, folder: Path, jobs: list[Job], progress: Callable[[int
         f"{NAME}.md": markdown(report).encode(),
         f"{NAME}.json": (json.dumps(record(report), indent=1, allow_nan=False) + "\n").encode(),
         f"{NAME}.csv": _csv(report).encode(),
+        "sequences.csv": _sequences(report).encode(),
         **_plot(report),
     }
     for name, content in files.items():
@@ -66,7 +67,7 @@ def markdown(report: Report) -> str:
         keep_trailing_newline=True,
     )  # fmt: skip
     return environment.get_template(f"{NAME}.md.j2").render(
-        report=report, figures=report.figures, table=_table(report), missing=_missing(report), version=__version__,
+        report=report, figures=report.figures, table=rows(report), missing=_missing(report), version=__version__,
         shown=shown, interval=_interval, verdict=_verdict,
     )  # fmt: skip
 
@@ -80,11 +81,6 @@ def shown(figure: Figure, value: float | None) -> str:
 
 def rows(report: Report) -> tuple[list[str], list[list[str]]]:
     """The table, printed figures above the measured ones: its head and its lines."""
-    head, lines = _table(report)
-    return head, lines
-
-
-def _table(report: Report) -> tuple[list[str], list[list[str]]]:
     figures = report.figures
     columns: list[tuple[str, dict[str, str]]] = []
     for method, printed in (report.table.published if report.table else {}).items():
@@ -111,7 +107,8 @@ def _with_interval(figure: Figure, found: Interval) -> str:
 
 def _interval(figure: Figure, found: Interval) -> str:
     mean, low, high = (
-        f"{value * figure.factor:+.{figure.digits}f}".replace("-", "−") if np.isfinite(value) else "–" for value in found
+        f"{value * figure.factor:+.{figure.digits}f}".replace("-", "−") if np.isfinite(value) else "–"
+        for value in found
     )
     return f"{mean} [{low}, {high}]"
 
@@ -122,16 +119,20 @@ def _verdict(figure: Figure, found: Interval) -> str:
     return "better" if found.mean * figure.better > 0 else "worse"
 
 
-def _missing(report: Report) -> list[tuple[str, str, int, int, str]]:
-    """Method, figure, frames without it, of how many, and why."""
-    found = []
+def _missing(report: Report) -> list[str]:
+    """What was left out, and why: a line for all figures of a method that lack the same frames."""
+    told: dict[tuple[str, str], list[str]] = {}
     for each in report.measured:
         for name, summary in each.summary.items():
-            without = sum(summary.missing.values())
-            if without:
-                why = ", ".join(f"{number:,} {reason}" for reason, number in summary.missing.items() if reason)
-                found.append((each.name, FIGURES[name].title, without, each.frames, why))
-    return found
+            why = ", ".join(f"{count:,} {reason}" for reason, count in sorted(summary.missing.items()))
+            if why and name in report.figures:
+                told.setdefault((f"{each.name}: {sum(summary.missing.values()):,} of {each.frames:,}", why), []).append(
+                    name
+                )
+    return [
+        f"{frames} frames have no {', '.join(FIGURES[name].title for name in names)}: {why}"
+        for (frames, why), names in told.items()
+    ]
 
 
 def record(report: Report) -> dict[str, Any]:
@@ -147,6 +148,7 @@ def record(report: Report) -> dict[str, Any]:
         "notes": list(report.notes),
         "units": {name: "shown in " + (f.unit or "1") + f", times {f.factor:g}" for name, f in FIGURES.items()},
         "printed": {} if report.table is None else {k: dict(v) for k, v in report.table.published.items()},
+        "edges": EDGES.tolist(),
         "methods": {
             each.name: {
                 "frames": each.frames,
@@ -155,15 +157,12 @@ def record(report: Report) -> dict[str, Any]:
                         **{key: plain(getattr(each.summary[name], key)) for key in ("mean", "std", "least", "largest")},
                         "interval": [plain(each.intervals[name].low), plain(each.intervals[name].high)],
                         "frames": each.summary[name].frames,
-                        "sequences": each.summary[name].sequences,
+                        "sequences": len(each.clusters[name].names),
                         "missing": dict(each.summary[name].missing),
                     }
                     for name in each.summary
                 },
-                "distribution": {
-                    name: {"edges": EDGES.tolist(), "frames below": counts.tolist()}
-                    for name, counts in each.below.items()
-                },
+                "frames below": {name: counts.tolist() for name, counts in each.below.items()},
             }
             for each in report.measured
         },
@@ -199,14 +198,30 @@ def _csv(report: Report) -> str:
             figure, found = FIGURES[name], each.intervals[name]
             numbers = [value * figure.factor for value in (summary.mean, found.low, found.high, summary.std)]
             told = [repr(float(value)) if np.isfinite(value) else "" for value in numbers]
-            counts = [summary.frames, summary.sequences, sum(summary.missing.values())]
+            counts = [summary.frames, len(each.clusters[name].names), sum(summary.missing.values())]
             lines.writerow([each.name, figure.title, figure.unit, *told, *counts])
     for each in report.differences:
         for name, found in each.intervals.items():
             figure = FIGURES[name]
-            told = [repr(float(v * figure.factor)) if np.isfinite(v) else "" for v in (found.mean, found.low, found.high)]
+            told = [
+                repr(float(v * figure.factor)) if np.isfinite(v) else "" for v in (found.mean, found.low, found.high)
+            ]
             label = f"{each.name} − {each.baseline}"
             lines.writerow([label, figure.title, figure.unit, *told, "", each.frames[name], "", ""])
+    return text.getvalue()
+
+
+def _sequences(report: Report) -> str:
+    """A line a method, sequence and figure; single images that are more than can be told apart are not listed."""
+    text = io.StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerow(["method", "sequence", "figure", "unit", "mean", "frames"])
+    for each in report.measured:
+        for name, found in each.clusters.items() if not each.pooled else ():
+            figure = FIGURES[name]
+            for sequence, total, count in zip(found.names, found.sums, found.counts, strict=True):
+                mean = repr(float(total / count * figure.factor))
+                lines.writerow([each.name, sequence, figure.title, figure.unit, mean, int(count)])
     return text.getvalue()
 
 
@@ -275,9 +290,7 @@ def _frames(path: Path, jobs: list[Job], progress: Callable[[int], None]) -> lis
         return []
     names = [name for name in FIGURES if any(name in job.result(0) for job in jobs if job.pieces)]
     text = ["method", "name", "sequence"]
-    schema = pyarrow.schema(
-        [(name, pyarrow.string()) for name in text] + [(name, pyarrow.float64()) for name in names]
-    )
+    schema = pyarrow.schema([(name, pyarrow.string()) for name in text] + [(name, pyarrow.float64()) for name in names])
     with being_written(path) as file, writer.ParquetWriter(file, schema, compression="zstd") as table:
         for method, piece in frames_of(jobs):
             count = len(piece["names"])

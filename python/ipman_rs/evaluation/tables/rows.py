@@ -99,7 +99,9 @@ def _header(path: Path, start: int, size: int) -> RowsOnDisk:
         shape, fortran, dtype = reader(file)
         offset = file.tell()
     if dtype.hasobject:
-        raise ValueError("holds Python objects, which are not loaded; save plain numbers, and names by np.array(x, str)")
+        raise ValueError(
+            "holds Python objects, which are not loaded; save plain numbers, and names by np.array(x, str)"
+        )
     if fortran and len(shape) > 1:
         raise ValueError("is stored column by column; save np.ascontiguousarray of it")
     count = int(np.prod([int(number) for number in shape], dtype=object))

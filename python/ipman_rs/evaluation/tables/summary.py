@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accumulator import Accumulator, Summary
+from ..accumulator import Accumulator, Clusters
 from ..bootstrap import Interval
+from ..column import Summary
 from ..sign_flip import sign_flip
 from .columns import Columns
 from .figures import FIGURES
@@ -29,6 +30,8 @@ class Measured:
     intervals: dict[str, Interval]
     below: dict[str, NDArray[np.int64]]  # frames whose figure is under each of EDGES
     frames: int
+    clusters: dict[str, Clusters]  # the figures of each sequence
+    pooled: bool  # there were too many sequences to keep each
 
 
 @dataclass
@@ -50,7 +53,8 @@ class _Sums:
 
     def add(self, piece: Columns) -> None:
         figures = {name: value for name, value in piece.items() if name in FIGURES}
-        self.sums.add(figures, piece["names"], piece["sequences"], piece["why"])
+        why = {name: np.where(piece["why"] == "", FIGURES[name].undefined, piece["why"]) for name in figures}
+        self.sums.add(figures, piece["names"], piece["sequences"], why)
         self.frames += len(piece["names"])
         for name, value in figures.items():
             if FIGURES[name].unit in ("mm", "°"):
@@ -64,7 +68,10 @@ def measured(job: Job, progress: Callable[[int], None] = lambda frames: None) ->
     for piece in job.results():
         sums.add(piece)
         progress(len(piece["names"]))
-    return Measured(job.name, _ordered(sums.sums.summary()), sums.sums.intervals(), sums.below, sums.frames)
+    total = sums.sums
+    summary = _ordered(total.summary())
+    clusters = {name: total.clusters(name) for name in summary}
+    return Measured(job.name, summary, total.intervals(), sums.below, sums.frames, clusters, total.is_pooled)
 
 
 def difference(job: Job, baseline: Job, progress: Callable[[int], None] = lambda frames: None) -> Difference:
@@ -77,7 +84,7 @@ def difference(job: Job, baseline: Job, progress: Callable[[int], None] = lambda
         sums.add(figures, both, own["sequences"][mine])
         progress(len(own["names"]))
     summary = sums.summary()
-    p = {name: sign_flip(sums.clusters(name)[0]) for name, each in summary.items() if each.frames}
+    p = {name: sign_flip(sums.clusters(name).sums) for name, each in summary.items() if each.frames}
     frames = {name: each.frames for name, each in summary.items()}
     return Difference(job.name, baseline.name, _ordered(sums.intervals()), p, frames)
 
