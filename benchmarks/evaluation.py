@@ -1,9 +1,8 @@
-"""How many frames a second `ipman evaluate` measures, in how much memory, and that shards, Ray and kill -9 change no bit.
+"""How many frames a second `ipman evaluate` measures, and in how much memory; shards, Ray and kill -9 change no bit.
 
 python -m benchmarks.evaluation [--frames 1000000] [--out docs] [--folder TMP]
 
-The truth is made of named poses of the small embedded body with noise, and the predictions are the truth with noise, both
-of a counter, so that any part of them can be made again.
+The truth is made of named poses of the small embedded body with noise, and the predictions are the truth with noise.
 """
 
 from __future__ import annotations

@@ -77,15 +77,16 @@ def evaluate(
 ) -> None:
     """Measure predictions against a data set: errors, balance, contact and pressure, with intervals.
 
-    PRED is an .npz or .parquet file: names (F,) of the frames as the data set calls them, in any order, and pose (F, J, 3)
-    with betas, transl and body (smpl, smplh, smplx, anny, anny-lite), or vertices (F, V, 3), or joints (F, K, 3) with
-    joint_names. Metres, in the axes of the data set, or with a ground (4,) of its own: normal and height. With several
-    files each is compared with the first, frame by frame. The data set own is a file in the same form: your truth.
+    PRED is an .npz or .parquet file: names (F,) of the frames as the data set calls them, in any order, and pose
+    (F, J, 3) with betas, transl and body (smpl, smplh, smplx, anny, anny-lite), or vertices (F, V, 3), or joints
+    (F, K, 3) with joint_names. Metres, in the axes of the data set, or with a ground (4,) of its own: normal and
+    height. With several files each is compared with the first, frame by frame. The data set own is a file in the same
+    form: your truth.
 
-    OUTPUT gets evaluation.md, .json, .csv, .svg and .png, frames.parquet with all figures of each frame (needs the extra
-    evaluate), and the pieces it is made of: interrupted, the same command goes on where it was. Shards may run one after
-    the other, side by side, or on other machines if their OUTPUT/methods are copied together; when all pieces are there,
-    the report is written, the same to the bit however they were made.
+    OUTPUT gets evaluation.md, .json, .csv, .svg and .png, sequences.csv, frames.parquet with all figures of each frame
+    (needs the extra evaluate), and the pieces it is made of: interrupted, the same command goes on where it was.
+    Shards may run one after the other, side by side, or on other machines if their OUTPUT/methods are copied together;
+    when all pieces are there, the report is written, the same to the bit however they were made.
 
     \b
     ipman evaluate hmr.npz --table rich --path RICH/ --models models/ -o out

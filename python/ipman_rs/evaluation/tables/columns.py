@@ -18,7 +18,7 @@ from ipman_rs.data.frames import Frames
 from ipman_rs.ground import Ground
 
 from .. import bose, com_error, cop_error, foot_skating, hover, moyo, mpjpe, pa_mpjpe, penetration, pve, reasons, tilt
-from .joints import joints_of
+from .joints import joints_of, named
 from .models import Bodies
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
     if ground is not None:
         found |= _tilt(truth, guess, ground, true.ground or ground)
         if guess.vertices is not None and guess.model is not None:
-            found |= _balance(guess.vertices, guess.model, ground, true, job.preset)
+            found |= _balance(guess.vertices, guess.model, ground, true)
             found |= _mass(guess.vertices, guess.model, true)
             found |= _pressure(guess.vertices, guess.model, ground, true, job.preset)
             found["skating"] = foot_skating(guess.vertices[:, soles(guess.model)], ground, true.sequences)
@@ -72,28 +72,24 @@ def _points(truth: Bodies, guess: Bodies, regressor: NDArray[Any] | None) -> Col
     """Errors of joints and vertices."""
     found: Columns = {}
     compared = joints_of(truth, guess, regressor)
-    same = truth.vertices is not None and guess.vertices is not None and truth.vertices.shape == guess.vertices.shape
     if compared is not None:
         found["mpjpe"] = pve(compared.estimated, compared.true, compared.root, compared.true_root)
         found["pa_mpjpe"] = pa_mpjpe(compared.estimated, compared.true)
         found["mpjpe_world"] = mpjpe(compared.estimated, compared.true, root=None)
-        if same:
+    if truth.vertices is not None and guess.vertices is not None and truth.vertices.shape == guess.vertices.shape:
+        if compared is not None:
             found["pve"] = pve(guess.vertices, truth.vertices, compared.root, compared.true_root)
-    if same:
         found["pve_world"] = pve(guess.vertices, truth.vertices)
     return found
 
 
 def _tilt(truth: Bodies, guess: Bodies, ground: Ground, true_ground: Ground) -> Columns:
-    if truth.joints is None or guess.joints is None:
-        return {}
     if not {*_PELVIS} <= {*truth.joint_names} & {*guess.joint_names}:
         return {}
-    own, true = (body.joints[:, [body.joint_names.index(name) for name in _PELVIS]] for body in (guess, truth))
-    return {"tilt": tilt(own, true, ground, true_ground)}
+    return {"tilt": tilt(named(guess, _PELVIS), named(truth, _PELVIS), ground, true_ground)}
 
 
-def _balance(vertices: NDArray[Any], model: BodyModel, ground: Ground, true: Frames, preset: str) -> Columns:
+def _balance(vertices: NDArray[Any], model: BodyModel, ground: Ground, true: Frames) -> Columns:
     template = model.template
     found: Columns = {
         "bose": bose(vertices, template, ground),

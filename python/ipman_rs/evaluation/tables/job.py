@@ -120,8 +120,8 @@ class Job:
             self._compare(json.loads(file.read_text()))
         if len(self.estimates) < len(self.data) and not self.partial:
             raise ValueError(
-                f"{self.predictions}: has {len(self.estimates):,} frames, but {self.source.name} has {len(self.data):,}; "
-                "--partial leaves out those without prediction"
+                f"{self.predictions}: has {len(self.estimates):,} frames, but the data set {self.source.name} has "
+                f"{len(self.data):,}; --partial leaves out those without prediction"
             )
         with being_written(file) as out:
             out.write((json.dumps(self.made_of, indent=1) + "\n").encode())
@@ -166,7 +166,7 @@ class Job:
     def measure(self, number: int) -> None:
         """Does a piece. ValueError where frames have no prediction or something does not fit."""
         start = number * self.piece
-        found = columns(self, start, start + self.frames(number))
+        found: dict[str, Any] = columns(self, start, start + self.frames(number))
         with being_written(self.file(number)) as file:
             np.savez(file, key=np.str_(self.key), **found)
 

@@ -47,7 +47,11 @@ def joints_of(truth: Bodies, guess: Bodies, regressor: NDArray[Any] | None) -> C
     if roots is None or len(names) < 3:
         return None
     return Compared(
-        names, _of(truth, names), _of(guess, names), _of(truth, roots).mean(axis=1), _of(guess, roots).mean(axis=1)
+        names,
+        named(truth, names),
+        named(guess, names),
+        named(truth, roots).mean(axis=1),
+        named(guess, roots).mean(axis=1),
     )
 
 
@@ -73,7 +77,8 @@ def _regressed(bodies: Bodies, regressor: NDArray[Any]) -> Bodies:
     return Bodies(bodies.vertices, joints, HUMAN36M, bodies.model)
 
 
-def _of(bodies: Bodies, names: tuple[str, ...]) -> NDArray[Any]:
+def named(bodies: Bodies, names: tuple[str, ...]) -> NDArray[Any]:
+    """Joints (F, K, 3) of these names. ValueError where there are none."""
     if bodies.joints is None:
         raise ValueError("joints: expected some")
     return bodies.joints[:, [bodies.joint_names.index(name) for name in names]]

@@ -16,7 +16,7 @@ def run(jobs: list[Job], progress: Callable[[int], None], address: str | None = 
     """Does what is missing. `progress` is told how many frames were done more. ValueError without ray, and for what the
     tasks raise; their pieces are kept."""
     try:
-        import ray
+        import ray  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise ValueError("--ray needs ray: pip install 'ipman_rs[ray]'") from error
     begun_here = not ray.is_initialized()

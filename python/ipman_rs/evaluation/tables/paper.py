@@ -61,6 +61,6 @@ TABLES = {
     "3dpw": Table("Regression on 3DPW", "3dpw", "test", ("mpjpe", "pa_mpjpe", "pve")),
     "push-pull": Table(
         "What pulling to the ground and pushing out of it do", "rich", "test", (*_POSE, "penetration", "hover"),
-        note="One file of predictions for each setting: without both, with either, with both. The first is the baseline.",
+        note="One file of predictions a setting: without both, with either, with both. The first is the baseline.",
     ),
 }  # fmt: skip

@@ -3,15 +3,17 @@
 | array | | |
 |---|---|---|
 | `names` | (F,) | of the frames, as the data set calls them; in any order |
-| `pose`, `betas`, `transl` | (F, J, 3) or (F, 3 J), (F, n), (F, 3) | rotation vectors, shape, metres; `betas` may be one row |
+| `pose`, `betas`, `transl` | (F, J, 3) or (F, 3 J), (F, n), (F, 3) | rotation vectors, shape, metres |
 | `body` | one word | "smpl", "smplh", "smplx", "anny", "anny-lite": what `pose` is of |
 | `vertices`, `joints`, `joint_names` | (F, V, 3) m, (F, K, 3) m, (K,) | instead of parameters, or beside them |
 | `ground` | (4,) or (F, 4) | the normal and the height, if not the data set's |
 | `sequences`, `frame_rate`, `genders` | (F,), Hz, (F,) | |
-| `center_of_mass`, `center_of_pressure`, `standing`, `contact` | (F, 3) m, (F, 3) m, (F,), (F,) | measured: in a data set of your own |
+| `center_of_mass`, `center_of_pressure` | (F, 3) m | measured, in a data set of your own |
+| `standing`, `contact` | (F,) | labelled, in a data set of your own |
 
-In Parquet each is a column of that name, one list a frame; what is one for all frames is repeated. The same form is that
-of the data set "own": `ipman evaluate estimated.npz --data own --path true.npz`.
+`betas` and `ground` may be one row for all frames. In Parquet each is a column of that name, one list a frame; what is
+one for all frames is repeated. The data set "own" has the same form: `ipman evaluate estimated.npz --data own --path
+true.npz`.
 """
 
 from __future__ import annotations
@@ -54,7 +56,7 @@ class Predictions:
         return len(self.columns["names"])
 
     def __getitem__(self, rows: Rows) -> Frames:
-        found = {name: column[rows] for name, column in self.columns.items()}
+        found: dict[str, Any] = {name: column[rows] for name, column in self.columns.items()}
         for name in POINTS:
             if name in found:
                 found[name] = found[name].reshape(len(found[name]), -1, 3)

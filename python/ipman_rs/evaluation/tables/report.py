@@ -129,7 +129,12 @@ def _missing(report: Report) -> list[str]:
                 told.setdefault((f"{each.name}: {sum(summary.missing.values()):,} of {each.frames:,}", why), []).append(
                     name
                 )
-    return [
+    lacking = [
+        f"{figure.title} needs {figure.needs}"
+        for name, figure in report.figures.items()
+        if not any(name in each.summary for each in report.measured)
+    ]
+    return lacking + [
         f"{frames} frames have no {', '.join(FIGURES[name].title for name in names)}: {why}"
         for (frames, why), names in told.items()
     ]
@@ -256,13 +261,11 @@ def _plot(report: Report) -> dict[str, bytes]:
         _differences(axis, each, [name for name in report.figures if name in each.intervals])
     for axis in axes[len(known) + len(report.differences) :]:
         axis.set_axis_off()
-    found = {}
+    svg, png = io.BytesIO(), io.BytesIO()
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}):
-        for ending, options in (("svg", {"metadata": {"Date": None}}), ("png", {"dpi": 130})):
-            content = io.BytesIO()
-            picture.savefig(content, format=ending, **options)
-            found[f"{NAME}.{ending}"] = content.getvalue()
-    return found
+        picture.savefig(svg, format="svg", metadata={"Date": None})
+        picture.savefig(png, format="png", dpi=130)
+    return {f"{NAME}.svg": svg.getvalue(), f"{NAME}.png": png.getvalue()}
 
 
 def _differences(axis: Any, difference: Difference, names: list[str]) -> None:

@@ -17,7 +17,7 @@ from .columns import Columns
 from .figures import FIGURES
 from .job import Job
 
-# Between these the share of frames below is kept, of figures that are lengths or angles: a tenth of a millimetre to 10 m.
+# The frames below each of these are counted, of figures that are lengths or angles: a tenth of a millimetre to 10 m.
 EDGES = np.logspace(-4, 1, 251)
 
 
