@@ -48,7 +48,7 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
     """Of frames that belong together row by row. ValueError where a body model is missing or shapes do not fit."""
     truth, guess = job.bodies.posed(true), job.bodies.posed(estimated)
     ground = true.ground if estimated.ground is None else estimated.ground
-    unknown = {"prediction not finite": ~_finite(guess), "truth not finite": ~_finite(truth)}
+    unknown = {"prediction not finite": ~_finite(guess, len(true)), "truth not finite": ~_finite(truth, len(true))}
     found: Columns = {"names": true.names, "sequences": true.sequences, "why": reasons(unknown)}
     found |= _points(truth, guess, job.joint_regressor)
     if ground is not None:
@@ -61,11 +61,9 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
     return found
 
 
-def _finite(bodies: Bodies) -> NDArray[np.bool_]:
+def _finite(bodies: Bodies, count: int) -> NDArray[np.bool_]:
     points = bodies.joints if bodies.vertices is None else bodies.vertices
-    if points is None:
-        return np.array(True)  # there is none in any frame: no reason of single ones
-    return np.isfinite(points).all(axis=(1, 2))
+    return np.ones(count, bool) if points is None else np.isfinite(points).all(axis=(1, 2))
 
 
 def _points(truth: Bodies, guess: Bodies, regressor: NDArray[Any] | None) -> Columns:

@@ -129,12 +129,11 @@ def _missing(report: Report) -> list[str]:
                 told.setdefault((f"{each.name}: {sum(summary.missing.values()):,} of {each.frames:,}", why), []).append(
                     name
                 )
-    lacking = [
-        f"{figure.title} needs {figure.needs}"
-        for name, figure in report.figures.items()
-        if not any(name in each.summary for each in report.measured)
-    ]
-    return lacking + [
+    lacking: dict[str, list[str]] = {}
+    for name, figure in report.figures.items():
+        if not any(name in each.summary for each in report.measured):
+            lacking.setdefault(figure.needs, []).append(figure.title)
+    return [f"{', '.join(titles)}: not to be had without {needs}" for needs, titles in lacking.items()] + [
         f"{frames} frames have no {', '.join(FIGURES[name].title for name in names)}: {why}"
         for (frames, why), names in told.items()
     ]
