@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -144,20 +143,27 @@ class Accumulator:
         """What `save` wrote. ValueError for a file that is damaged, half-written, or something else."""
         path = Path(path)
         try:
-            head = json.loads(safe_npz.read(path, "head").tobytes())
-            if head["format"] != FORMAT:
-                raise ValueError(f"format: expected {FORMAT!r}, got {head['format']!r}")
-            arrays = {name: safe_npz.read(path, name) for name in ARRAYS} if head["metrics"] else {}
-            found, sequences = cls(), head["sequences"]
-            found._rows = None if sequences is None else {str(name): row for row, name in enumerate(sequences)}
-            size = CLUSTERS if sequences is None else len(sequences)
-            for index, (metric, missing) in enumerate(zip(head["metrics"], head["missing"], strict=True)):
-                column = {name: array[index] for name, array in arrays.items()}
-                found._columns[str(metric)] = Column.of(column, size, Counter(missing))
-        except (KeyError, TypeError, IndexError, ValueError) as error:
+            return cls._read(path)
+        except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise ValueError(
                 f"{path}: no accumulator can be read from it ({error}); if it is a shard's, run that shard again"
             ) from error
+
+    @classmethod
+    def _read(cls, path: Path) -> Accumulator:
+        head = json.loads(safe_npz.read(path, "head").tobytes())
+        if head["format"] != FORMAT:
+            raise ValueError(f"format: expected {FORMAT!r}, got {head['format']!r}")
+        metrics, sequences, missing = head["metrics"], head["sequences"], head["missing"]
+        found = cls()
+        found._rows = None if sequences is None else {str(name): row for row, name in enumerate(sequences)}
+        size = CLUSTERS if sequences is None else len(sequences)
+        if not size == len(found._order()) <= CLUSTERS:
+            raise ValueError(f"sequences: expected different names, {CLUSTERS} at most")
+        arrays = {name: safe_npz.read(path, name) for name in ARRAYS} if metrics else {}
+        columns = [dict(zip(arrays, row, strict=True)) for row in zip(*arrays.values(), strict=True)]
+        for metric, column, counts in zip(metrics, columns, missing, strict=True):
+            found._columns[str(metric)] = Column.of(column, size, counts)
         return found
 
     def _rows_of(self, sequences: Sequence[str]) -> NDArray[np.int64]:

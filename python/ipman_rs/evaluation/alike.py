@@ -25,12 +25,13 @@ def alike(metric: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     @functools.wraps(metric)
     def either(*args: Parameters.args, **options: Parameters.kwargs) -> Result:
         given: list[Any] = [*args, *options.values()]
-        if not any(map(_is_torch, given)):
-            return metric(*args, **options)
-        arrays = [as_array(value) for value in args]
-        found = metric(*arrays, **{name: as_array(value) for name, value in options.items()})  # type: ignore[arg-type]
+        if any(map(_is_torch, given)):
+            named = {name: as_array(value) for name, value in options.items()}
+            found = metric(*[as_array(value) for value in args], **named)  # type: ignore[arg-type]
+        else:
+            found = metric(*args, **options)
         devices = [value.device for value in given if _is_tensor(value)]
-        return _as_tensors(found, devices[0]) if devices else found
+        return _results(found, devices[0] if devices else None)
 
     return either
 
@@ -61,10 +62,13 @@ def _is_torch(value: Any) -> bool:
     return _is_tensor(value) or type(value).__module__ == "ipman_rs.torch.ground"
 
 
-def _as_tensors(found: Any, device: Any) -> Any:
+def _results(found: Any, device: Any) -> Any:
+    """Arrays as tensors on the device, or as they are where that is None; what has no dimension as a number."""
+    if isinstance(found, tuple):
+        parts = [_results(part, device) for part in found]
+        return type(found)(*parts) if hasattr(found, "_fields") else tuple(parts)
+    if device is None:
+        return found[()]
     import torch
 
-    if isinstance(found, tuple):
-        parts = [_as_tensors(part, device) for part in found]
-        return type(found)(*parts) if hasattr(found, "_fields") else tuple(parts)
     return torch.from_numpy(np.array(found)).to(device)

@@ -75,19 +75,21 @@ class Column:
         }
 
     @classmethod
-    def of(cls, arrays: Mapping[str, NDArray[Any]], size: int, missing: Counter[str]) -> Column:
+    def of(cls, arrays: Mapping[str, NDArray[Any]], size: int, missing: Mapping[str, int]) -> Column:
         """From `arrays` of `size` rows. ValueError where they are not what that gives."""
         found = cls()
         for name, expected in found.arrays(np.arange(size)).items():
             given = arrays[name]
             if given.shape != expected.shape or given.dtype != expected.dtype:
                 raise ValueError(f"{name}: expected {expected.shape} {expected.dtype}, got {given.shape} {given.dtype}")
+        if (arrays["counts"] < 0).any() or not all(isinstance(n, int) and n > 0 for n in missing.values()):
+            raise ValueError("counts: expected none below zero")
         found.sums[:size], found.counts[:size], found.prints[:size] = (
             arrays[name] for name in ("sums", "counts", "prints")
         )
         found.squares[:] = arrays["squares"]
         found.least, found.largest = arrays["edges"].tolist()
-        found.missing = missing
+        found.missing.update(missing)
         return found
 
     def summary(self) -> Summary:

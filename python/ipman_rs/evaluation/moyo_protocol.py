@@ -100,8 +100,7 @@ class _Frame:
 
     def __init__(self, body: Array, heights: Array, normal: Array, mat: Mat, truth: Array, center: Array) -> None:
         self.body, self.normal, self.truth, self.center = body, normal, truth, center
-        self.heights = heights - max(heights.min(), 0.0)  # of a hovering body e^(−γh) would vanish; ratios stay
-        self.below = self.heights < 0
+        self.heights, self.below = heights, heights < 0
         self.cells = cells_of(body, mat)
 
     def figures(self, alphas: Array, gammas: Array) -> Array:
@@ -115,10 +114,11 @@ class _Frame:
 
     def _centers(self, alphas: Array, gammas: Array) -> Array:
         """Centres of pressure (A, G, 3)."""
+        heights = self.heights - max(self.heights.min(), 0.0)  # of a hovering body e^(−γh) would vanish; ratios stay
         moments = np.column_stack([self.body, np.ones(len(self.body))])
         low, high = moments[self.below], moments[~self.below]
-        deep = (1 - alphas[:, None] * self.heights[self.below]) @ low
-        above = np.exp(-gammas[:, None] * self.heights[~self.below]) @ high
+        deep = (1 - alphas[:, None] * heights[self.below]) @ low
+        above = np.exp(-gammas[:, None] * heights[~self.below]) @ high
         total = deep[:, None] + above[None]
         return total[..., :3] / total[..., 3:]
 
@@ -137,8 +137,8 @@ class _Frame:
         most = np.maximum(_edge(np.max, deep, -np.inf)[:, None], _edge(np.max, above, -np.inf))
         number = np.bincount(self.cells[on], minlength=size)
         sums = (under[:, None] + over - least[..., None] * number).clip(min=0)
-        spread = np.where(most > least, sums / np.where(most > least, most - least, 1.0)[..., None], 0.0)
-        return normalised(spread.reshape(*spread.shape[:2], *self.truth.shape), (-2, -1))
+        sums[most <= least] = 0  # but for rounding
+        return normalised(sums.reshape(*most.shape, *self.truth.shape), (-2, -1))
 
 
 def _edge(kind: Any, rows: list[Array], empty: float = np.inf) -> Array:

@@ -54,6 +54,8 @@ def root_tilt(estimated: ArrayLike, true: ArrayLike, ground: AnyGround, true_gro
     first, second = (plain("rotations", value).astype(np.float64) for value in (estimated, true))
     if first.shape != second.shape or first.shape[-2:] != (3, 3):
         raise ValueError(f"rotations: expected two arrays (..., 3, 3), got {first.shape} and {second.shape}")
+    for turns in (first, second):
+        turns[~np.isfinite(turns).all(axis=(-2, -1))] = np.nan
     seen = (first.swapaxes(-1, -2) @ _up(ground)[..., None])[..., 0]
     truly = (second.swapaxes(-1, -2) @ _up(true_ground or ground)[..., None])[..., 0]
     return _between(seen, truly)
