@@ -8,7 +8,7 @@ import math
 import evaluate_files as files
 import numpy as np
 import pytest
-from scipy.spatial import procrustes
+from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
 from ipman_rs.evaluation import paired, paired_test
@@ -37,10 +37,10 @@ def test_means_are_those_of_plain_loops(record, bodies):
         mesh = zip(guess.vertices[k].astype(float), truth.vertices[k].astype(float), strict=True)
         vertices.append(np.mean([math.dist(a - own[0], b - real[0]) for a, b in mesh]))
         pelvis.append(np.mean(np.linalg.norm(own - real, axis=1)))
-        # scipy scales both to unit size: undo that, the true joints keep theirs.
-        first, second, _ = procrustes(real, own)
-        size = np.linalg.norm(real - real.mean(axis=0))
-        aligned.append(size * np.linalg.norm(first - second, axis=1).mean())
+        here, there = own - own.mean(axis=0), real - real.mean(axis=0)
+        turned = Rotation.align_vectors(there, here)[0].apply(here)
+        scale = (turned * there).sum() / (turned**2).sum()
+        aligned.append(np.linalg.norm(scale * turned - there, axis=1).mean())
     found = record["methods"]["guess"]["figures"]
     assert found["mpjpe"]["mean"] == pytest.approx(np.mean(joints), abs=1e-12)
     assert found["pve"]["mean"] == pytest.approx(np.mean(vertices), abs=1e-12)

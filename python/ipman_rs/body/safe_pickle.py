@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+BODY_MODEL, BODY_MODELS = "body model", "an unmodified SMPL, SMPL+H or SMPL-X file"
 MAX_BYTES = 1 << 30  # the largest upstream file (SMPL-X with 400 components, in float64) has about half of that
 
 
@@ -191,9 +192,13 @@ class RestrictedUnpickler(_Interpreter):
         code: run for code, run in _Interpreter.dispatch.items() if bytes([code]) not in FORBIDDEN_OPCODES
     }
 
+    def __init__(self, stream: io.BytesIO, what: str) -> None:
+        super().__init__(stream, encoding="latin1")
+        self.what = what
+
     def find_class(self, module: str, name: str) -> Callable[..., Any]:
         if (module, name) not in ALLOWED:
-            raise pickle.UnpicklingError(f"names {module}.{name}, which no body model needs; it is refused")
+            raise pickle.UnpicklingError(f"names {module}.{name}, which no {self.what} needs; it is refused")
         return ALLOWED[module, name]
 
     def load_build(self) -> None:
@@ -227,23 +232,28 @@ class RestrictedUnpickler(_Interpreter):
     dispatch[pickle.BYTEARRAY8[0]] = load_bytearray8
 
 
-def read(path: Path) -> dict[str, Any]:
+def read(path: Path, what: str = BODY_MODEL, expected: str = BODY_MODELS) -> dict[str, Any]:
     """The pickled dictionary in `path`: numbers and text as they are, arrays as records for `as_array`.
 
-    Raises ValueError when the file is too large, truncated, damaged, not a dictionary, or names anything not allowed.
+    `what` and `expected` name the file in messages. Raises ValueError when it is missing, too large, truncated,
+    damaged, not a dictionary, or names anything not allowed.
     """
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        raise ValueError(f"{path}: {size} bytes is more than any body model has ({MAX_BYTES}); is it the right file?")
     try:
-        content = RestrictedUnpickler(io.BytesIO(path.read_bytes()), encoding="latin1").load()
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise ValueError(f"{path}: {size} bytes is more than any {what} has ({MAX_BYTES}); is it the right file?")
+        data = path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from error
+    try:
+        content = RestrictedUnpickler(io.BytesIO(data), what).load()
     except Exception as error:  # damaged bytes can fail in any way
         reason = (
             f"the pickle {error}" if isinstance(error, pickle.UnpicklingError) else f"{type(error).__name__}: {error}"
         )
         raise ValueError(
-            f"{path}: cannot be read as a pickled body model: {reason}. Expected an unmodified SMPL, SMPL+H or SMPL-X "
-            "file; download it again, or save its arrays with numpy.savez and load that"
+            f"{path}: cannot be read as a pickled {what}: {reason}. Expected {expected}; download it again, or save "
+            "its arrays with numpy.savez and load that"
         ) from error
     if not isinstance(content, dict):
         raise ValueError(f"{path}: expected a pickled dictionary of arrays, found a {type(content).__name__}")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .benchmark import benchmark
+from .data import data
 from .errors import FileError
 from .evaluate import evaluate
 from .fit import fit
@@ -48,6 +49,7 @@ def main() -> None:
 main.add_command(fit)
 main.add_command(benchmark)
 main.add_command(evaluate)
+main.add_command(data)
 
 
 @main.command()

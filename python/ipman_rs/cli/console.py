@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -56,6 +56,14 @@ def progress(title: str, total: int) -> Iterator[Step]:
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         yield Step(bar, total, title)
+
+
+@contextmanager
+def busy(title: str) -> Iterator[None]:
+    """A sign of life on stderr for work of unknown length; nothing where stderr is no terminal."""
+    console = Console(stderr=True)
+    with console.status(Text(one_line(title))) if console.is_terminal else nullcontext():
+        yield
 
 
 def print_table(studies: Sequence[Study]) -> None:

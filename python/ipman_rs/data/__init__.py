@@ -30,6 +30,7 @@ DATASETS = {  # name -> module with NAME, open(path, split=None, **options) and 
     "mpii": "mpii",
     "opensim": "opensim",
     "rich": "rich",
+    "rich-ipman": "rich_ipman",
 }
 
 

@@ -6,7 +6,7 @@ the common form. `demand` makes an error of what is wrong.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -64,7 +64,7 @@ def of_frames(frames: Frames) -> list[Finding]:
     for what in ("joints", "vertices"):
         points = getattr(frames, what)
         if points is not None:
-            found += finite(what, points) + size_of_body(what, points)
+            found += finite_points(what, points) + size_of_body(what, points)
     if frames.transl is not None:
         found += finite("transl", frames.transl) + place("transl", frames.transl)
     if frames.pose is not None:
@@ -87,14 +87,25 @@ def names(values: NDArray[np.str_]) -> list[Finding]:
 
 
 def finite(what: str, values: NDArray[Any]) -> list[Finding]:
-    """Frames that have a NaN or an infinity in some places only: a frame without the thing is NaN throughout."""
-    rows = np.asarray(values).reshape(len(values), -1)
-    good = np.isfinite(rows)
-    if good.all():
-        return []
-    if not good.any():
-        return [Finding("wrong", f"{what}: no finite number in any frame")]
-    return [Finding("missing", f"{what}: {(~good.all(axis=1)).sum()} of {len(rows)} frames have NaN or infinity in them")]
+    """Whether every frame has the thing, values (F, …). A frame without it is NaN throughout: no figure needs it."""
+    good = np.isfinite(np.asarray(values).reshape(len(values), -1))
+    return _finite(what, good.any(axis=1), good.all(axis=1))
+
+
+def finite_points(what: str, points: NDArray[Any]) -> list[Finding]:
+    """The same for points (F, K, 3), of which a frame may lack some: those are NaN in x, y and z."""
+    good = np.isfinite(points)
+    return _finite(what, good.any(axis=(1, 2)), (good.all(axis=-1) | ~good.any(axis=-1)).all(axis=-1))
+
+
+def _finite(what: str, some: Any, whole: Any) -> list[Finding]:
+    found = []
+    if not some.all():
+        found.append(Finding("ok", f"{what}: {(~some).sum()} of {len(some)} frames have none"))
+    if (some & ~whole).any():
+        said = f"{what}: NaN or infinity among the numbers of {(some & ~whole).sum()} of {len(some)} frames"
+        found.append(Finding("missing", said, "no figure is computed for them"))
+    return found
 
 
 def size_of_body(what: str, points: NDArray[Any]) -> list[Finding]:
@@ -196,51 +207,56 @@ def cameras(given: Cameras) -> list[Finding]:
 
 def _upright(frames: Frames, ground: Ground) -> list[Finding]:
     if frames.joints is not None and frames.joint_names is not None:
-        head = next((frames.joint_names.index(name) for name in HEADS if name in frames.joint_names), None)
-        feet = _feet(frames.joint_names)
-        if head is not None and feet:
-            return upright("joints", frames.joints[:, head] - frames.joints[:, feet].mean(axis=1), ground)
+        seen = dict(zip(frames.joint_names, np.moveaxis(frames.joints, 1, 0), strict=True))
+        heads = [seen[name] for name in HEADS if name in seen and np.isfinite(seen[name]).any()]
+        feet = [points for name, points in seen.items() if any(word in name for word in FEET)]
+        if heads and feet:
+            return upright("joints", heads[0] - _mean(np.stack(feet)), ground)
     if frames.pose is not None and (frames.body or "").startswith("smpl"):
         return upright("pose", from_axis_angle(np.asarray(frames.pose[:, 0], np.float64))[..., 1], ground)
     return []
 
 
+def _mean(points: NDArray[Any]) -> NDArray[np.float64]:
+    """Mean of points (K, F, 3) over those of the K that are known; NaN where none is."""
+    known = np.isfinite(points).all(axis=-1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        return np.where(known, points, 0.0).sum(axis=0) / known.sum(axis=0)
+
+
 def _on_ground(frames: Frames, ground: Ground) -> list[Finding]:
     for what, points in (("vertices", frames.vertices), ("joints", frames.joints)):
         if points is not None:
-            return heights(f"lowest of the {what}", ground.signed_height(points).min(axis=-1))
+            height = ground.signed_height(points)
+            lowest = np.where(np.isfinite(height), height, np.inf).min(axis=-1)
+            return heights(f"lowest of the {what}", lowest)
     if frames.transl is not None:  # the pelvis, give or take SMPL's offset of 0.2 to 0.4 m
         return heights("transl", ground.signed_height(frames.transl[:, None])[:, 0], (-0.5, 2.5))
     return []
 
 
-def _feet(joint_names: Sequence[str]) -> list[int]:
-    return [i for i, name in enumerate(joint_names) if any(word in name for word in FEET)]
-
-
 def _projections(frames: Frames, given: Cameras) -> list[Finding]:
-    """Joints seen through the camera against the keypoints of the same names."""
+    """Joints seen through the camera, against the keypoints of the same names."""
     if frames.joints is None or frames.joint_names is None:
         return []
     seen = np.einsum("fij,fkj->fki", given.rotation, frames.joints) + given.translation[:, None]
-    depth = np.nanmedian(seen[..., 2])
-    if np.isfinite(depth) and depth <= 0:
+    depth = seen[..., 2][np.isfinite(seen[..., 2])]
+    if len(depth) and np.median(depth) <= 0:
         advice = "is the camera's transform that of the world to the camera?"
-        return [Finding("wrong", f"joints lie behind the camera ({depth:.2f} m)", advice)]
-    if frames.keypoints is None or frames.keypoint_names is None:
+        return [Finding("wrong", f"joints lie behind the camera ({np.median(depth):.2f} m)", advice)]
+    shared = [name for name in frames.joint_names if name in (frames.keypoint_names or ())]
+    if frames.keypoints is None or frames.keypoint_names is None or not shared:
         return []
-    shared = [name for name in frames.joint_names if name in frames.keypoint_names]
-    if not shared:
-        return []
-    pixels = np.einsum("fij,fkj->fki", given.intrinsics, seen)
-    pixels = pixels[..., :2] / pixels[..., 2:]
     found = frames.keypoints[:, [list(frames.keypoint_names).index(name) for name in shared]]
-    off = pixels[:, [list(frames.joint_names).index(name) for name in shared]] - found[..., :2]
-    off = np.linalg.norm(np.where(found[..., 2:] > 0, off, np.nan), axis=-1)
-    if np.isnan(off).all():
+    seen = np.einsum("fij,fkj->fki", given.intrinsics, seen)
+    seen = seen[:, [list(frames.joint_names).index(name) for name in shared]]
+    known = (found[..., 2] > 0) & np.isfinite(seen).all(axis=-1) & np.isfinite(found).all(axis=-1) & (seen[..., 2] > 0)
+    if not known.any():
         return []
-    size = np.nanmedian(np.nanmax(found[..., :2], axis=(1, 2)) - np.nanmin(found[..., :2], axis=(1, 2)))
-    said = f"joints seen through the camera lie {np.nanmedian(off):.1f} pixels from the keypoints in the median"
-    if np.nanmedian(off) <= 0.25 * size:
+    pixels, labelled = seen[known], found[known]
+    off = np.median(np.linalg.norm(pixels[:, :2] / pixels[:, 2:] - labelled[:, :2], axis=-1))
+    size = np.linalg.norm(np.ptp(np.where(known[..., None], found[..., :2], found[..., :1, :2]), axis=1), axis=-1)
+    said = f"joints seen through the camera lie {off:.1f} pixels from the keypoints in the median"
+    if off <= max(0.25 * np.median(size), 5.0):
         return [Finding("ok", said)]
     return [Finding("wrong", said, "the camera, the joints or the image's size are of another frame")]
