@@ -95,7 +95,7 @@ def test_duckdb_over_the_frames_gives_the_means(evaluated, record):
     pytest.importorskip("pyarrow")
     frames = str(evaluated[0] / "out" / "frames.parquet")
     for name, told in record["methods"]["guess"]["figures"].items():
-        query = f"select avg({name}), count({name}), stddev_samp({name}) from read_parquet('{frames}') where not isnan({name})"
+        query = f"select avg({name}), count({name}), stddev_samp({name}) from '{frames}'"
         mean, count, std = duckdb.sql(query).fetchall()[0]
         assert told["mean"] == pytest.approx(mean, rel=1e-12)
         assert told["frames"] == count

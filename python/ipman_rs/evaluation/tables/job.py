@@ -204,8 +204,8 @@ class Job:
             lacking = true.names[where < 0]
             raise ValueError(
                 f"{self.predictions}: no prediction for {len(lacking)} of the frames {true.names[0]} to "
-                f"{true.names[-1]} of {self.source.name}, such as {lacking[0]!r}; the file's names are like "
-                f"{self.estimates.columns['names'][:1][0]!r}; --partial leaves them out"
+                f"{true.names[-1]} of {self.source.name}, such as {str(lacking[0])!r}; the file's names are like "
+                f"{str(self.estimates.columns['names'][:1][0])!r}; --partial leaves them out"
             )
         there = np.flatnonzero(where >= 0)
         return true[there], self.estimates[where[there]], rows.start + there

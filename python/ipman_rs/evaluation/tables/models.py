@@ -71,7 +71,8 @@ class Models:
         pose = np.asarray(frames.pose)
         width = 10 if frames.betas is None else frames.betas.shape[1]
         genders = np.full(len(frames), "neutral") if frames.genders is None else np.asarray(frames.genders)
-        vertices = joints = np.zeros((0, 0, 3))
+        shape = self.template_of(kind)
+        vertices, joints = np.zeros((0, shape.num_vertices, 3)), np.zeros((0, shape.num_joints, 3))
         for number, gender in enumerate(np.unique(genders)):
             rows = np.flatnonzero(genders == gender)
             model = self.get(kind, str(gender), width)

@@ -59,7 +59,7 @@ class Predictions:
         found: dict[str, Any] = {name: column[rows] for name, column in self.columns.items()}
         for name in POINTS:
             if name in found:
-                found[name] = found[name].reshape(len(found[name]), -1, 3)
+                found[name] = found[name].reshape(len(found[name]), int(np.prod(found[name].shape[1:])) // 3, 3)
         for name in found.keys() & set(NUMBERS):
             kind = found[name].dtype
             found[name] = found[name].astype(bool if name in LABELS else np.promote_types(kind, "f4"))
@@ -182,7 +182,7 @@ class Names:
         if len(twice):
             name = column[rows[twice[:1]]][0]
             raise ValueError(
-                f"{predictions.path}: names: {len(twice)} frames stand there more than once, such as {name!r}"
+                f"{predictions.path}: names: {len(twice)} frames stand there more than once, such as {str(name)!r}"
             )
         return cls(column, hashes, rows)
 

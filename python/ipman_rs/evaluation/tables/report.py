@@ -47,18 +47,22 @@ class Report:
 
 def write(report: Report, folder: Path, jobs: list[Job], progress: Callable[[int], None]) -> list[Path]:
     """The files; `progress` is told how many frames more are in frames.parquet."""
-    files = {
-        f"{NAME}.md": markdown(report).encode(),
-        f"{NAME}.json": (json.dumps(record(report), indent=1, allow_nan=False) + "\n").encode(),
-        f"{NAME}.csv": _csv(report).encode(),
-        "sequences.csv": _sequences(report).encode(),
-        **_plot(report),
-    }
+    files = {**{name: text.encode() for name, text in texts(report).items()}, **_plot(report)}
     for name, content in files.items():
         with being_written(folder / name) as file:
             file.write(content)
     written = [folder / name for name in files]
-    return [*written, *_frames(folder / "frames.parquet", jobs, progress)]
+    return [*written, *write_frames(folder / "frames.parquet", jobs, progress)]
+
+
+def texts(report: Report) -> dict[str, str]:
+    """The files by name, without pictures and frames."""
+    return {
+        f"{NAME}.md": markdown(report),
+        f"{NAME}.json": json.dumps(record(report), indent=1, allow_nan=False) + "\n",
+        f"{NAME}.csv": _csv(report),
+        "sequences.csv": _sequences(report),
+    }
 
 
 def markdown(report: Report) -> str:
@@ -284,7 +288,7 @@ def _differences(axis: Any, difference: Difference, names: list[str]) -> None:
     axis.tick_params(labelsize=8)
 
 
-def _frames(path: Path, jobs: list[Job], progress: Callable[[int], None]) -> list[Path]:
+def write_frames(path: Path, jobs: list[Job], progress: Callable[[int], None]) -> list[Path]:
     """Every frame's figures, method by method; nothing where pyarrow is missing."""
     try:
         pyarrow, writer = parquet.needed()
@@ -297,7 +301,9 @@ def _frames(path: Path, jobs: list[Job], progress: Callable[[int], None]) -> lis
         for method, piece in frames_of(jobs):
             count = len(piece["names"])
             columns = {"method": [method] * count, "name": piece["names"], "sequence": piece["sequences"]}
-            columns |= {name: piece.get(name, np.full(count, np.nan)) for name in names}
+            # Null where there is none: queries leave it out of means, which they do not with NaN.
+            numbers = {name: piece.get(name, np.full(count, np.nan)) for name in names}
+            columns |= {name: pyarrow.array(value, from_pandas=True) for name, value in numbers.items()}
             table.write_table(pyarrow.table(columns, schema=schema))
             progress(count)
     return [path]

@@ -136,11 +136,12 @@ class being_written:
         return self.file
 
     def __exit__(self, kind: Any, *_: Any) -> None:
-        if kind is None:
-            self.file.flush()
-            os.fsync(self.file.fileno())
-        self.file.close()
-        if kind is None:
-            os.replace(self.part, self.path)
-        else:
+        try:
+            with self.file:
+                if kind is None:
+                    self.file.flush()
+                    os.fsync(self.file.fileno())
+            if kind is None:
+                os.replace(self.part, self.path)
+        finally:
             self.part.unlink(missing_ok=True)
