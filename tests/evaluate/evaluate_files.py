@@ -72,7 +72,7 @@ def write(jobs: list[Job]) -> dict[str, Any]:
     report = reports.Report("test", "made", found, differences)
     for name, text in reports.texts(report).items():
         (folder / name).write_text(text)
-    reports.write_frames(folder / "frames.parquet", jobs, lambda frames: None)
+    reports.write_frames(folder / "frames.parquet", report, jobs, lambda frames: None)
     return json.loads((folder / "evaluation.json").read_text())
 
 

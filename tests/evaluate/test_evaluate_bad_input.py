@@ -64,7 +64,10 @@ def test_pickled_names_are_not_loaded(tmp_path, guessed):
 
 CHANGES = {
     "no names": (lambda a: a.pop("names"), "expected names, the name of each frame"),
-    "no bodies": (lambda a: [a.pop(k) for k in ("pose", "transl")], "expected pose .* vertices or joints; it has betas"),
+    "no bodies": (
+        lambda a: [a.pop(k) for k in ("pose", "transl")],
+        "expected pose .* vertices or joints; it has betas",
+    ),
     "no body": (lambda a: a.pop("body"), "pose without body: add body, one of smpl"),
     "lengths": (lambda a: a.update(transl=a["transl"][:-1]), r"transl: expected 300 rows, .* got shape \(299, 3\)"),
     "names length": (lambda a: a.update(names=a["names"][:10]), r"pose: expected 10 rows|betas: expected 10 rows"),
@@ -86,7 +89,11 @@ def test_arrays_that_do_not_fit(change, tmp_path, guessed):
 
 def test_vertices_in_millimetres(tmp_path, guessed):
     arrays = {"names": guessed["names"][:8], "vertices": 1000 * np.random.default_rng(0).random((8, 99, 3))}
-    refused(files.save(tmp_path / "mm.npz", arrays), "vertices: looks like millimetres: a body spans .* divide by 1000", tmp_path)
+    refused(
+        files.save(tmp_path / "mm.npz", arrays),
+        "vertices: looks like millimetres: a body spans .* divide by 1000",
+        tmp_path,
+    )
 
 
 def job_of(tmp_path, true, arrays, **options):
@@ -101,7 +108,9 @@ def test_too_few_frames_and_foreign_names(tmp_path, true, guessed):
     foreign = dict(guessed, names=np.char.add("other/", guessed["names"]))
     job = job_of(tmp_path, true, foreign)
     job.begin()
-    with pytest.raises(ValueError, match=r"no prediction for 40 of the frames walk0/0000 .* such as .*walk0/0000") as said:
+    with pytest.raises(
+        ValueError, match=r"no prediction for 40 of the frames walk0/0000 .* such as .*walk0/0000"
+    ) as said:
         job.measure(0)
     assert "the file's names are like 'other/walk0/0000'" in str(said.value)
 
@@ -137,7 +146,9 @@ def test_a_frame_of_nan_touches_no_other(evaluated, tmp_path, true, guessed):
     bad = [5, 123, 200]
     good = np.setdiff1d(np.arange(300), bad)
     for name in FIGURES:
-        pieces = [np.concatenate([p[name] for p in each.results()]) for each in (evaluated[1], job) if name in each.result(0)]
+        pieces = [
+            np.concatenate([p[name] for p in each.results()]) for each in (evaluated[1], job) if name in each.result(0)
+        ]
         if pieces and name != "skating":  # which looks at the frame before
             np.testing.assert_array_equal(pieces[0][good], pieces[1][good])
             assert np.isnan(pieces[1][bad]).all()

@@ -157,7 +157,9 @@ def test_a_pressure_mat_is_compared(evaluated):
     guess = job.estimates[slice(0, 6)]
     vertices = job.bodies.posed(guess).vertices
     samples = ip.sample_surface(vertices, model.template)
-    mat = PressureMaps(np.zeros((6, 90, 90)), np.array([-1.0, 0, -1.0]), np.array([1.0, 0, 0]), np.array([0, 0, 1.0]), 0.025)
+    mat = PressureMaps(
+        np.zeros((6, 90, 90)), np.array([-1.0, 0, -1.0]), np.array([1.0, 0, 0]), np.array([0, 0, 1.0]), 0.025
+    )
     pressed = pressure_map(samples, ip.pressure(vertices, model.template, floor, alpha=100, gamma=10), mat)
     centers = ip.center_of_pressure(vertices, model.template, floor, alpha=100, gamma=10)
     true = replace(job.data[slice(0, 6)], pressure=replace(mat, values=pressed), center_of_pressure=centers)
@@ -249,7 +251,9 @@ def test_models_are_found_in_a_folder(tmp_path):
     """SMPL under the names that it is downloaded with; a missing one is named."""
     from ipman_rs.evaluation.tables.models import Models
 
-    with pytest.raises(ValueError, match=r"smpl \(male\) needs its model file, SMPL_MALE.npz or .pkl: there is none under"):
+    with pytest.raises(
+        ValueError, match=r"smpl \(male\) needs its model file, SMPL_MALE.npz or .pkl: there is none under"
+    ):
         Models(tmp_path).get("smpl", "male")
     with pytest.raises(ValueError, match="no folder is named by --models"):
         Models().get("smplx")

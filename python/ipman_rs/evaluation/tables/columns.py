@@ -41,7 +41,17 @@ def columns(job: Job, start: int, stop: int) -> Columns:
         found = figures(true, estimated, job)
         own = slice(int(len(kept) > 0 and kept[0] < first), None)
         parts.append({name: value[own] for name, value in found.items()})
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return joined(parts)
+
+
+def joined(parts: list[Columns]) -> Columns:
+    """One after the other; NaN where a part lacks a figure that another has."""
+    known = list(dict.fromkeys(name for part in parts for name in part))
+    lengths = [len(part["names"]) for part in parts]
+    return {
+        name: np.concatenate([part.get(name, np.full(n, np.nan)) for part, n in zip(parts, lengths, strict=True)])
+        for name in known
+    }
 
 
 def figures(true: Frames, estimated: Frames, job: Job) -> Columns:

@@ -114,6 +114,7 @@ class Job:
 
     def begin(self) -> None:
         """Makes the folder; ValueError where it holds the figures of something else, or lengths cannot fit."""
+        _ = self.joint_regressor  # fails early
         self.place.mkdir(parents=True, exist_ok=True)
         file = self.place / "made_of.json"
         if file.exists():

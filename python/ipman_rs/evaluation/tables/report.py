@@ -52,7 +52,7 @@ def write(report: Report, folder: Path, jobs: list[Job], progress: Callable[[int
         with being_written(folder / name) as file:
             file.write(content)
     written = [folder / name for name in files]
-    return [*written, *write_frames(folder / "frames.parquet", jobs, progress)]
+    return [*written, *write_frames(folder / "frames.parquet", report, jobs, progress)]
 
 
 def texts(report: Report) -> dict[str, str]:
@@ -97,7 +97,7 @@ def rows(report: Report) -> tuple[list[str], list[list[str]]]:
             said[name] = "–" if found is None else _with_interval(figure, found)
         columns.append((each.name, said))
     titles = {name: f"{figure.title}{f', {figure.unit}' if figure.unit else ''}" for name, figure in figures.items()}
-    if report.table is not None and report.table.across:
+    if report.table is None or report.table.across:
         head = ["", *(name for name, _ in columns)]
         return head, [[titles[key], *(said.get(key, "–") for _, said in columns)] for key in figures]
     return ["", *titles.values()], [[name, *(said.get(key, "–") for key in figures)] for name, said in columns]
@@ -288,13 +288,13 @@ def _differences(axis: Any, difference: Difference, names: list[str]) -> None:
     axis.tick_params(labelsize=8)
 
 
-def write_frames(path: Path, jobs: list[Job], progress: Callable[[int], None]) -> list[Path]:
+def write_frames(path: Path, report: Report, jobs: list[Job], progress: Callable[[int], None]) -> list[Path]:
     """Every frame's figures, method by method; nothing where pyarrow is missing."""
     try:
         pyarrow, writer = parquet.needed()
     except ValueError:
         return []
-    names = [name for name in FIGURES if any(name in job.result(0) for job in jobs if job.pieces)]
+    names = [name for name in FIGURES if any(name in each.summary for each in report.measured)]
     text = ["method", "name", "sequence"]
     schema = pyarrow.schema([(name, pyarrow.string()) for name in text] + [(name, pyarrow.float64()) for name in names])
     with being_written(path) as file, writer.ParquetWriter(file, schema, compression="zstd") as table:
