@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .clusters import differences
 
-DRAWS = 1 << 22  # at a time
+DRAWS = 1 << 20  # at a time
 
 
 class Interval(NamedTuple):

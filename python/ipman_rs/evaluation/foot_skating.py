@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ipman_rs.checks import positive
 
 from .alike import AnyGround, alike
-from .points import norm, points
+from .points import finite, norm, points
 
 
 @alike
@@ -29,7 +29,7 @@ def foot_skating(feet: ArrayLike, ground: AnyGround, sequences: ArrayLike, thres
     Raises:
         ValueError: shapes do not fit, or the threshold is not positive.
     """
-    way = points("feet", feet)
+    way = finite(points("feet", feet))
     names = np.asarray(sequences)
     if way.ndim != 3:
         raise ValueError(f"feet: expected (F, N, 3), got {way.shape}")

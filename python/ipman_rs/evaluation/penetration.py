@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ipman_rs.ground import Ground
@@ -27,5 +28,6 @@ def hover(vertices: ArrayLike, ground: AnyGround) -> Any:
 
 
 def lowest(vertices: ArrayLike, ground: Ground) -> Array:
-    """Signed height of the lowest vertex, (...) m."""
-    return ground.signed_height(points("vertices", vertices)).min(axis=-1)
+    """Signed height of the lowest vertex, (...) m; NaN for a body that is not finite."""
+    heights = ground.signed_height(points("vertices", vertices))
+    return np.where(np.isfinite(heights.max(axis=-1)), heights.min(axis=-1), np.nan)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .alike import alike
-from .points import Array, pair
+from .points import Array, finite, pair
 
 
 @alike
@@ -35,14 +35,15 @@ def moved(points: Array, target: Array) -> Array:
 
 
 def _similarity(points: Array, target: Array) -> tuple[Array, Array, Array]:
+    points, target = finite(points), finite(target)
     middle, goal = points.mean(axis=-2, keepdims=True), target.mean(axis=-2, keepdims=True)
     p, q = points - middle, target - goal
     covariance = q.swapaxes(-1, -2) @ p
-    finite = np.isfinite(covariance).all(axis=(-2, -1), keepdims=True)
-    u, sizes, vt = np.linalg.svd(np.where(finite, covariance, np.eye(3)))  # which would not converge on NaN
+    known = np.isfinite(covariance).all(axis=(-2, -1), keepdims=True)
+    u, sizes, vt = np.linalg.svd(np.where(known, covariance, np.eye(3)))  # which would not converge on NaN
     signs = np.ones_like(sizes)
     signs[..., 2] = np.sign(np.linalg.det(u @ vt))
-    rotation = np.where(finite, (u * signs[..., None, :]) @ vt, np.nan)
+    rotation = np.where(known, (u * signs[..., None, :]) @ vt, np.nan)
     spread = (p**2).sum(axis=(-2, -1))
     scale = np.where(spread == 0, 1.0, (sizes * signs).sum(axis=-1) / np.where(spread == 0, 1.0, spread))
     shift = goal[..., 0, :] - scale[..., None] * (rotation @ middle.swapaxes(-1, -2))[..., 0]

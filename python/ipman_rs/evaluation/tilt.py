@@ -12,7 +12,7 @@ from ipman_rs.arrays import plain
 from ipman_rs.ground import Ground
 
 from .alike import AnyGround, alike
-from .points import Array, norm, pair
+from .points import Array, finite, norm, pair
 from .procrustes import similarity
 
 PELVIS = (0, 1, 2, 3)  # of SMPL, SMPL-H and SMPL-X: what turns with the root alone (pelvis, hips, first of the spine)
@@ -40,7 +40,7 @@ def tilt(
     Raises:
         ValueError: shapes differ, or there are fewer than three joints.
     """
-    first, second = pair("joints", estimated, true)
+    first, second = map(finite, pair("joints", estimated, true))
     if len(pelvis) < 3:
         raise ValueError(f"pelvis: expected three joints or more, got {len(pelvis)}")
     rotation = similarity(second[..., list(pelvis), :], first[..., list(pelvis), :])[1]
@@ -54,8 +54,7 @@ def root_tilt(estimated: ArrayLike, true: ArrayLike, ground: AnyGround, true_gro
     first, second = (plain("rotations", value).astype(np.float64) for value in (estimated, true))
     if first.shape != second.shape or first.shape[-2:] != (3, 3):
         raise ValueError(f"rotations: expected two arrays (..., 3, 3), got {first.shape} and {second.shape}")
-    for turns in (first, second):
-        turns[~np.isfinite(turns).all(axis=(-2, -1))] = np.nan
+    first, second = finite(first), finite(second)
     seen = (first.swapaxes(-1, -2) @ _up(ground)[..., None])[..., 0]
     truly = (second.swapaxes(-1, -2) @ _up(true_ground or ground)[..., None])[..., 0]
     return _between(seen, truly)
