@@ -38,6 +38,15 @@ def read(path: Path, name: str) -> NDArray[Any]:
         raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
 
 
+def shape_of(path: Path, name: str) -> tuple[int, ...]:
+    """The shape that array `name` of `path` claims; a few bytes are read. Raises as `read`."""
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as stream:
+            return tuple(int(size) for size in _header(stream)[0])
+    except Exception as error:
+        raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
+
+
 def mapped(path: Path, name: str) -> NDArray[Any]:
     """Array `name` of `path` without reading it: the rows that are looked at come from the disk, however long it is.
 

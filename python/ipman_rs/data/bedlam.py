@@ -28,11 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.body import joints
-from ipman_rs.body.rotations import from_axis_angle
 from ipman_rs.ground import Ground
 
 from . import naming
-from .check import Finding, demand, of_frames, sample, upright
+from .check import Finding, demand, of_frames, sample, stance
 from .frames import Cameras, Frames, Rows
 from .joined import Joined
 from .rows import TEXT, RowFile
@@ -146,10 +145,6 @@ def _files(place: Path) -> list[Path]:
 
 
 def _plausible(scene: Scene) -> list[Finding]:
-    """The axes are judged without a floor's height, too."""
+    """The axes are judged without a floor, too."""
     frames = sample(scene)
-    found = of_frames(frames)
-    if frames.ground is None and frames.pose is not None:
-        root = from_axis_angle(frames.pose[:, 0])
-        found += upright("pose_world", root[..., 1], Ground(UP))
-    return found
+    return of_frames(frames) + (stance(frames, Ground(UP)) if frames.ground is None else [])

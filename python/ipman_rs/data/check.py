@@ -6,9 +6,9 @@ the common form. `demand` makes an error of what is wrong.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -38,14 +38,14 @@ class Finding:
     advice: str = ""
 
 
-def demand(path: Path | str, findings: Iterable[Finding]) -> None:
+def demand(path: str | os.PathLike[str], findings: Iterable[Finding]) -> None:
     """ValueError with the file's name and all that is wrong; what is merely missing passes."""
     wrong = [f"{each.what}; {each.advice}" if each.advice else each.what for each in findings if each.level == "wrong"]
     if wrong:
         raise ValueError(f"{path}: {'. '.join(wrong)}")
 
 
-def demanded(path: Path | str, data: DS) -> DS:
+def demanded(path: str | os.PathLike[str], data: DS) -> DS:
     """`data`, if a sample of its frames has plausible units, axes, ground and cameras; else ValueError."""
     demand(path, of_frames(sample(data)))
     return data
@@ -60,21 +60,35 @@ def of_frames(frames: Frames) -> list[Finding]:
     """All that can be told from the frames alone: whatever they have is judged, whatever they lack is passed over."""
     if not len(frames):
         return [Finding("wrong", "no frame at all", "the file is empty: is the download complete?")]
-    found = names(frames.names)
+    found = names(frames.names) + _lengths(frames)
+    if frames.pose is not None:
+        found += finite("pose", frames.pose) + radians("pose", frames.pose)
+    if frames.betas is not None:
+        found += finite("betas", frames.betas)
+    if _any_wrong(found):  # floor and cameras would only repeat it
+        return found
+    standing = stance(frames, frames.ground) if frames.ground is not None else []
+    found += standing
+    if frames.ground is not None and not _any_wrong(standing):
+        found += _on_ground(frames, frames.ground)
+    if frames.cameras is not None:
+        found += cameras(frames.cameras)
+        found += [] if _any_wrong(standing) else _projections(frames, frames.cameras)
+    return found
+
+
+def _any_wrong(found: list[Finding]) -> bool:
+    return any(each.level == "wrong" for each in found)
+
+
+def _lengths(frames: Frames) -> list[Finding]:
+    found = []
     for what in ("joints", "vertices"):
         points = getattr(frames, what)
         if points is not None:
             found += finite_points(what, points) + size_of_body(what, points)
     if frames.transl is not None:
         found += finite("transl", frames.transl) + place("transl", frames.transl)
-    if frames.pose is not None:
-        found += finite("pose", frames.pose) + radians("pose", frames.pose)
-    if frames.betas is not None:
-        found += finite("betas", frames.betas)
-    if frames.ground is not None:
-        found += _upright(frames, frames.ground) + _on_ground(frames, frames.ground)
-    if frames.cameras is not None:
-        found += cameras(frames.cameras) + _projections(frames, frames.cameras)
     return found
 
 
@@ -83,7 +97,9 @@ def names(values: NDArray[np.str_]) -> list[Finding]:
     unique, counts = np.unique(values, return_counts=True)
     if len(unique) == len(values):
         return []
-    return [Finding("wrong", f"{len(values) - len(unique)} frames share a name, such as {unique[counts.argmax()]!r}")]
+    return [
+        Finding("wrong", f"{len(values) - len(unique)} frames share a name, such as {str(unique[counts.argmax()])!r}")
+    ]
 
 
 def finite(what: str, values: NDArray[Any]) -> list[Finding]:
@@ -141,11 +157,11 @@ def place(what: str, positions: NDArray[Any]) -> list[Finding]:
 
 def radians(what: str, pose: NDArray[Any]) -> list[Finding]:
     """Whether rotation vectors (F, J, 3) can be radians."""
-    angles = np.linalg.norm(np.asarray(pose, np.float64), axis=-1)
-    angles = angles[np.isfinite(angles)]
-    if not len(angles) or np.quantile(angles, 0.95) <= 2 * np.pi:
+    largest = np.linalg.norm(np.asarray(pose, np.float64), axis=-1).max(axis=-1)
+    largest = largest[np.isfinite(largest)]
+    if not len(largest) or np.median(largest) <= 2 * np.pi:
         return []
-    said = f"{what}: looks like degrees: rotations by up to {angles.max():.4g}, expected radians"
+    said = f"{what}: looks like degrees: rotations by up to {largest.max():.4g}, expected radians"
     return [Finding("wrong", said, "multiply by π/180")]
 
 
@@ -162,15 +178,28 @@ def upright(what: str, up: NDArray[Any], ground: Ground) -> list[Finding]:
         return []
     unit, normal = up[seen] / length[seen][:, None], normal[seen]
     agreement = float((unit * normal).sum(axis=-1).mean())
+    expected = f"({', '.join(f'{number:.2g}' for number in normal[0])})"
     if agreement > 0.5:
-        return [Finding("ok", f"{what}: people stand along the ground's normal")]
+        return [Finding("ok", f"{what}: people stand along up, {expected}")]
     mean = unit.mean(axis=0)
     axis = int(np.concatenate([mean, -mean]).argmax())
     if np.abs(mean).max() < 0.6 or agreement > 0.3:
         return []
-    expected = f"({', '.join(f'{number:.2g}' for number in normal[0])})"
     said = f"{what}: looks like {AXES[axis]} up: heads lie that way from the feet, but up is said to be {expected}"
     return [Finding("wrong", said, "these are other axes than the data set's own: were they turned or not turned?")]
+
+
+def stance(frames: Frames, ground: Ground) -> list[Finding]:
+    """`upright` of the frames' joints, or else of the roots of their SMPL bodies; the ground's height is not needed."""
+    if frames.joints is not None and frames.joint_names is not None:
+        seen = dict(zip(frames.joint_names, np.moveaxis(frames.joints, 1, 0), strict=True))
+        heads = [seen[name] for name in HEADS if name in seen and np.isfinite(seen[name]).any()]
+        feet = [points for name, points in seen.items() if any(word in name for word in FEET)]
+        if heads and feet:
+            return upright("joints", heads[0] - _mean(np.stack(feet)), ground)
+    if frames.pose is not None and (frames.body or "").startswith("smpl"):
+        return upright("pose", from_axis_angle(np.asarray(frames.pose[:, 0], np.float64))[..., 1], ground)
+    return []
 
 
 def heights(what: str, lowest: NDArray[Any], allowed: tuple[float, float] = (-0.3, 0.5)) -> list[Finding]:
@@ -203,18 +232,6 @@ def cameras(given: Cameras) -> list[Finding]:
         said = f"cameras.intrinsics: focal lengths of {np.median(focal, axis=0)} are no pixels"
         found.append(Finding("wrong", said, "they look divided by the image's size, or are another matrix"))
     return found or [Finding("ok", "cameras: rotations, focal lengths in pixels, positions in metres")]
-
-
-def _upright(frames: Frames, ground: Ground) -> list[Finding]:
-    if frames.joints is not None and frames.joint_names is not None:
-        seen = dict(zip(frames.joint_names, np.moveaxis(frames.joints, 1, 0), strict=True))
-        heads = [seen[name] for name in HEADS if name in seen and np.isfinite(seen[name]).any()]
-        feet = [points for name, points in seen.items() if any(word in name for word in FEET)]
-        if heads and feet:
-            return upright("joints", heads[0] - _mean(np.stack(feet)), ground)
-    if frames.pose is not None and (frames.body or "").startswith("smpl"):
-        return upright("pose", from_axis_angle(np.asarray(frames.pose[:, 0], np.float64))[..., 1], ground)
-    return []
 
 
 def _mean(points: NDArray[Any]) -> NDArray[np.float64]:

@@ -31,17 +31,24 @@ class Cameras:
 class PressureMaps:
     """What a mat measured under the body: a map a frame, on a grid of square cells on the ground.
 
-    The point of cell (i, j) is origin + (i + ½) cell e1 + (j + ½) cell e2.
+    The point of cell (i, j) is origin + (i + ½) cell e1 + (j + ½) cell e2. Where the mat lay elsewhere in some of the
+    frames, origin, e1 and e2 have a row a frame; the maps of one frame, or of one place, never have.
     """
 
     values: Array  # (F, H, W), in the mat's own unit
-    origin: Array  # (3,) m
-    e1: Array  # (3,) unit vector along the rows' numbers
-    e2: Array  # (3,) unit vector along the columns' numbers
+    origin: Array  # (3,) or (F, 3) m
+    e1: Array  # (3,) or (F, 3) unit vector along the rows' numbers
+    e2: Array  # (3,) or (F, 3) unit vector along the columns' numbers
     cell: float  # m
 
     def __getitem__(self, rows: Rows) -> PressureMaps:
-        return replace(self, values=self.values[rows])
+        placed = np.concatenate([np.atleast_2d(part) for part in (self.origin, self.e1, self.e2)], axis=1)
+        if len(placed) > 1:
+            placed = placed[rows]
+        if len(placed) and (placed == placed[0]).all():
+            placed = placed[0]
+        origin, e1, e2 = np.split(placed, 3, axis=-1)
+        return PressureMaps(self.values[rows], origin, e1, e2, self.cell)
 
 
 @dataclass(frozen=True, eq=False)

@@ -95,9 +95,10 @@ def _grounds(grounds: list[Ground], counts: list[int]) -> Ground:
 
 def _pressure(maps: list[PressureMaps]) -> PressureMaps:
     first = maps[0]
-    for each in maps:
-        if each.cell != first.cell or not all(
-            np.array_equal(getattr(each, name), getattr(first, name)) for name in ("origin", "e1", "e2")
-        ):
-            raise ValueError("pressure: the mats lie in different places; open the files one by one")
-    return PressureMaps(np.concatenate([each.values for each in maps]), first.origin, first.e1, first.e2, first.cell)
+    if any((each.cell, each.values.shape[1:]) != (first.cell, first.values.shape[1:]) for each in maps):
+        raise ValueError("pressure: the mats have other cells; open the files one by one")
+    origin, e1, e2 = (
+        np.concatenate([np.broadcast_to(getattr(each, name), (len(each.values), 3)) for each in maps])
+        for name in ("origin", "e1", "e2")
+    )
+    return PressureMaps(np.concatenate([each.values for each in maps]), origin, e1, e2, first.cell)[:]

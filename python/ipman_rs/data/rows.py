@@ -1,12 +1,13 @@
 """Arrays of an `.npz` file with a row a frame, mapped into memory: a row costs what its own bytes cost.
 
 numpy.savez stores its arrays as they are, so nothing is read before its rows are asked for, in a file of any length. A
-file of numpy.savez_compressed has to be unpacked: once, when it is opened, up to 1 GB an array, which stay in memory.
+file of numpy.savez_compressed has to be unpacked: once, when it is opened, up to 4 GB, which stay in memory.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from .check import Finding
 from .frames import Rows
 
 TEXT = "text"  # instead of the shape of a row
+UNPACKED = 4 << 30  # bytes of packed arrays, together
 PIECE = 1 << 14  # rows of a scan that are in memory at once
 
 
@@ -37,7 +39,7 @@ class RowFile:
         if lacking:
             raise ValueError(f"{path}: no {', '.join(lacking)} among its arrays ({', '.join(sorted(there)) or 'none'})")
         self.path, self.shapes = path, shapes
-        self.arrays = {name: safe_npz.mapped(path, name) for name in shapes if name in there}
+        self.arrays = self._opened(name for name in shapes if name in there)
         first = self.arrays[required[0]]
         self.count = len(first) if first.ndim else 0
         for name, array in self.arrays.items():
@@ -61,10 +63,14 @@ class RowFile:
 
     def texts(self, name: str, rows: Rows) -> NDArray[np.str_]:
         """Rows of an array of text."""
+        values = np.asarray(self.arrays[name][rows]).reshape(-1)
         try:
-            return np.asarray(self.arrays[name][rows]).astype(np.str_).reshape(-1)
-        except ValueError as error:
+            texts = values.astype(np.str_)
+        except UnicodeDecodeError as error:
             raise ValueError(f"{self.path}: {name}: holds what is no text ({error})") from None
+        if texts.nbytes and texts.view(np.uint32).max() > sys.maxunicode:  # numpy and Python do not look
+            raise ValueError(f"{self.path}: {name}: holds what is no text (characters that Unicode does not have)")
+        return texts
 
     def scan(self) -> Iterator[Finding]:
         """Every number of the file, whether it is one."""
@@ -75,6 +81,17 @@ class RowFile:
             if bad:
                 said = f"{name}: NaN or infinity in {bad} of {self.count} rows"
                 yield Finding("missing", said, "no figure is computed for them")
+
+    def _opened(self, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+        arrays: dict[str, NDArray[Any]] = {}
+        unpacked = 0
+        for name in names:
+            arrays[name] = safe_npz.mapped(self.path, name)
+            unpacked += 0 if isinstance(arrays[name], np.memmap) else arrays[name].nbytes
+            if unpacked > UNPACKED:
+                advice = "save it again with numpy.savez, which need not be unpacked"
+                raise ValueError(f"{self.path}: unpacks to more than {UNPACKED >> 30} GB; {advice}")
+        return arrays
 
     def _check(self, name: str, array: NDArray[Any], first: str) -> None:
         wanted = self.shapes[name]

@@ -33,7 +33,7 @@ from ipman_rs.fitting.keypoints.openpose import BODY_25
 from ipman_rs.ground import Ground
 
 from . import naming
-from .check import Finding, demanded, of_frames, sample
+from .check import Finding, demand, of_frames, sample, stance
 from .frames import Array, Cameras, Frames, Rows
 from .rows import TEXT, RowFile
 
@@ -76,18 +76,17 @@ class Form:
 
 
 class Spin:
-    """A data set in this form: rows of one file, as Frames."""
+    """A data set in this form: the rows of one file, as Frames."""
 
-    def __init__(self, path: Path, form: Form, frame: str | None = None, height: float | None = None) -> None:
-        self.file = RowFile(path, SHAPES, REQUIRED)
-        self.form = form
+    def __init__(self, file: RowFile, form: Form, frame: str | None = None, height: float | None = None) -> None:
+        self.file, self.form = file, form
         self.world = self._in_world(frame)
         self.height = form.height if height is None else height
         self.people = self._people()
         labels = [form.label(image) for image in self.file.texts("imgname", slice(0, 64)).tolist()]
         self.frame_rate = naming.frame_rate(labels, form.video_rate)
         if "ground_offset" in self.file and not np.isfinite(self.file.arrays["ground_offset"]).all():
-            raise ValueError(f"{path}: ground_offset: expected metres in every row, got NaN or infinity")
+            raise ValueError(f"{file.path}: ground_offset: expected metres in every row, got NaN or infinity")
 
     def __len__(self) -> int:
         return len(self.file)
@@ -216,7 +215,9 @@ def open(
     file for what is missing, damaged, of a wrong shape, or not metres, radians and the axes that are promised.
     """
     file = _file(form, Path(path), split)
-    return demanded(file, Spin(file, form, frame, height))
+    data = Spin(RowFile(file, SHAPES, REQUIRED), form, frame, height)
+    demand(file, _plausible(data))
+    return data
 
 
 def check(form: Form, path: str | os.PathLike[str]) -> list[Finding]:
@@ -231,17 +232,17 @@ def check(form: Form, path: str | os.PathLike[str]) -> list[Finding]:
         if (place / name).is_file():
             found += _check_file(form, place / name)
         else:
-            found.append(
-                Finding("missing", f"{name}: not in the folder (split {split!r})", "see the data set's own page")
-            )
+            found.append(Finding("missing", f"{name}: not in the folder", f"only the split {split!r} needs it"))
     return found
 
 
 def _check_file(form: Form, file: Path) -> list[Finding]:
     try:
-        data = Spin(file, form)
-        found = [Finding("ok", f"{len(data)} rows with {', '.join(data.file)}")]
-        found += of_frames(sample(data))
+        data = Spin(RowFile(file, SHAPES, REQUIRED), form)
+        found = [Finding("ok", f"{len(data)} rows with {', '.join(data.file)}"), *_plausible(data)]
+        if data.world and "S" in data.file:
+            seen = _plausible(Spin(data.file, form, "camera"))
+            found += [Finding(each.level, f"in the camera's axes: {each.what}", each.advice) for each in seen]
         found += data.file.scan()
     except ValueError as error:
         return [Finding("wrong", str(error))]
@@ -249,6 +250,13 @@ def _check_file(form: Form, file: Path) -> list[Finding]:
         Finding("missing", f"{name}: no such array", why) for name, why in form.wanted.items() if name not in data.file
     ]
     return [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in [*found, *lacking]]
+
+
+def _plausible(data: Spin) -> list[Finding]:
+    """Axes are judged where there is no floor, too. Cameras are held upright: up is -y in their axes."""
+    frames = sample(data)
+    up = data.form.up if data.world else (0.0, -1.0, 0.0)
+    return of_frames(frames) + (stance(frames, Ground(up)) if frames.ground is None and up is not None else [])
 
 
 def _file(form: Form, path: Path, split: str | None) -> Path:
@@ -266,5 +274,6 @@ def _file(form: Form, path: Path, split: str | None) -> Path:
 
 def millimetres_or_metres(translation: Array) -> Array:
     """Millimetres, as Human3.6M's and MPI-INF-3DHP's calibrations have them, into metres; cameras stand within 20 m."""
-    far = np.nanmedian(np.abs(translation).max(axis=-1)) > 20
+    distance = np.linalg.norm(translation, axis=-1)
+    far = np.isfinite(distance).any() and np.median(distance[np.isfinite(distance)]) > 20
     return translation / 1000 if far else translation

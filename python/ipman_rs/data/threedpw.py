@@ -89,7 +89,7 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         return _check_files([place])
     if not place.is_dir():
         return [Finding("wrong", f"{place}: no such file or folder")]
-    if (place / FORM.files["test"]).is_file():
+    if not (place / "sequenceFiles").is_dir() and (place / FORM.files["test"]).is_file():
         return spin.check(FORM, place)
     found: list[Finding] = []
     for split, expected in FILES.items():
