@@ -117,7 +117,7 @@ def command(folder: Path, out: Path, *more: str, frames: int) -> list[str]:
 
 
 def run(arguments: list[str]) -> dict[str, Any]:
-    """Seconds, and the peak memory of the process in megabytes. RuntimeError where it fails."""
+    """Seconds, of which of processor cores, and the peak memory of the process in megabytes. RuntimeError."""
     begun = time.perf_counter()
     process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     said = process.stdout.read() if process.stdout else ""
@@ -125,7 +125,8 @@ def run(arguments: list[str]) -> dict[str, Any]:
     if status:
         raise RuntimeError(f"{' '.join(arguments)}: {said}")
     peak = used.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
-    return {"seconds": time.perf_counter() - begun, "peak_megabytes": peak, "said": said}
+    seconds, cpu = time.perf_counter() - begun, used.ru_utime + used.ru_stime
+    return {"seconds": seconds, "cpu_seconds": cpu, "peak_megabytes": peak, "said": said.splitlines()[0]}
 
 
 def run_and_kill(arguments: list[str], out: Path, pieces: int) -> None:
@@ -167,9 +168,12 @@ def _measured(made: Path, frames: int, same: int, ray: bool) -> dict[str, Any]:
         write_predictions(made / f"noisy-{count}.npz", count, nan=997)
     for count in sorted({frames // 10, frames}):
         found = run(command(made, made / f"out-{count}", frames=count))
-        result["runs"].append({"frames": count, **found, "frames_a_second": count / found["seconds"]})
+        cpu = 1e6 * found["cpu_seconds"] / count
+        speed = {"frames_a_second": count / found["seconds"], "cpu_us_a_frame": cpu}
+        result["runs"].append({"frames": count, **found, **speed})
         click.echo(
-            f"{count:9,} frames: {count / found['seconds']:6,.0f} a second; peak {found['peak_megabytes']:,.0f} MB"
+            f"{count:9,} frames: {speed['frames_a_second']:6,.0f} a second, {cpu:.0f} µs of one core each; "
+            f"peak {found['peak_megabytes']:,.0f} MB"
         )
     expected = _expected(made, same, frames)
     for name, way in _ways(made, same, ray).items():

@@ -6,10 +6,13 @@ as must the predictions, the data and the models. What comes out is the same to 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import Any
 
 from .job import Job, Shard
+
+STORE = 80_000_000  # bytes, about the least that Ray takes
 
 
 def run(jobs: list[Job], progress: Callable[[int], None], address: str | None = None) -> None:
@@ -21,7 +24,10 @@ def run(jobs: list[Job], progress: Callable[[int], None], address: str | None = 
         raise ValueError("--ray needs ray: pip install 'ipman_rs[ray]'") from error
     begun_here = not ray.is_initialized()
     if begun_here:
-        ray.init(address=address, include_dashboard=False, log_to_driver=False, configure_logging=False)
+        quiet = {"include_dashboard": False, "log_to_driver": False, "configure_logging": False}
+        # Tasks send words only; where a cluster is joined, its store is as it is.
+        store = {} if address or os.environ.get("RAY_ADDRESS") else {"object_store_memory": STORE}
+        ray.init(address=address, **quiet, **store)
     try:
         _run(ray, jobs, progress)
     finally:
