@@ -102,6 +102,16 @@ def test_the_table_of_the_centre_of_mass(run, folder, own, tmp_path):
     assert re.search(r"\| CoM exact, mm \| – \| \d+\.\d \[", page)
 
 
+def test_the_bodies_of_the_data_set_itself(run, folder, own, tmp_path):
+    """Their centre of mass is the one that was said to be measured; float32 figures, so 1e-6."""
+    done = run("evaluate", "truth", "--table", "com", *own, "-o", tmp_path / "out")
+    assert done.code == 0, done.err
+    figures = json.loads((tmp_path / "out" / "evaluation.json").read_text())["methods"]["truth"]["figures"]
+    assert figures["com_error"]["largest"] < 1e-6
+    assert 0.02 < figures["com_error_exact"]["mean"] < 0.2
+    assert figures["mpjpe"]["largest"] == 0
+
+
 def test_what_a_table_cannot_tell_is_said(run, folder, own, tmp_path):
     run("evaluate", folder / "near.npz", "--table", "biomech", *own, "-o", tmp_path / "out")
     page = (tmp_path / "out" / "evaluation.md").read_text()
@@ -135,7 +145,7 @@ def test_wrong_usage(run, folder, own, tmp_path):
     near, out = folder / "near.npz", ("-o", tmp_path / "out")
     for arguments, said in (
         ([near, *out], "Missing option '--data', the data set, or '--table'"),
-        ([near, "--table", "rich", *out], "Missing option '--path', where rich is"),
+        ([near, "--table", "rich", *out], "Missing option '--path', where rich-ipman is"),
         ([near, *own, *out, "--shard", "3/2"], "'3/2' is no shard such as 2/7"),
         ([near, *own, *out, "--option", "camera"], "'camera' is no option such as frame=camera"),
     ):

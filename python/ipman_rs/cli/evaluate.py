@@ -81,7 +81,7 @@ def evaluate(
     (F, J, 3) with betas, transl and body (smpl, smplh, smplx, anny, anny-lite), or vertices (F, V, 3), or joints
     (F, K, 3) with joint_names. Metres, in the axes of the data set, or with a ground (4,) of its own: normal and
     height. With several files each is compared with the first, frame by frame. The data set own is a file in the same
-    form: your truth.
+    form: your truth. The word truth instead of a file: the data set's own bodies, held against what was measured.
 
     OUTPUT gets evaluation.md, .json, .csv, .svg and .png, sequences.csv, frames.parquet with all figures of each frame
     (needs the extra evaluate), and the pieces it is made of: interrupted, the same command goes on where it was.
@@ -90,6 +90,7 @@ def evaluate(
 
     \b
     ipman evaluate hmr.npz --table rich --path RICH/ --models models/ -o out
+    ipman evaluate truth --table biomech --path MOYO/ --models models/ -o out
     ipman evaluate ours.npz theirs.npz --data moyo --path MOYO/ --models models/ -o out
     ipman evaluate estimated.npz --data own --path true.npz -o out
     ipman evaluate big.parquet --data own --path true.npz -o out --shard 2/7

@@ -30,6 +30,7 @@ from .rows import being_written
 
 PIECE = 4096  # frames: some seconds of work, and small in memory
 OWN = "own"  # the data set of the user's own files, in the form of predictions
+TRUTH = "truth"  # instead of a file of predictions: the data set's own bodies
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,9 @@ class Shard:
 
 @dataclass(frozen=True)
 class Job:
-    """The figures of one file of predictions. All words are plain: it travels to other processes.
+    """The figures of one file of predictions, or of the data set's own bodies (`TRUTH`).
+
+    All words are plain: it travels to other processes.
 
     folder: of the pieces. models: folder of model files. partial: frames without prediction are left out instead of
     being an error.
@@ -119,7 +122,7 @@ class Job:
         file = self.place / "made_of.json"
         if file.exists():
             self._compare(json.loads(file.read_text()))
-        if len(self.estimates) < len(self.data) and not self.partial:
+        if self.predictions != TRUTH and len(self.estimates) < len(self.data) and not self.partial:
             raise ValueError(
                 f"{self.predictions}: has {len(self.estimates):,} frames, but the data set {self.source.name} has "
                 f"{len(self.data):,}; --partial leaves out those without prediction"
@@ -131,14 +134,14 @@ class Job:
     def made_of(self) -> dict[str, Any]:
         """All that decides the figures."""
         return {
-            "predictions": predicted.fingerprint(Path(self.predictions)),
+            "predictions": self.predictions if self.predictions == TRUTH else _fingerprint(self.predictions),
             "data": self.source.name,
             "path": str(Path(self.source.path).resolve()) if self.source.name != OWN else "",
-            "content": predicted.fingerprint(Path(self.source.path)) if self.source.name == OWN else "",
+            "content": _fingerprint(self.source.path) if self.source.name == OWN else "",
             "split": self.source.split,
             "options": [list(each) for each in self.source.options],
             "frames": len(self.data),
-            "regressor": None if self.regressor is None else predicted.fingerprint(Path(self.regressor)),
+            "regressor": None if self.regressor is None else _fingerprint(self.regressor),
             "preset": self.preset,
             "partial": self.partial,
             "piece": self.piece,
@@ -200,6 +203,8 @@ class Job:
     def pair(self, rows: slice) -> tuple[Frames, Frames, NDArray[np.int64]]:
         """True and estimated frames of the same names, and their numbers. ValueError where some have no estimate."""
         true = self.data[rows]
+        if self.predictions == TRUTH:
+            return true, true, rows.start + np.arange(len(true))
         where = self.estimates.index.find(true.names)
         if (where < 0).any() and not self.partial:
             lacking = true.names[where < 0]
@@ -210,6 +215,10 @@ class Job:
             )
         there = np.flatnonzero(where >= 0)
         return true[there], self.estimates[where[there]], rows.start + there
+
+
+def _fingerprint(path: str) -> str:
+    return predicted.fingerprint(Path(path))
 
 
 def methods(files: Sequence[Path]) -> list[str]:

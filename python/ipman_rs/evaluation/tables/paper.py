@@ -30,9 +30,9 @@ _POSE = ("mpjpe", "pa_mpjpe", "pve", "bose")
 
 TABLES = {
     "rich": Table(
-        "Regression on RICH", "rich", "test", (*_POSE, "bose_strict", "tilt"),
+        "Regression on RICH", "rich-ipman", "test", (*_POSE, "bose_strict", "tilt"),
         {"IPMAN-R": {"mpjpe": 79.0, "pve": 89.9}},
-        "Give the regressor for the 14 joints of the literature (--regressor), else SMPL-X's own joints are compared.",
+        "Camera 0, in the form of IPMAN's code, bodies SMPL. For SMPL-X methods --data rich, its own files.",
     ),
     "h36m": Table(
         "Regression on Human3.6M", "human36m", "valid-p2", (*_POSE, "bose_strict", "tilt"),
@@ -45,7 +45,7 @@ TABLES = {
         ("pressure_iou", "pressure_iou_chosen", "cop_error", "cop_error_chosen", "com_error"),
         {"paper": {"pressure_iou_chosen": 0.32, "cop_error_chosen": 57.3, "com_error": 53.3}},
         "The paper chooses the pressure's parameters for each frame by what was measured there (chosen); beside it, "
-        "the figures at fixed parameters.",
+        "the figures at fixed parameters. The paper's bodies are the data set's own: PRED truth.",
     ),
     "com": Table(
         "Formulations of the centre of mass on MoYo", "moyo", None,
@@ -60,7 +60,8 @@ TABLES = {
     ),
     "3dpw": Table("Regression on 3DPW", "3dpw", "test", ("mpjpe", "pa_mpjpe", "pve")),
     "push-pull": Table(
-        "What pulling to the ground and pushing out of it do", "rich", "test", (*_POSE, "penetration", "hover"),
+        "What pulling to the ground and pushing out of it do", "rich-ipman", "test",
+        (*_POSE, "penetration", "hover"),
         note="One file of predictions a setting: without both, with either, with both. The first is the baseline.",
     ),
 }  # fmt: skip
