@@ -9,6 +9,7 @@ import evaluate_files as files
 import numpy as np
 import pytest
 
+import ipman_rs as ip
 from ipman_rs.evaluation.tables import read
 from ipman_rs.evaluation.tables.figures import FIGURES
 
@@ -101,6 +102,20 @@ def job_of(tmp_path, true, arrays, **options):
     return files.job(tmp_path / "out", guess, files.save(tmp_path / "truth.npz", true), **options)
 
 
+def test_people_who_lie_along_another_axis(tmp_path):
+    """z up for y up: a method that gives standing people in other axes than the data set's."""
+    model = ip.load_body("anny-lite")
+    names, pose = np.array([f"f{k}" for k in range(20)]), np.zeros((20, 24, 3))
+    pose += 0.05 * np.random.default_rng(0).standard_normal(pose.shape)
+    joints = model(pose).joints
+    turned = np.stack([joints[..., 0], -joints[..., 2], joints[..., 1]], axis=-1)
+    true = {"names": names, "joints": joints, "joint_names": model.joint_names}
+    true["ground"] = np.array([0.0, 1.0, 0.0, joints[..., 1].min()])
+    job = job_of(tmp_path, true, {"names": names, "joints": turned, "joint_names": model.joint_names})
+    with pytest.raises(ValueError, match=r"guess.npz: joints: looks like \+z up: .* but up is said to be \(0, 1, 0\)"):
+        job.begin()
+
+
 def test_too_few_frames_and_foreign_names(tmp_path, true, guessed):
     few = {key: value if key == "body" else value[:-1] for key, value in guessed.items()}
     with pytest.raises(ValueError, match=r"has 299 frames, but the data set own has 300; --partial leaves out"):
@@ -170,10 +185,10 @@ def test_an_empty_file(tmp_path, guessed):
 def test_the_wrong_body(tmp_path, true, guessed):
     job = job_of(tmp_path, true, dict(guessed, body="smplx", pose=np.zeros((300, 55, 3))))
     with pytest.raises(ValueError, match=r"smplx \(neutral\) needs its model file, SMPLX_NEUTRAL.npz"):
-        job.measure(0)
+        job.begin()
     job = job_of(tmp_path, true, dict(guessed, body="anny", pose=np.zeros((300, 55, 3))))
     with pytest.raises(ValueError, match="pose: has 55 joints, but the body anny has 24"):
-        job.measure(0)
+        job.begin()
 
 
 def test_parquet_rows_that_do_not_fit(tmp_path, guessed):

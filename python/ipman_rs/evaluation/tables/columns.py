@@ -73,7 +73,7 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
 
 def _finite(bodies: Bodies, count: int) -> NDArray[np.bool_]:
     points = bodies.joints if bodies.vertices is None else bodies.vertices
-    return np.ones(count, bool) if points is None else np.isfinite(points).all(axis=(1, 2))
+    return np.ones(count, bool) if points is None else np.asarray(np.isfinite(points).all(axis=(1, 2)))
 
 
 def _points(truth: Bodies, guess: Bodies, regressor: NDArray[Any] | None) -> Columns:

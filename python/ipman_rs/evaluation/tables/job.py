@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,9 @@ from numpy.typing import NDArray
 
 from ipman_rs import __version__, data
 from ipman_rs.body import safe_npz
+from ipman_rs.data import check
 from ipman_rs.data.frames import DataSet, Frames
+from ipman_rs.ground import Ground
 
 from . import joints
 from . import predictions as predicted
@@ -127,8 +129,22 @@ class Job:
                 f"{self.predictions}: has {len(self.estimates):,} frames, but the data set {self.source.name} has "
                 f"{len(self.data):,}; --partial leaves out those without prediction"
             )
+        if self.predictions != TRUTH:
+            self._check_axes()
         with being_written(file) as out:
             out.write((json.dumps(self.made_of, indent=1) + "\n").encode())
+
+    def _check_axes(self) -> None:
+        """ValueError where the estimated people lie or hang along another axis than the data set's up."""
+        some = check.sample(self.estimates)
+        ground = some.ground or self.data[slice(0, 1)].ground
+        bodies = self.bodies.posed(some)
+        if ground is None or bodies.joints is None:
+            return
+        normal = ground.normal if ground.normal.ndim == 1 else ground.normal[0]
+        standing = replace(some, joints=bodies.joints, joint_names=bodies.joint_names, ground=Ground(normal))
+        found = [each for each in check.of_frames(standing) if each.what.startswith("joints: looks like")]
+        check.demand(self.predictions, found)
 
     @cached_property
     def made_of(self) -> dict[str, Any]:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from .job import Job, Shard
+from .job import TRUTH, Job, Shard
 
 STORE = 80_000_000  # bytes, about the least that Ray takes
 
@@ -39,7 +41,7 @@ def _run(ray: Any, jobs: list[Job], progress: Callable[[int], None]) -> None:
     tasks = ray.remote(num_cpus=1, max_retries=2)(_shard)
     workers = max(1, int(ray.cluster_resources().get("CPU", 1)))
     waiting = []
-    for job in jobs:
+    for job in map(_anywhere, jobs):
         # Several a worker: they end at about the same time although pieces differ.
         count = max(1, min(4 * workers, job.pieces))
         waiting += [tasks.remote(job, Shard(index + 1, count)) for index in range(count)]
@@ -55,6 +57,22 @@ def _run(ray: Any, jobs: list[Job], progress: Callable[[int], None]) -> None:
         now = _there(jobs)
         progress(now - before)
         before = now
+
+
+def _anywhere(job: Job) -> Job:
+    """The same job in words that another process understands: nothing opened, and whole paths."""
+
+    def whole(path: str | None) -> str | None:
+        return None if path is None else str(Path(path).resolve())
+
+    return replace(
+        job,
+        predictions=job.predictions if job.predictions == TRUTH else str(whole(job.predictions)),
+        source=replace(job.source, path=str(whole(job.source.path))),
+        folder=str(whole(job.folder)),
+        models=whole(job.models),
+        regressor=whole(job.regressor),
+    )
 
 
 def _there(jobs: list[Job]) -> int:
