@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -245,23 +245,12 @@ def _plot(report: Report) -> dict[str, bytes]:
     picture = Picture(figsize=(4.2 * wide, 3.2 * high), layout="constrained")
     axes = picture.subplots(high, wide, squeeze=False).ravel()
     for axis, name in zip(axes, known, strict=False):
-        figure = FIGURES[name]
-        for each in report.measured:
-            if name in each.below and each.summary[name].frames:
-                share = 100 * each.below[name] / each.summary[name].frames
-                axis.plot(EDGES * figure.factor, share, label=each.name)
-                seen = (share > 0.5) & (share < 99.5)
-                if seen.any():
-                    axis.set_xlim(right=EDGES[np.flatnonzero(seen)[-1]] * figure.factor * 1.2)
-        axis.set_xlim(left=0)
-        axis.set_xlabel(f"{figure.title}, {figure.unit}", fontsize=9)
-        axis.set_ylabel("% of frames below", fontsize=9)
-        axis.tick_params(labelsize=8)
-        axis.grid(alpha=0.3)
+        _shares(axis, name, [each for each in report.measured if name in each.below and each.summary[name].frames])
     if known and len(report.measured) > 1:
         axes[0].legend(fontsize=8)
     for axis, each in zip(axes[len(known) :], report.differences, strict=False):
-        _differences(axis, each, [name for name in report.figures if name in each.intervals])
+        means = {name: found.mean for name, found in report.measured[0].intervals.items()}
+        _differences(axis, each, {name: means[name] for name in report.figures if name in each.intervals})
     for axis in axes[len(known) + len(report.differences) :]:
         axis.set_axis_off()
     svg, png = io.BytesIO(), io.BytesIO()
@@ -271,20 +260,32 @@ def _plot(report: Report) -> dict[str, bytes]:
     return {f"{NAME}.svg": svg.getvalue(), f"{NAME}.png": png.getvalue()}
 
 
-def _differences(axis: Any, difference: Difference, names: list[str]) -> None:
-    """In multiples of half the interval's width, so that figures of several units stand in one picture."""
-    for place, name in enumerate(names):
-        found, figure = difference.intervals[name], FIGURES[name]
-        half = (found.high - found.low) / 2
-        if not half > 0:
-            continue
-        verdict = _verdict(figure, found)
-        color = {"better": "#2e7d32", "worse": "#c62828"}.get(verdict, "#777777")
-        axis.errorbar(found.mean / half, -place, xerr=1.0, fmt="o", markersize=4, capsize=3, color=color)
+def _shares(axis: Any, name: str, methods: Sequence[Measured]) -> None:
+    """Of frames whose figure is under x, up to where all methods have almost all."""
+    figure, end = FIGURES[name], 1
+    for each in methods:
+        share = 100 * each.below[name] / each.summary[name].frames
+        axis.plot(EDGES * figure.factor, share, label=each.name)
+        end = max(end, int(np.searchsorted(share, 99.0)))
+    axis.set_xlim(0, EDGES[min(end, len(EDGES) - 1)] * figure.factor)
+    axis.set_xlabel(f"{figure.title}, {figure.unit}", fontsize=9)
+    axis.set_ylabel("% of frames below", fontsize=9)
+    axis.tick_params(labelsize=8)
+    axis.grid(alpha=0.3)
+
+
+def _differences(axis: Any, difference: Difference, means: Mapping[str, float]) -> None:
+    """In % of the baseline's means, so that figures of several units stand in one picture."""
+    drawn = [name for name, mean in means.items() if mean and np.isfinite(difference.intervals[name].low)]
+    for place, name in enumerate(drawn):
+        found = difference.intervals[name]
+        color = {"better": "#2e7d32", "worse": "#c62828"}.get(_verdict(FIGURES[name], found), "#777777")
+        mean, low, high = (100 * value / means[name] for value in found)
+        axis.errorbar(mean, -place, xerr=[[mean - low], [high - mean]], fmt="o", markersize=4, capsize=3, color=color)
     axis.axvline(0, color="#999999", linewidth=0.8)
-    axis.set_yticks([-place for place in range(len(names))], [FIGURES[name].title for name in names])
-    axis.set_title(f"{difference.name} − {difference.baseline}", fontsize=9)
-    axis.set_xlabel("difference, in half widths of its 95 % interval", fontsize=9)
+    axis.set_yticks([-place for place in range(len(drawn))], [FIGURES[name].title for name in drawn])
+    axis.set_title(f"{difference.name} − {difference.baseline} (green: better)", fontsize=9)
+    axis.set_xlabel(f"% of {difference.baseline}'s mean", fontsize=9)
     axis.tick_params(labelsize=8)
 
 
