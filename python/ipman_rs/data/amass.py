@@ -16,6 +16,7 @@ Where it comes from: the project's own site, AMASS. MoYo is there in this form, 
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -62,12 +63,10 @@ def open(path: str | os.PathLike[str], split: str | None = None, *, frame_rate: 
             f"{files[other]}: poses: expected {motions[0][0]} columns as in {files[0].name}, got {motions[other][0]}; "
             "open the bodies of SMPL+H and of SMPL-X apart"
         )
-    base = root if root.is_dir() else root.parent
     taken = [_taken(count, rate, frame_rate) for _, count, rate in motions]
 
     def sequence(index: int) -> Frames:
-        name = files[index].relative_to(base).with_suffix("").as_posix()
-        return _frames(files[index], name, taken[index], frame_rate or motions[index][2])
+        return _frames(files[index], _name(files[index], root), taken[index], frame_rate or motions[index][2])
 
     return sequences.demanded(path, sequences.sequences([len(rows) for rows in taken], sequence, path))
 
@@ -94,7 +93,8 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
             whole.append(file)
         except ValueError as error:
             found.append(Finding("wrong", str(error), "download it again"))
-    return found + sequences.judged([(file.name, lambda file=file: _whole(file)) for file in whole])
+    named = {file: _name(file, root) for file in whole}
+    return found + sequences.judged([(name, partial(_whole, file, name)) for file, name in named.items()])
 
 
 def _motions(root: Path, split: str | None) -> list[Path]:
@@ -142,9 +142,14 @@ def _taken(count: int, rate: float, wanted: float | None) -> NDArray[np.int64]:
     return rows[rows < count]
 
 
-def _whole(file: Path) -> Frames:
+def _name(file: Path, root: Path) -> str:
+    """Of a motion: its path in the folder that was opened."""
+    return file.relative_to(root if root.is_dir() else root.parent).with_suffix("").as_posix()
+
+
+def _whole(file: Path, name: str) -> Frames:
     _, count, rate = _header(file)
-    return _frames(file, file.stem, np.arange(count), rate)
+    return _frames(file, name, np.arange(count), rate)
 
 
 def _frames(file: Path, name: str, rows: NDArray[np.int64], rate: float) -> Frames:

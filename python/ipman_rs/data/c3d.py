@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,7 +52,7 @@ class Recording:
         return self.points[:, [self.names.index(name) for name in names]] * METRES[self.unit.lower()]
 
 
-def read(path: str | Path) -> Recording:
+def read(path: str | os.PathLike[str]) -> Recording:
     """The content of a C3D file.
 
     ImportError without the extra. ValueError, naming the file, if it is missing, damaged or shorter than it says.
@@ -90,7 +91,7 @@ def read(path: str | Path) -> Recording:
     )
 
 
-def markers(path: str | Path, up: str | None = None) -> Tracks:
+def markers(path: str | os.PathLike[str], up: str | None = None) -> Tracks:
     """The markers of a C3D file; which axis is up says its Y_SCREEN, z if it does not.
 
     ImportError without the extra. ValueError, naming the file, if it is missing, damaged or has no markers.

@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ NAME = "force-plates"
 Array = NDArray[np.float64]
 
 LOADED = 20.0  # N: with less, a plate's centre of pressure is noise
+LEVEL = 0.7  # cosine: of several plates, one at least lies level; others may be ramps or walls
 UP = {axis: TO_Y_UP[axis].T @ (0.0, 1.0, 0.0) for axis in TO_Y_UP}
 CHANNELS = {2: 6, 3: 8, 4: 6}  # of a plate, by its type
 NEWTON_METRES = {"nmm": 1e-3, "n.mm": 1e-3, "n*mm": 1e-3, "ncm": 1e-2, "nm": 1.0, "n.m": 1.0, "n*m": 1.0}
@@ -77,11 +79,12 @@ class ForcePlates:
         """
         wanted = np.asarray(times, float)
         loads = np.where((self.loads > least) & np.isfinite(self.points).all(axis=-1), self.loads, 0.0)
-        carried = self._between(loads[..., None], wanted)
-        weighted = self._between(np.where(loads[..., None] > 0, loads[..., None] * self.points, 0.0), wanted)
+        carried = between(self.times, loads[..., None], wanted)
+        pressed = np.where(loads[..., None] > 0, loads[..., None] * self.points, 0.0)
+        weighted = between(self.times, pressed, wanted)
         with np.errstate(invalid="ignore"):
             points = np.where(carried > 0, weighted / carried, np.nan)
-        forces, moments = self._between(self.forces, wanted), self._between(self.moments, wanted)
+        forces, moments = (between(self.times, values, wanted) for values in (self.forces, self.moments))
         return replace(self, times=wanted, forces=forces, points=points, moments=moments)
 
     def turned(self, rotation: ArrayLike) -> ForcePlates:
@@ -92,11 +95,18 @@ class ForcePlates:
             corners=None if self.corners is None else self.corners @ turn,
         )  # fmt: skip
 
-    def _between(self, values: Array, times: Array) -> Array:
-        """(T, ...) at other times: (n, ...)."""
-        rows = values.reshape(len(values), -1)
-        lines = [np.interp(times, self.times, column, left=np.nan, right=np.nan) for column in rows.T]
-        return np.stack(lines, axis=-1).reshape(len(times), *values.shape[1:])
+
+def between(times: Array, values: Array, wanted: ArrayLike) -> Array:
+    """Values (T, ...) at other times (n,), on straight lines between the samples: (n, ...).
+
+    NaN more than half a sample outside the recording: files round their times.
+    """
+    wanted, rows = np.asarray(wanted, float), values.reshape(len(values), -1)
+    slack = 0.5 * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    outside = (wanted < times[0] - slack) | (wanted > times[-1] + slack)
+    found = np.stack([np.interp(wanted, times, column) for column in rows.T], axis=-1)
+    found[outside] = np.nan
+    return found.astype(np.float64).reshape(len(wanted), *values.shape[1:])
 
 
 def read(path: str | os.PathLike[str], up: str | None = None) -> ForcePlates:
@@ -118,6 +128,13 @@ def of_recording(found: c3d.Recording, up: str | None = None) -> ForcePlates:
         raise ValueError(f"{found.source}: up: expected x, y or z, got {up or found.up!r}")
     vertical = UP[up or found.up]
     plates = [_Plate.of(found, index) for index in range(used)]
+    normals = np.abs([plate.axes[:, 2] for plate in plates])
+    if (normals @ np.abs(vertical)).max() < LEVEL:
+        axis = "xyz"[int(normals[0].argmax())]
+        raise ValueError(
+            f"{found.source}: looks like {axis} up: that is where its force plates face, up is said to be "
+            f"{up or found.up}; say up={axis!r} if so"
+        )
     wrenches = [plate.wrench(vertical) for plate in plates]
     forces, points, moments = (np.stack(part, axis=1) for part in zip(*wrenches, strict=True))
     count = len(found.analogs) // max(len(found.times), 1)
@@ -164,7 +181,7 @@ class _Plate:
 
     def wrench(self, up: Array) -> tuple[Array, Array, Array]:
         """Force on the body, centre of pressure and moment about it, each (T, 3), in the world."""
-        axes = self._axes()
+        axes = self.axes
         forces = self.forces
         moments = self.moments - np.cross(self.origin, forces)  # about the middle of the surface
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -177,7 +194,8 @@ class _Plate:
         sign = -1.0 if loads.size and -loads.min() > max(loads.max(), LOADED) else 1.0
         return sign * force, np.where(np.isfinite(points), points, np.nan), sign * np.nan_to_num(moment)
 
-    def _axes(self) -> Array:
+    @cached_property
+    def axes(self) -> Array:
         """(3, 3), the plate's axes in the world as columns."""
         first, second, third, fourth = self.corners
         x, y = (first + fourth) - (second + third), (first + second) - (third + fourth)
@@ -188,7 +206,7 @@ class _Plate:
             hint = "; looks like millimetres" if area > 100 else ""
             raise ValueError(f"{self.place}: CORNERS: expected a plate of a decimetre to two metres, got {sides}{hint}")
         x, z = x / np.linalg.norm(x), z / area
-        return np.stack([x, np.cross(z, x), z], axis=1)
+        return np.stack([x, np.cross(z, x), z], axis=1).astype(np.float64)
 
 
 def _of_plate(found: c3d.Recording, name: str, index: int, size: int) -> list[float]:
@@ -252,7 +270,7 @@ def open(path: str | os.PathLike[str], split: str | None = None, *, up: str | No
     names = list(dict.fromkeys(name for found in recordings for name in found.names))
 
     parts = [of_file(found, file.stem, names, up) for file, found in zip(files, recordings, strict=True)]
-    return demanded(path, Joined(sequences.measured_alike(parts)))
+    return demanded(Path(path), Joined(sequences.measured_alike(parts)))
 
 
 def of_file(found: c3d.Recording, name: str, markers: Sequence[str], up: str | None = None) -> Frames:
@@ -296,9 +314,10 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
     for file in files:
         try:
             content = c3d.read(file)
-            joints = of_file(content, file.stem, content.names).joints
-            found += sequences.judged([(file.name, lambda file=file: open(file)[:])])
-            found += [] if joints is None else standing(file.name, joints, np.isfinite(joints).all(axis=-1), content.up)
+            points = content.positions(content.names)
+            seen = np.isfinite(points).all(axis=-1) & (points != 0).any(axis=-1)
+            found += standing(file.name, points, seen, content.up)
+            found += sequences.told(file.name, open(file)[:])
             found.append(_loads(file))
         except (ValueError, ImportError) as error:
             found.append(Finding("wrong", str(error)))

@@ -253,7 +253,7 @@ def _anywhere(element: Element, tag: str, path: str | os.PathLike[str]) -> Eleme
 def _pair(element: Element, tag: str, path: str | os.PathLike[str]) -> tuple[int, int]:
     x, y = (safe_xml.number(element, f"{tag}/{axis}", path) for axis in "xy")
     if x != int(x) or y != int(y):
-        raise ValueError(f"{path}: {tag}: expected whole numbers, got {x} and {y}")
+        raise ValueError(f"{path}: {tag.removeprefix('.//')}: expected whole numbers, got {x} and {y}")
     return int(x), int(y)
 
 

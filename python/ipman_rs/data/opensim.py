@@ -1,7 +1,8 @@
 """OpenSim's recordings: markers in `.trc`, force plates and centres of mass in `.mot` and `.sto`.
 
 Expected: a `.trc` file, or a folder of them, and beside it storages whose names have the marker file's name in them:
-`walk.trc`, `walk_grf.mot` (ground forces), `walk_com.sto` (BodyKinematics: center_of_mass_X, Y, Z). OpenSim's world is
+`walk.trc`, `walk_grf.mot` (ground forces), `walk_com.sto` (BodyKinematics: center_of_mass_X, Y, Z); a centre of mass
+under another name belongs to the only recording with forces. OpenSim's world is
 y up, right-handed, in metres; the floor is y = 0. A `.trc` says its unit; a storage does not, and its forces and points
 must be N and m (`plates` takes other units). Frames have the markers' rate (often 60 or 100 Hz; force plates have
 their own, and are read at the markers' times). No cameras. Such files come with OpenSim's models, SimTK projects,
@@ -22,8 +23,8 @@ from numpy.typing import NDArray
 from ipman_rs.ground import Ground
 
 from . import sequences, trc
-from .check import Finding, demanded
-from .force_plates import LOADED, UP, ForcePlates, standing
+from .check import Finding, demand, demanded, size_of_body
+from .force_plates import LOADED, UP, ForcePlates, between, standing
 from .frames import DataSet, Frames
 from .joined import Joined
 from .tracks import METRES, Tracks
@@ -34,7 +35,7 @@ Array = NDArray[np.float64]
 
 COM = "center_of_mass"  # begins the columns of the whole body's centre of mass
 FAR = 20.0  # m: no plate or person is farther from the origin of a laboratory
-BESIDE = 0.5  # m: a centre of mass farther than that from all markers is in other units or axes
+BESIDE = 0.5  # m: a centre of mass farther than that outside the markers is in other units or axes
 # ground_force_vx beside ground_torque_x; ground_force_1_vx beside ground_force_1_mx; f1_1 beside p1_1 and m1_1.
 OPENSIM_FORCE = re.compile(r"(.*)vx$")
 C3D_FORCE = re.compile(r"f(\d+)_1$")
@@ -215,13 +216,14 @@ def open(path: str | os.PathLike[str], split: str | None = None) -> DataSet:
         _frames(file.stem, found, markers, *beside)
         for file, found, beside in zip(files, tracks, _beside(files), strict=True)
     ]
-    return demanded(path, Joined(sequences.measured_alike(parts)))
+    return demanded(Path(path), Joined(sequences.measured_alike(parts)))
 
 
 def _frames(name: str, tracks: Tracks, markers: list[str], forces: Path | None, com: Path | None) -> Frames:
     joints = np.full((len(tracks), len(markers), 3), np.nan)
     seen = np.where(tracks.confidence[..., None] > 0, tracks.points, np.nan)
     joints[:, [markers.index(marker) for marker in tracks.names]] = seen
+    demand(tracks.source, size_of_body("joints", joints))
     at = None if forces is None else plates(storage(forces)).at(tracks.times)
     lasted = float(tracks.times[-1] - tracks.times[0])  # the times of single samples are often rounded to milliseconds
     return Frames(
@@ -240,16 +242,16 @@ def _frames(name: str, tracks: Tracks, markers: list[str], forces: Path | None, 
 def _com_at(table: Storage, tracks: Tracks) -> Array:
     """(T, 3) m at the markers' times; NaN outside the storage's. ValueError if it is nowhere near the markers."""
     points = center_of_mass(table)
-    lines = [np.interp(tracks.times, table.times, column, left=np.nan, right=np.nan) for column in points.T]
-    found = np.stack(lines, axis=1)
-    weights = tracks.confidence[..., None]
-    with np.errstate(invalid="ignore"):
-        middle = (weights * tracks.points).sum(axis=1) / weights.sum(axis=1)
-    away = np.linalg.norm(found - middle, axis=1)
+    found = between(table.times, points, tracks.times)
+    seen = tracks.confidence.any(axis=1)
+    shown = tracks.confidence[seen][..., None] > 0
+    low = np.where(shown, tracks.points[seen], np.inf).min(axis=1)
+    high = np.where(shown, tracks.points[seen], -np.inf).max(axis=1)
+    away = np.linalg.norm(np.maximum(0, np.maximum(low - found[seen], found[seen] - high)), axis=1)
     if np.isfinite(away).any() and np.nanmedian(away) > BESIDE:
         raise ValueError(
-            f"{table.source}: the centre of mass is {np.nanmedian(away):.2f} m from the middle of the markers of "
-            f"{tracks.source}; expected it among them: both in metres, y up, of one recording?"
+            f"{table.source}: the centre of mass is {np.nanmedian(away):.2f} m outside the markers of {tracks.source}; "
+            "expected it among them: are both in metres, y up, and of one recording?"
         )
     return found
 
@@ -273,9 +275,8 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
                 found.append(Finding("ok", f"{file.name}: {what} in {other.name}"))
         try:
             tracks = trc.read(file)
-            frames = _frames(file.stem, tracks, list(tracks.names), forces, com)
-            found += sequences.judged([(file.name, lambda frames=frames: frames)])
             found += standing(file.name, tracks.points, tracks.confidence > 0, "y")
+            found += sequences.told(file.name, _frames(file.stem, tracks, list(tracks.names), forces, com))
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
     return found
@@ -292,21 +293,28 @@ def _files(path: str | os.PathLike[str]) -> list[Path]:
 
 
 def _beside(files: list[Path]) -> list[tuple[Path | None, Path | None]]:
-    """Forces and centre of mass of each recording: those in its folder with the longest of the recordings' names."""
+    """Forces and centre of mass of each recording."""
     found: dict[Path, list[Path | None]] = {file: [None, None] for file in files}
     for folder in dict.fromkeys(file.parent for file in files):
-        for other in sorted(folder.iterdir()):
-            owners = [file for file in files if file.parent == folder and file.stem.lower() in other.stem.lower()]
-            if other.suffix.lower() not in (".mot", ".sto") or not owners:
-                continue
-            owner = max(owners, key=lambda file: len(file.stem))
-            table = storage(other)
-            for place, has in enumerate((has_plates, has_center_of_mass)):
-                if has(table):
-                    if found[owner][place] is not None:
-                        raise ValueError(f"{other}: expected one of its kind for {owner.name}, got another beside it")
-                    found[owner][place] = other
+        here = [file for file in files if file.parent == folder]
+        others = [other for other in sorted(folder.iterdir()) if other.suffix.lower() in (".mot", ".sto")]
+        for place, has in enumerate((has_plates, has_center_of_mass)):  # forces first: they tell whose the rest are
+            for other in others:
+                owner = _owner(other, here, [file for file in here if found[file][0] is not None])
+                if owner is None or not has(storage(other)):
+                    continue
+                if found[owner][place] is not None:
+                    raise ValueError(f"{other}: expected one of its kind for {owner.name}, got another beside it")
+                found[owner][place] = other
     return [(pair[0], pair[1]) for pair in found.values()]
+
+
+def _owner(other: Path, files: list[Path], with_forces: list[Path]) -> Path | None:
+    """The recording with the longest name that the other file's has in it; else the only one with forces, if any."""
+    named = [file for file in files if file.stem.lower() in other.stem.lower()]
+    if named:
+        return max(named, key=lambda file: len(file.stem))
+    return with_forces[0] if len(with_forces) == 1 else None
 
 
 def _some(table: Storage) -> str:

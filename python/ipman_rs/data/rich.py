@@ -26,7 +26,8 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,7 @@ IPMAN = {
     ),
 }  # fmt: skip
 RATE = 30.0  # Hz
-FEMALE = (9, 10, 12, 13, 16, 17, 18, 19)  # of the subjects 0 to 21
+FEMALE = (9, 10, 12, 13, 16, 17, 18, 19, 21)  # of the subjects 0 to 21
 SUBJECTS = 22
 PARTS = {  # array -> the joints that it turns, in SMPL-X's order
     "global_orient": slice(0, 1),
@@ -112,13 +113,28 @@ def open(
     root = Path(path)
     folders = _folders(root, split)
     views = [view for folder in folders for view in _views(root, folder, _cameras(root, folder, split, cameras))]
-    scenes = {folder: _scene(root, folder) for folder in folders}
+    read = lru_cache(maxsize=None)(_scene)  # of a place, whose files are those of all its sequences
+    scenes = {folder: read(*_scene_files(root, folder)) for folder in folders}
+    _alike(root, scenes)
     rate = _rate(views)
+    pictured = any(_image_folder(root, view).is_dir() for view in views)
 
     def sequence(index: int) -> Frames:
-        return _frames(root, views[index], scenes[views[index].folder], hands, rate)
+        frames = _frames(root, views[index], scenes[views[index].folder], hands, rate)
+        return frames if not pictured else replace(frames, images=_images(root, views[index]))
 
     return sequences.demanded(root, sequences.sequences([len(view.files) for view in views], sequence, path))
+
+
+def _alike(root: Path, scenes: dict[Path, Scene]) -> None:
+    """ValueError if some scenes lack what others have."""
+    for what, there, file in (
+        ("ground", {folder: scene.ground is not None for folder, scene in scenes.items()}, "ground_mesh.ply"),
+        ("cameras", {folder: bool(scene.cameras) for folder, scene in scenes.items()}, "calibration/*.xml"),
+    ):
+        lacking = [folder.name for folder, has in there.items() if not has]
+        if lacking and len(lacking) < len(there):
+            raise ValueError(f"{root}: {what} of {', '.join(lacking)}: expected {file}, as other sequences have")
 
 
 def _folders(root: Path, split: str | None) -> list[Path]:
@@ -192,7 +208,6 @@ def _frames(root: Path, view: View, scene: Scene, hands: Hands | None, rate: flo
         pose=pose,
         betas=betas,
         transl=transl,
-        images=_images(root, view),
         cameras=spread,
     )
     return sequences.plausible(view.folder, frames)
@@ -233,16 +248,16 @@ def _gender(subject: str) -> str:
     return "female" if int(subject) in FEMALE else "male"
 
 
-def _images(root: Path, view: View) -> NDArray[np.str_] | None:
-    """The images' paths; None if there is no folder of them."""
-    folder = root / "images" / view.folder.parent.name / view.sequence / f"cam_{view.camera:02d}"
-    first = (
-        next((file for file in folder.glob("*") if file.suffix.lower() in IMAGES), None) if folder.is_dir() else None
-    )
-    if first is None:
-        return None
-    names = (f"{file.parent.name}_{view.camera:02d}{first.suffix}" for file in view.files)
-    return np.array([str(folder / name) for name in names])
+def _image_folder(root: Path, view: View) -> Path:
+    return root / "images" / view.folder.parent.name / view.sequence / f"cam_{view.camera:02d}"
+
+
+def _images(root: Path, view: View) -> NDArray[np.str_]:
+    """The images' paths; empty if the view has none."""
+    folder = _image_folder(root, view)
+    first = next((file for file in folder.glob("*") if file.suffix.lower() in IMAGES), None)
+    names = (f"{file.parent.name}_{view.camera:02d}" for file in view.files)
+    return np.array(["" if first is None else str(folder / name) + first.suffix for name in names])
 
 
 def _calibration(root: Path, folder: Path) -> Path:
@@ -263,11 +278,15 @@ def _ground_mesh(root: Path, folder: Path) -> Path | None:
     return next((place for place in places if place.is_file()), None)
 
 
-def _scene(root: Path, folder: Path) -> Scene:
-    files = sorted(file for file in _calibration(root, folder).glob("*.xml") if file.stem.isdigit())
-    mesh = _ground_mesh(root, folder)
+def _scene_files(root: Path, folder: Path) -> tuple[Path | None, Path, Path]:
+    """Ground, way to the scan's world, and folder of the cameras' calibrations."""
+    return _ground_mesh(root, folder), _to_world(root, folder), _calibration(root, folder)
+
+
+def _scene(mesh: Path | None, to_world: Path, calibration: Path) -> Scene:
+    files = sorted(file for file in calibration.glob("*.xml") if file.stem.isdigit())
     return Scene(
-        ground=None if mesh is None else ground(mesh, _to_world(root, folder)),
+        ground=None if mesh is None else ground(mesh, to_world),
         cameras={int(file.stem): camera(file) for file in files},
     )
 
@@ -358,11 +377,11 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
             found.append(Finding("missing", f"{split}: {', '.join(lacking)}"))
         else:
             found.append(Finding("ok", f"{split}: all {len(names)} sequences"))
-    read = []
+    read, read_scene = [], lru_cache(maxsize=None)(_scene)
     for folder in folders:
         found += _around(root, folder)
         try:
-            scene = _scene(root, folder)
+            scene = read_scene(*_scene_files(root, folder))
             for view in _views(root, folder, (0,)):
                 read.append((view.sequence, lambda v=view, s=scene: _frames(root, v, s, None, None)))
         except ValueError as error:

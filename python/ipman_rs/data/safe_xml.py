@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 from xml.etree import ElementTree
 from xml.parsers import expat
 
@@ -35,7 +35,7 @@ def read(path: str | os.PathLike[str]) -> ElementTree.Element:
         depth -= 1
         builder.end(tag)
 
-    def refuse(*_: Any) -> None:
+    def refuse(*_: Any) -> NoReturn:
         raise ValueError("has a document type (DOCTYPE), which can hold entities; no file of a data set has one")
 
     parser = expat.ParserCreate()

@@ -52,7 +52,7 @@ def measured_alike(parts: Sequence[Frames]) -> list[Frames]:
 
 
 def _with_nothing(part: Frames, parts: Sequence[Frames], plates: int) -> Frames:
-    lacking = {
+    lacking: dict[str, NDArray[np.floating]] = {
         name: np.full((len(part), 3), np.nan)
         for name in ("center_of_mass", "center_of_pressure")
         if getattr(part, name) is None and any(getattr(other, name) is not None for other in parts)
@@ -95,7 +95,16 @@ def judged(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Find
                 found.append(check.Finding(each.level, f"{name}: {each.what}", each.advice))
         if index in _spread(len(parts), SAMPLED**2):
             some.append(frames[_spread(len(frames), SAMPLED)])
-    return found + (check.of_frames(concatenated(some)) if some else [])
+    try:
+        return found + (check.of_frames(concatenated(some)) if some else [])
+    except ValueError as error:  # they have other joints, or only some have a ground
+        return [*found, check.Finding("missing", str(error))]
+
+
+def told(name: str, frames: Frames) -> list[check.Finding]:
+    """What can be told of one recording, under its name."""
+    found = check.of_frames(check.sample(frames))
+    return [check.Finding(each.level, f"{name}: {each.what}", each.advice) for each in found]
 
 
 def numbered(name: str, count: int) -> NDArray[np.str_]:
