@@ -60,7 +60,7 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
     ground = true.ground if estimated.ground is None else estimated.ground
     unknown = {"prediction not finite": ~_finite(guess, len(true)), "truth not finite": ~_finite(truth, len(true))}
     found: Columns = {"names": true.names, "sequences": true.sequences, "why": reasons(unknown)}
-    found |= _points(truth, guess, job.joint_regressor)
+    found |= _points(truth, guess, job)
     if ground is not None:
         found |= _tilt(truth, guess, ground, true.ground or ground)
         if guess.vertices is not None and guess.model is not None:
@@ -72,14 +72,16 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
 
 
 def _finite(bodies: Bodies, count: int) -> NDArray[np.bool_]:
-    points = bodies.joints if bodies.vertices is None else bodies.vertices
-    return np.ones(count, bool) if points is None else np.asarray(np.isfinite(points).all(axis=(1, 2)))
+    """Of vertices all; of joints some, for a data set may know a few of those that it names."""
+    if bodies.vertices is not None:
+        return np.asarray(np.isfinite(bodies.vertices).all(axis=(1, 2)))
+    return np.ones(count, bool) if bodies.joints is None else np.isfinite(bodies.joints).all(axis=2).any(axis=1)
 
 
-def _points(truth: Bodies, guess: Bodies, regressor: NDArray[Any] | None) -> Columns:
+def _points(truth: Bodies, guess: Bodies, job: Job) -> Columns:
     """Errors of joints and vertices."""
     found: Columns = {}
-    compared = joints_of(truth, guess, regressor)
+    compared = joints_of(truth, guess, job.known_joints, job.joint_regressor)
     if compared is not None:
         found["mpjpe"] = pve(compared.estimated, compared.true, compared.root, compared.true_root)
         found["pa_mpjpe"] = pa_mpjpe(compared.estimated, compared.true)

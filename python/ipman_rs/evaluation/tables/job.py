@@ -109,6 +109,15 @@ class Job:
     def joint_regressor(self) -> NDArray[np.floating] | None:
         return None if self.regressor is None else joints.read_regressor(Path(self.regressor))
 
+    @cached_property
+    def known_joints(self) -> frozenset[str]:
+        """Names of the true joints that have numbers in some frame of a sample."""
+        bodies = self.bodies.posed(check.sample(self.data))
+        if bodies.joints is None:
+            return frozenset()
+        there = np.isfinite(bodies.joints).all(axis=2).any(axis=0)
+        return frozenset(name for name, known in zip(bodies.joint_names, there, strict=True) if known)
+
     @property
     def pieces(self) -> int:
         return -(-len(self.data) // self.piece)

@@ -34,14 +34,18 @@ class Compared:
     root: NDArray[Any]
 
 
-def joints_of(truth: Bodies, guess: Bodies, regressor: NDArray[Any] | None) -> Compared | None:
-    """The joints that two bodies share; None where there are fewer than three, or no pelvis and no hips."""
+def joints_of(truth: Bodies, guess: Bodies, known: frozenset[str], regressor: NDArray[Any] | None) -> Compared | None:
+    """The joints that two bodies share; None where there are fewer than three, or no pelvis and no hips.
+
+    known: those that the data set has numbers for, of the ones that it names.
+    """
+    truth = Bodies(truth.vertices, truth.joints, tuple(n if n in known else "" for n in truth.joint_names), truth.model)
     if regressor is not None:
         measured = {*COUNTED} <= {*truth.joint_names}  # by the data set, which goes before its own body's
         truth, guess = truth if measured else _regressed(truth, regressor), _regressed(guess, regressor)
     if truth.joints is None or guess.joints is None:
         return None
-    shared = tuple(name for name in truth.joint_names if name in guess.joint_names)
+    shared = tuple(name for name in truth.joint_names if name and name in guess.joint_names)
     roots = next((each for each in (("pelvis",), ("left_hip", "right_hip")) if {*each} <= {*shared}), None)
     names = tuple(name for name in COUNTED if name in shared) if regressor is not None else shared
     if roots is None or len(names) < 3:

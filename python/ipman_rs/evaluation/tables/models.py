@@ -56,12 +56,18 @@ class Models:
                 return self.get(kind, gender)
         return self.get(kind)
 
+    def has(self, kind: str) -> bool:
+        """Whether there is a model of that kind, of some gender."""
+        return kind in embedded.NAMES or any(self._found(kind, gender) is not None for gender in GENDERS)
+
     def posed(self, frames: Frames) -> Bodies:
-        """Vertices and joints of the frames. ValueError where a pose does not fit its model."""
-        model = None if frames.body is None else self.template_of(frames.body)
+        """Vertices and joints of the frames. ValueError where a pose does not fit its model, or where the pose is all
+        that there is and its model is not."""
         vertices, joints = frames.vertices, frames.joints
         names = tuple(frames.joint_names or ())
-        if frames.pose is not None and frames.body is not None and vertices is None:
+        needed = vertices is None and joints is None
+        model = None if frames.body is None or not (needed or self.has(frames.body)) else self.template_of(frames.body)
+        if frames.pose is not None and frames.body is not None and model is not None and vertices is None:
             vertices, own = self._skinned(frames, frames.body)
             if joints is None and model is not None:
                 joints, names = own, model.joint_names
