@@ -102,7 +102,7 @@ def evaluate(
     try:
         table, jobs = _jobs(predictions, output, given)
         _evaluate(jobs, table, output, shard, ray)
-    except ValueError as error:
+    except (ValueError, ImportError) as error:
         console.error(str(error))
         sys.exit(1)
     except MemoryError:
