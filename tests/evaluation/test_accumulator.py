@@ -49,6 +49,7 @@ def file_of(accumulator, folder):
     return (folder / "shard.npz").read_bytes()
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-LARGEST, LARGEST, exclude_min=True, exclude_max=True), min_size=1, max_size=50))
 def test_sums_are_those_of_fractions(numbers):
     """Up to the last place of 2⁻⁶⁴, to which each number is rounded."""

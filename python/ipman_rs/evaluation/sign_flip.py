@@ -32,6 +32,10 @@ def sign_flip(sums: NDArray[np.float64], resamples: int = 10_000, seed: int = 0)
     draw, block, extreme = np.random.default_rng(seed), max(1, DRAWS // clusters), 0
     for start in range(0, number, block):
         rows = np.arange(start, min(start + block, number))
-        up = (rows[:, None] >> np.arange(clusters)) & 1 if every else draw.integers(2, size=(len(rows), clusters))
-        extreme += int((np.abs(np.where(up == 1, sums, -sums).sum(axis=1)) >= least).sum())
+        up = _bits(rows, clusters) if every else draw.integers(2, size=(len(rows), clusters), dtype=np.bool_)
+        extreme += int((np.abs(np.where(up, sums, -sums).sum(axis=1)) >= least).sum())
     return extreme / number if every else (extreme + 1) / (number + 1)
+
+
+def _bits(numbers: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
+    return (numbers[:, None] >> np.arange(count)) & 1 == 1
