@@ -74,7 +74,7 @@ def smplx(path):
 
 @pytest.mark.parametrize("table", ["biomech", "com"])
 def test_the_paper_s_biomechanics(table, tmp_path):
-    """MoYo's own bodies against its mat and its centre of mass: every column has frames, and the paper's stands above."""
+    """MoYo's own bodies against its mat and its centre of mass; the paper's figures stand above."""
     pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
     from miniatures import moyo
 
