@@ -118,15 +118,33 @@ def command(folder: Path, out: Path, *more: str, frames: int) -> list[str]:
 
 def run(arguments: list[str]) -> dict[str, Any]:
     """Seconds, of which of processor cores, and the peak memory of the process in megabytes. RuntimeError."""
-    begun = time.perf_counter()
-    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    said = process.stdout.read() if process.stdout else ""
-    _, status, used = os.wait4(process.pid, 0)
+    begun, peak = time.perf_counter(), 0.0
+    with tempfile.TemporaryFile("w+") as output:
+        process = subprocess.Popen(arguments, stdout=output, stderr=subprocess.STDOUT)
+        while True:
+            # The peak that wait4 tells is at least that of the process which started this one.
+            peak = max(peak, _peak_megabytes(process.pid))
+            ended, status, used = os.wait4(process.pid, os.WNOHANG)
+            if ended:
+                break
+            time.sleep(0.02)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        output.seek(0)
+        said = output.read()
     if status:
         raise RuntimeError(f"{' '.join(arguments)}: {said}")
-    peak = used.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
     seconds, cpu = time.perf_counter() - begun, used.ru_utime + used.ru_stime
+    peak = peak or used.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
     return {"seconds": seconds, "cpu_seconds": cpu, "peak_megabytes": peak, "said": said.splitlines()[0]}
+
+
+def _peak_megabytes(pid: int) -> float:
+    """So far; 0 where the system does not tell."""
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    except OSError:
+        return 0.0
+    return next((float(line.split()[1]) / 1e3 for line in lines if line.startswith("VmHWM")), 0.0)
 
 
 def run_and_kill(arguments: list[str], out: Path, pieces: int) -> None:
