@@ -74,8 +74,12 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
 def _finite(bodies: Bodies, count: int) -> NDArray[np.bool_]:
     """Of vertices all; of joints some, for a data set may know a few of those that it names."""
     if bodies.vertices is not None:
-        return np.asarray(np.isfinite(bodies.vertices).all(axis=(1, 2)))
-    return np.ones(count, bool) if bodies.joints is None else np.isfinite(bodies.joints).all(axis=2).any(axis=1)
+        points = bodies.vertices.reshape(count, -1)
+        return np.asarray(np.isfinite(points).all(axis=1))
+    if bodies.joints is None:
+        return np.ones(count, bool)
+    known: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(bodies.joints), axis=2)
+    return np.asarray(np.logical_or.reduce(known, axis=1))
 
 
 def _points(truth: Bodies, guess: Bodies, job: Job) -> Columns:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -115,8 +115,8 @@ class Job:
         bodies = self.bodies.posed(check.sample(self.data))
         if bodies.joints is None:
             return frozenset()
-        there = np.isfinite(bodies.joints).all(axis=2).any(axis=0)
-        return frozenset(name for name, known in zip(bodies.joint_names, there, strict=True) if known)
+        joints = enumerate(bodies.joint_names)
+        return frozenset(name for k, name in joints if np.isfinite(bodies.joints[:, k]).all(axis=1).any())
 
     @property
     def pieces(self) -> int:
@@ -157,16 +157,23 @@ class Job:
 
     @cached_property
     def made_of(self) -> dict[str, Any]:
-        """All that decides the figures."""
+        """All that decides the figures; no paths, for other machines have other ones."""
+        kinds = {self.data[slice(0, 1)].body}
+        if self.predictions != TRUTH:
+            kinds.add(self.estimates[slice(0, 1)].body)
+        files = [path for kind in kinds - {None} for path in self.bodies.files(str(kind))]
+        data = self.data
         return {
-            "predictions": self.predictions if self.predictions == TRUTH else _fingerprint(self.predictions),
+            "predictions": TRUTH if self.predictions == TRUTH else self.estimates.fingerprint,
             "data": self.source.name,
-            "path": str(Path(self.source.path).resolve()) if self.source.name != OWN else "",
-            "content": _fingerprint(self.source.path) if self.source.name == OWN else "",
+            "content": data.fingerprint
+            if isinstance(data, predicted.Predictions)
+            else _content(check.sample(data, 16)),
             "split": self.source.split,
             "options": [list(each) for each in self.source.options],
             "frames": len(self.data),
-            "regressor": None if self.regressor is None else _fingerprint(self.regressor),
+            "models": {path.name: predicted.fingerprint(path) for path in sorted(files)},
+            "regressor": None if self.regressor is None else predicted.fingerprint(Path(self.regressor)),
             "preset": self.preset,
             "partial": self.partial,
             "piece": self.piece,
@@ -242,8 +249,15 @@ class Job:
         return true[there], self.estimates[where[there]], rows.start + there
 
 
-def _fingerprint(path: str) -> str:
-    return predicted.fingerprint(Path(path))
+def _content(frames: Frames) -> str:
+    """Of the numbers of some frames: whether a data set is the same as before."""
+    digest = hashlib.sha256()
+    for field in fields(frames):
+        value = getattr(frames, field.name)
+        if isinstance(value, np.ndarray) and field.name != "images":  # which are paths
+            digest.update(f"{field.name} {value.shape} {value.dtype}".encode())
+            digest.update(np.ascontiguousarray(value).tobytes())
+    return digest.hexdigest()
 
 
 def methods(files: Sequence[Path]) -> list[str]:

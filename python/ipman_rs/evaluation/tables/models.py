@@ -58,7 +58,12 @@ class Models:
 
     def has(self, kind: str) -> bool:
         """Whether there is a model of that kind, of some gender."""
-        return kind in embedded.NAMES or any(self._found(kind, gender) is not None for gender in GENDERS)
+        return kind in embedded.NAMES or bool(self.files(kind))
+
+    def files(self, kind: str) -> list[Path]:
+        """Of that kind, of any gender."""
+        found = [self._found(kind, gender) for gender in GENDERS]
+        return sorted({path for path in found if path is not None})
 
     def posed(self, frames: Frames) -> Bodies:
         """Vertices and joints of the frames. ValueError where a pose does not fit its model, or where the pose is all

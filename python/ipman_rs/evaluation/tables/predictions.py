@@ -51,6 +51,7 @@ class Predictions:
     path: Path
     columns: dict[str, RowsOnDisk]
     common: dict[str, Any]  # what is one for all frames
+    fingerprint: str  # of the file's bytes
 
     def __len__(self) -> int:
         return len(self.columns["names"])
@@ -86,12 +87,13 @@ def read(path: str | Path, unpacked: Path) -> Predictions:
         raise ValueError(f"{path}: {'is a folder; name the file' if path.is_dir() else 'there is no such file'}")
     if path.suffix.lower() not in (".npz", ".parquet"):
         raise ValueError(f"{path}: expected predictions in .npz or .parquet, got {path.suffix or 'no ending'}")
-    unpacked = unpacked / fingerprint(path)[:16]
+    content = fingerprint(path)
+    unpacked = unpacked / content[:16]
     if path.suffix.lower() == ".parquet":
         columns, common = parquet.read(path, unpacked)
     else:
         columns, common = _npz(path, unpacked)
-    found = Predictions(path, *_checked(path, columns, common))
+    found = Predictions(path, *_checked(path, columns, common), content)
     check.demand(path, [each for each in check.of_frames(check.sample(found)) if not each.what.startswith("lowest of")])
     return found
 
