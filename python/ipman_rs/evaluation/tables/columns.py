@@ -74,8 +74,7 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
 def _finite(bodies: Bodies, count: int) -> NDArray[np.bool_]:
     """Of vertices all; of joints some, for a data set may know a few of those that it names."""
     if bodies.vertices is not None:
-        points = bodies.vertices.reshape(count, -1)
-        return np.asarray(np.isfinite(points).all(axis=1))
+        return np.asarray(np.isfinite(bodies.vertices).all(axis=(1, 2)))
     if bodies.joints is None:
         return np.ones(count, bool)
     known: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(bodies.joints), axis=2)

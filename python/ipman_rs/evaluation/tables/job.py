@@ -115,8 +115,8 @@ class Job:
         bodies = self.bodies.posed(check.sample(self.data))
         if bodies.joints is None:
             return frozenset()
-        joints = enumerate(bodies.joint_names)
-        return frozenset(name for k, name in joints if np.isfinite(bodies.joints[:, k]).all(axis=1).any())
+        named = enumerate(bodies.joint_names)
+        return frozenset(name for k, name in named if np.isfinite(bodies.joints[:, k]).all(axis=1).any())
 
     @property
     def pieces(self) -> int:
@@ -162,13 +162,13 @@ class Job:
         if self.predictions != TRUTH:
             kinds.add(self.estimates[slice(0, 1)].body)
         files = [path for kind in kinds - {None} for path in self.bodies.files(str(kind))]
-        data = self.data
+        true = self.data
         return {
             "predictions": TRUTH if self.predictions == TRUTH else self.estimates.fingerprint,
             "data": self.source.name,
-            "content": data.fingerprint
-            if isinstance(data, predicted.Predictions)
-            else _content(check.sample(data, 16)),
+            "content": true.fingerprint
+            if isinstance(true, predicted.Predictions)
+            else _content(check.sample(true, 16)),
             "split": self.source.split,
             "options": [list(each) for each in self.source.options],
             "frames": len(self.data),
