@@ -113,6 +113,8 @@ def _balance(vertices: NDArray[Any], model: BodyModel, ground: Ground, true: Fra
     }
     if true.standing is not None:
         labels = np.asarray(true.standing, float)
+        if true.contact is not None:  # −1: in the air, as the authors label it
+            labels = np.where(true.contact, labels, -1.0)
         found["bose_released"] = bose(vertices, template, ground, bose_mode="released", labels=labels)
     return found
 
