@@ -147,6 +147,7 @@ def test_wrong_usage(run, folder, own, tmp_path):
         ([near, *out], "Missing option '--data', the data set, or '--table'"),
         ([near, "--table", "rich", *out], "Missing option '--path', where rich-ipman is"),
         ([near, *own, *out, "--shard", "3/2"], "'3/2' is no shard such as 2/7"),
+        ([near, *own, *out, "--shard", "1/2", "--ray"], "--ray does all shards: leave out --shard"),
         ([near, *own, *out, "--option", "camera"], "'camera' is no option such as frame=camera"),
     ):
         done = run("evaluate", *arguments)
@@ -160,7 +161,7 @@ def test_files_that_are_wrong(run, folder, own, tmp_path):
         ([tmp_path / "none.npz", *own], "none.npz: there is no such file"),
         ([folder / "near.npz", "--data", "own", "--path", tmp_path / "none.npz"], "none.npz: there is no such file"),
         ([folder / "near.npz", "--data", "moyo", "--path", tmp_path / "none"], "none: there is no such file or folder"),
-        ([folder / "near.npz", "--data", "moio", "--path", tmp_path], "expected one of 3dpw, amass"),
+        ([folder / "near.npz", "--data", "moio", "--path", tmp_path], "data: expected own, or one of 3dpw, amass"),
         ([folder / "near.npz", *own, "--regressor", tmp_path / "none.npy"], "none.npy: the regressor cannot be read"),
     ):
         done = run("evaluate", *arguments, *out)

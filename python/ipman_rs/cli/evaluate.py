@@ -51,7 +51,7 @@ class Setting(click.ParamType):
 @click.command()
 @click.argument("predictions", nargs=-1, required=True, metavar="PRED...", type=click.Path(path_type=Path))
 @click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Output folder.")
-@click.option("--data", metavar="NAME", help="Data set: one that `ipman data` knows, or own (see below).")
+@click.option("--data", metavar="NAME", help="Data set: one of `ipman data list`, or own (see above).")
 @click.option("--path", type=click.Path(path_type=Path), metavar="PATH", help="Folder or file of the data set.")
 @click.option("--split", metavar="NAME", help="Part of the data set, such as test.")
 @click.option(
@@ -99,6 +99,8 @@ def evaluate(
     """
     from . import console
 
+    if ray and shard:
+        raise click.UsageError("--ray does all shards: leave out --shard")
     try:
         table, jobs = _jobs(predictions, output, given)
         _evaluate(jobs, table, output, shard, ray)

@@ -48,6 +48,8 @@ class Source:
         """ValueError naming the file where there is none or something is wrong."""
         if self.name == OWN:
             return predicted.read(self.path, unpacked)
+        if self.name not in data.DATASETS:
+            raise ValueError(f"data: expected {OWN}, or one of {', '.join(data.DATASETS)}, got {self.name!r}")
         options = dict(self.options) if self.split is None else {"split": self.split, **dict(self.options)}
         if not Path(self.path).exists():
             raise ValueError(f"{self.path}: there is no such file or folder; it should hold the data set {self.name}")
