@@ -6,8 +6,10 @@ python -m benchmarks [--quick] [--out docs]
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+import tempfile
 import time
 import warnings
 from dataclasses import asdict, replace
@@ -32,6 +34,8 @@ def main(context: click.Context, quick: bool, seconds: float | None, out: Path) 
     if context.invoked_subcommand is not None:
         return
     warnings.filterwarnings("ignore", message=".*[Ss]parse.*")
+    # Not the user's cache: a run that was killed while it compiled would leave half a library there.
+    os.environ["TORCHINDUCTOR_CACHE_DIR"] = tempfile.mkdtemp(prefix="ipman-bench-")
     start = time.perf_counter()
     budget = cases.QUICK if quick else cases.Budget()
     if seconds is not None:

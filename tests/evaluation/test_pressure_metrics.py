@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
@@ -197,3 +198,23 @@ def test_bad_input():
         moyo(samples, SLOPE, there, np.zeros((2, 3)), gamma=np.inf)
     empty = SimpleNamespace(**{**vars(there), "values": np.ones((0, HEIGHT, WIDTH))})
     assert moyo(samples[:0], SLOPE, empty, np.zeros((0, 3))).fixed.iou.shape == (0,)
+
+
+def test_a_mat_that_was_moved():
+    """A row of its place for each frame: as the frames one by one, each over its own mat."""
+    samples, values = over(3, 200), np.random.default_rng(4).random((3, HEIGHT, WIDTH))
+    still = [mat(values[f : f + 1]) for f in range(3)]
+    mats = [replace(there, origin=there.origin + 0.02 * f * there.e1) for f, there in enumerate(still)]
+    centers = samples.mean(axis=1)
+    moved = PressureMaps(values, *(np.array([getattr(m, part) for m in mats]) for part in ("origin", "e1", "e2")), CELL)
+    weights = np.random.default_rng(5).random((3, 200))
+    together = moyo(samples, SLOPE, moved, centers)
+    for f, alone in enumerate(mats):
+        row = slice(f, f + 1)
+        assert np.array_equal(
+            pressure_map(samples, weights, moved)[row], pressure_map(samples[row], weights[row], alone)
+        )
+        expected = moyo(samples[row], SLOPE, alone, centers[row])
+        for whole, own in zip(together, expected, strict=True):
+            assert np.array_equal(np.array(whole)[:, row], np.array(own))
+    assert not np.array_equal(np.array(together.fixed), np.array(moyo(samples, SLOPE, mat(values), centers).fixed))

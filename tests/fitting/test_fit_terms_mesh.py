@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import replace
 
@@ -168,7 +169,8 @@ def standing(names: tuple[str, ...], dtype: torch.dtype = torch.float64, lift: f
     return values
 
 
-PHYSICS = {"stability": Stability, "ground": Ground, "balance": Balance}
+SATURATED = functools.partial(Balance, wrap="saturate")
+PHYSICS = {"stability": Stability, "ground": Ground, "balance": Balance, "saturated": SATURATED}
 
 
 def test_physics_is_the_cores():
@@ -183,6 +185,8 @@ def test_physics_is_the_cores():
     torch.testing.assert_close(Ground(problem, pull=0.3).cost(body), 0.3 * pull + push, rtol=1e-12, atol=0)
     balance = ipt.balance_cost(body.vertices, template, floor)
     torch.testing.assert_close(Balance(problem).cost(body), balance, rtol=1e-9, atol=1e-12)
+    saturated = -torch.expm1(-balance)  # J / (1 + J) of log(1 + J)
+    torch.testing.assert_close(SATURATED(problem).cost(body), saturated, rtol=1e-9, atol=1e-12)
 
 
 def test_terms_of_one_preset_share_an_evaluation(monkeypatch):

@@ -15,7 +15,7 @@ def benchmark() -> None:
 @benchmark.command()
 @click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Folder.")
 @click.option(
-    "-n", "--bodies", type=click.IntRange(1), default=105, show_default=True, help="Balanced people, 7 families."
+    "-n", "--bodies", type=click.IntRange(1), default=140, show_default=True, help="Balanced people, 7 families."
 )
 @click.option(
     "--controls", type=click.IntRange(1), default=42, show_default=True, help="Tipped people, and jumping ones."

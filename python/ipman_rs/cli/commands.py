@@ -14,6 +14,7 @@ from .errors import FileError
 from .evaluate import evaluate
 from .fit import fit
 from .options import GROUND, PRESETS, UP
+from .validate import validate
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -43,12 +44,14 @@ def main() -> None:
     ipman analyze body.obj -o out   your own mesh; open out/report.html afterwards
     ipman fit photo.jpg -o out      a body for the person in a photo
     ipman evaluate pred.npz --data own --path true.npz -o out   predictions against the truth
+    ipman validate folder/ -o out   the engine against force plates and OpenSim
     """
 
 
 main.add_command(fit)
 main.add_command(benchmark)
 main.add_command(evaluate)
+main.add_command(validate)
 main.add_command(data)
 
 

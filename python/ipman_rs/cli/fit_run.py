@@ -148,6 +148,7 @@ def _started(problem: Problem, config: Config) -> tuple[Problem, dict[str, Any]]
     """The problem, its ground known where the camera moves around the body, and where the fit starts."""
     options = start.options(config.start)
     if config.start.get("search") == "camera":
-        problem = on_the_ground(problem, start.neutral(problem))
+        if problem.ground is None:
+            problem = on_the_ground(problem, start.neutral(problem))
         return problem, start.camera_around(problem, **options)
     return problem, start.before_camera(problem, **options)

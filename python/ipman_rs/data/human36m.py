@@ -18,12 +18,9 @@ without the world, SPIN's) repository; MoSh's parameters are not given out.
 
 from __future__ import annotations
 
-import os
 import re
-from typing import Literal
 
 from . import spin
-from .check import Finding
 
 NAME = "human36m"
 IMAGE = re.compile(r"(S\d+)[/_]([^/]+\.\d{8})[/_](\d{6})\.\w+$")
@@ -60,17 +57,4 @@ FORM = spin.Form(
     },
 )
 
-
-def open(
-    path: str | os.PathLike[str],
-    split: str | None = None,
-    frame: Literal["world", "camera"] | None = None,
-    height: float | None = None,
-) -> spin.Spin:
-    """Frames of the file, or of the split's file in the folder; see `spin.open` for the options and the errors."""
-    return spin.open(FORM, path, split, frame, height)
-
-
-def check(path: str | os.PathLike[str]) -> list[Finding]:
-    """What is there, missing and wrong."""
-    return spin.check(FORM, path)
+open, check = FORM.open, FORM.check

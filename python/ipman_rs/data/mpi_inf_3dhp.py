@@ -15,11 +15,7 @@ Where it comes from: the data set's own site for images and calibration, the rep
 
 from __future__ import annotations
 
-import os
-from typing import Literal
-
 from . import naming, spin
-from .check import Finding
 
 NAME = "mpi-inf-3dhp"
 
@@ -43,17 +39,4 @@ FORM = spin.Form(
     wanted={"S": "joints in the camera's axes: no MPJPE without them"},
 )
 
-
-def open(
-    path: str | os.PathLike[str],
-    split: str | None = None,
-    frame: Literal["world", "camera"] | None = None,
-    height: float | None = None,
-) -> spin.Spin:
-    """Frames of the file, or of the split's file in the folder; see `spin.open` for the options and the errors."""
-    return spin.open(FORM, path, split, frame, height)
-
-
-def check(path: str | os.PathLike[str]) -> list[Finding]:
-    """What is there, missing and wrong."""
-    return spin.check(FORM, path)
+open, check = FORM.open, FORM.check

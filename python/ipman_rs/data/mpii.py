@@ -11,10 +11,7 @@ Where it comes from: the data set's own site for the images, the repository of S
 
 from __future__ import annotations
 
-import os
-
 from . import naming, spin
-from .check import Finding
 
 NAME = "mpii"
 FORM = spin.Form(
@@ -24,12 +21,4 @@ FORM = spin.Form(
     wanted={"part": "no labelled keypoints"},
 )
 
-
-def open(path: str | os.PathLike[str], split: str | None = None) -> spin.Spin:
-    """Frames of the file, or of the split's file in the folder; see `spin.open` for the errors."""
-    return spin.open(FORM, path, split)
-
-
-def check(path: str | os.PathLike[str]) -> list[Finding]:
-    """What is there, missing and wrong."""
-    return spin.check(FORM, path)
+open, check = FORM.open, FORM.check

@@ -15,15 +15,12 @@ Where it comes from: RICH's own site; then the preprocessing of IPMAN's reposito
 
 from __future__ import annotations
 
-import os
 import re
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import spin
-from .check import Finding
 from .frames import Array
 
 NAME = "rich-ipman"
@@ -66,17 +63,4 @@ FORM = spin.Form(
     },
 )
 
-
-def open(
-    path: str | os.PathLike[str],
-    split: str | None = None,
-    frame: Literal["world", "camera"] | None = None,
-    height: float | None = None,
-) -> spin.Spin:
-    """Frames of the file, or of the split's file in the folder; see `spin.open` for the options and the errors."""
-    return spin.open(FORM, path, split, frame, height)
-
-
-def check(path: str | os.PathLike[str]) -> list[Finding]:
-    """What is there, missing and wrong."""
-    return spin.check(FORM, path)
+open, check = FORM.open, FORM.check

@@ -74,6 +74,40 @@ class Form:
     camera_t: Callable[[Array, Array, NDArray[np.str_]], Array] | None = None  # cam_r, cam_t, imgname -> t (F, 3) m
     wanted: Mapping[str, str] = field(default_factory=dict)  # column -> what cannot be computed without it
 
+    def open(
+        self,
+        path: str | os.PathLike[str],
+        split: str | None = None,
+        frame: Literal["world", "camera"] | None = None,
+        height: float | None = None,
+    ) -> Spin:
+        """The data set in the file `path`, or in the file of `split` in the folder `path`.
+
+        `frame`: bodies in the world's axes or in the camera's, where they have no place; None: the world's where the
+        file has one. `height` of the floor in metres, where the data set's own is not to be taken. Raises ValueError
+        naming the file for what is missing, damaged, of a wrong shape, or not metres, radians and the axes that are
+        promised.
+        """
+        file = _file(self, Path(path), split)
+        data = Spin(RowFile(file, SHAPES, REQUIRED), self, frame, height)
+        demand(file, _plausible(data))
+        return data
+
+    def check(self, path: str | os.PathLike[str]) -> list[Finding]:
+        """What is there, what is missing and what is wrong in a file, or in a folder with the files of all splits."""
+        place = Path(path)
+        if place.is_file():
+            return _check_file(self, place)
+        if not place.is_dir():
+            return [Finding("wrong", f"{place}: no such file or folder")]
+        found: list[Finding] = []
+        for split, name in self.files.items():
+            if (place / name).is_file():
+                found += _check_file(self, place / name)
+            else:
+                found.append(Finding("missing", f"{name}: not in the folder", f"only the split {split!r} needs it"))
+        return found
+
 
 class Spin:
     """A data set in this form: the rows of one file, as Frames."""
@@ -199,41 +233,6 @@ def genders(file: RowFile, rows: Rows) -> NDArray[np.str_]:
     if unknown:
         raise ValueError(f"{file.path}: gender: expected one of {', '.join(GENDERS)}, got {unknown.pop()!r}")
     return np.array([GENDERS[gender] for gender in given], np.str_)
-
-
-def open(
-    form: Form,
-    path: str | os.PathLike[str],
-    split: str | None = None,
-    frame: Literal["world", "camera"] | None = None,
-    height: float | None = None,
-) -> Spin:
-    """The data set in the file `path`, or in the file of `split` in the folder `path`.
-
-    `frame`: bodies in the world's axes or in the camera's, where they have no place; None: the world's where the file
-    has one. `height` of the floor in metres, where the data set's own is not to be taken. Raises ValueError naming the
-    file for what is missing, damaged, of a wrong shape, or not metres, radians and the axes that are promised.
-    """
-    file = _file(form, Path(path), split)
-    data = Spin(RowFile(file, SHAPES, REQUIRED), form, frame, height)
-    demand(file, _plausible(data))
-    return data
-
-
-def check(form: Form, path: str | os.PathLike[str]) -> list[Finding]:
-    """What is there, what is missing and what is wrong in a file, or in a folder with the files of all splits."""
-    place = Path(path)
-    if place.is_file():
-        return _check_file(form, place)
-    if not place.is_dir():
-        return [Finding("wrong", f"{place}: no such file or folder")]
-    found: list[Finding] = []
-    for split, name in form.files.items():
-        if (place / name).is_file():
-            found += _check_file(form, place / name)
-        else:
-            found.append(Finding("missing", f"{name}: not in the folder", f"only the split {split!r} needs it"))
-    return found
 
 
 def _check_file(form: Form, file: Path) -> list[Finding]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.checks import number
 
@@ -79,7 +79,8 @@ def moyo(
     found = np.full((len(bodies), 4, 5), np.nan)
     for frame, truth in enumerate(as_measured(measured, pressure_mode)):
         if np.isfinite(bodies[frame]).all():
-            frame_of = _Frame(bodies[frame], heights[frame], normals[frame], mat, truth, centers[frame])
+            cells = cells_of(bodies[frame], mat, frame)
+            frame_of = _Frame(bodies[frame], heights[frame], normals[frame], cells, truth, centers[frame])
             grid = frame_of.figures(ALPHAS, GAMMAS)
             fixed = frame_of.figures(np.array(own[:1]), np.array(own[1:]))
             found[frame] = [*_choices(grid), fixed[0]]
@@ -98,10 +99,12 @@ class _Frame:
     """One body over the mat. Pressure is 1 − αh below the ground and e^(−γh) above: sums of all samples are made of
     sums that know α alone, or γ alone, so the grid of both costs their sum and not their product."""
 
-    def __init__(self, body: Array, heights: Array, normal: Array, mat: Mat, truth: Array, center: Array) -> None:
+    def __init__(
+        self, body: Array, heights: Array, normal: Array, cells: NDArray[np.int64], truth: Array, center: Array
+    ) -> None:
         self.body, self.normal, self.truth, self.center = body, normal, truth, center
         self.heights, self.below = heights, heights < 0
-        self.cells = cells_of(body, mat)
+        self.cells = cells
 
     def figures(self, alphas: Array, gammas: Array) -> Array:
         """(A · G, 5), the fields of `PressureFigures`, α changing slowest."""

@@ -15,16 +15,16 @@ from .points import Array, points
 
 class Mat(Protocol):
     """A mat on the ground with square cells, such as `ipman_rs.data.PressureMaps`: the point of cell (i, j) is
-    origin + (i + ½) cell e1 + (j + ½) cell e2."""
+    origin + (i + ½) cell e1 + (j + ½) cell e2. A mat that was moved has a row of origin, e1 and e2 for each body."""
 
     @property
     def values(self) -> NDArray[Any]: ...  # (..., H, W)
     @property
-    def origin(self) -> NDArray[Any]: ...  # (3,) m
+    def origin(self) -> NDArray[Any]: ...  # (3,) or (B, 3) m
     @property
-    def e1(self) -> NDArray[Any]: ...  # (3,)
+    def e1(self) -> NDArray[Any]: ...  # (3,) or (B, 3)
     @property
-    def e2(self) -> NDArray[Any]: ...  # (3,)
+    def e2(self) -> NDArray[Any]: ...  # (3,) or (B, 3)
     @property
     def cell(self) -> float: ...  # m
 
@@ -42,19 +42,20 @@ def pressure_map(samples: ArrayLike, pressure: ArrayLike, mat: Mat) -> Any:
     height, width = mat.values.shape[-2:]
     bodies = where.reshape(-1, *where.shape[-2:]), weights.reshape(-1, weights.shape[-1])
     maps = np.full((len(bodies[0]), height * width), np.nan)
-    for found, body, weight in zip(maps, *bodies, strict=True):
+    for number, (found, body, weight) in enumerate(zip(maps, *bodies, strict=True)):
         if np.isfinite(body).all():
-            cells = cells_of(body, mat)
+            cells = cells_of(body, mat, number)
             on = cells >= 0
             found[:] = np.bincount(cells[on], weight[on], height * width)
     return maps.reshape(*where.shape[:-2], height, width)
 
 
-def cells_of(samples: Array, mat: Mat) -> NDArray[np.int64]:
-    """The number i · W + j of the cell under each sample (S, 3); −1 off the mat."""
+def cells_of(samples: Array, mat: Mat, body: int) -> NDArray[np.int64]:
+    """The number i · W + j of the cell under each sample (S, 3) of the body of this number; −1 off the mat."""
     height, width = mat.values.shape[-2:]
-    offset = (samples - mat.origin) / mat.cell
-    i, j = np.floor(offset @ mat.e1), np.floor(offset @ mat.e2)
+    origin, e1, e2 = (place[body] if place.ndim == 2 else place for place in (mat.origin, mat.e1, mat.e2))
+    offset = (samples - origin) / mat.cell
+    i, j = np.floor(offset @ e1), np.floor(offset @ e2)
     on = (i >= 0) & (i < height) & (j >= 0) & (j < width)
     return np.where(on, i * width + j, -1).astype(np.int64)
 

@@ -24,7 +24,7 @@ class Stage:
     weights: Mapping[str, float]
     solver: str
     options: Options
-    find_ground: bool = False  # lay the ground under the feet before it, unless the ground is known
+    find_ground: bool = False  # lay the ground under the body before it, unless the ground is given
 
 
 @dataclass(frozen=True)

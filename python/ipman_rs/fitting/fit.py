@@ -72,9 +72,10 @@ def fit(
     `trace`: report the terms by iteration, for one more evaluation each.
     """
     reports = []
+    known = problem.ground is not None
     with one_thread():
         for stage in config.stages:
-            if stage.find_ground:
+            if stage.find_ground and not known:
                 problem = on_the_ground(problem, variables)
             problem = judged(problem, variables)
             variables, report = run_stage(problem, variables, stage, config.terms, progress, trace)
@@ -83,9 +84,7 @@ def fit(
 
 
 def on_the_ground(problem: Problem, variables: Variables) -> Problem:
-    """The problem with a level ground under the lowest vertex of each body, unless its ground is known."""
-    if problem.ground is not None:
-        return problem
+    """The problem with a level ground under the lowest vertex of each body."""
     with torch.no_grad():
         lowest = Candidate(problem, variables).vertices[..., 1].amin(dim=1)
     up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(len(lowest), 3)

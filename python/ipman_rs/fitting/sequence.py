@@ -60,9 +60,10 @@ def fit_sequence(
     smooth = Smoothness(problem.body, problem.num_bodies, rate, order)
     smooth.band *= not_negative("smoothness", smoothness)
     reports = []
+    known = problem.ground is not None
     with one_thread():
         for number, stage in enumerate(config.stages):
-            if stage.find_ground:
+            if stage.find_ground and not known:
                 problem = on_one_ground(problem, variables)
             problem = judged(problem, variables)
             if number == 0:
@@ -74,9 +75,7 @@ def fit_sequence(
 
 
 def on_one_ground(problem: Problem, variables: Variables) -> Problem:
-    """The problem with one level ground for all frames, unless its ground is known."""
-    if problem.ground is not None:
-        return problem
+    """The problem with one level ground for all frames."""
     each = on_the_ground(problem, variables).ground
     assert each is not None
     return replace(problem, ground=ipt.Ground(each.normal, each.height.nanmedian().expand(len(each.height))))

@@ -1,25 +1,28 @@
 """Where a fit starts: the mean body before the camera, as far away as its size in the image tells, turned the way that
 explains the points best.
 
-SMPLify-X estimates the depth by similar triangles and tries a turn by 180°; SMPLify-XMC searches over yaws. Here both:
-every yaw is fitted for a few iterations, and the lowest cost wins.
+SMPLify-X estimates the depth by similar triangles and tries a turn by 180°; SMPLify-XMC searches over yaws. Here both,
+and without a presented pose over the named ones: the most promising are fitted for a few iterations, and the lowest
+cost wins.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from ipman_rs.body.poses import NAMES, pose_of
+
 from .camera import NEAREST
 from .problem import Problem
 from .rotations import matrix, nearest, vector
 from .solvers import Options
-from .variables import Variables
+from .variables import Variables, pack
 
 # Far joints of the trunk, whose lengths change least with the pose, and then those of the legs and arms.
 SPANS = (
@@ -35,6 +38,7 @@ SPANS = (
 SEEN = 0.1  # confidence from which a point counts as seen
 WEIGHTS = {"reprojection": 4.0, "pose_prior": 40.0, "joint_limits": 200.0, "shape_prior": 50.0}
 DEEPEST = 100.0  # m
+TRIED = 8  # placed poses that are fitted for a few iterations
 
 
 def level_camera(pitch: float | Tensor = 0.0) -> Tensor:
@@ -58,9 +62,7 @@ def neutral(problem: Problem) -> dict[str, Tensor]:
         pose = problem.presented.pose.double()
         orient = orient if problem.presented.orient is None else problem.presented.orient.double()
     else:
-        from ipman_rs.body import poses
-
-        standing = torch.as_tensor(poses.pose_of(model, "standing"))[1:]
+        standing = torch.as_tensor(pose_of(model, "standing"))[1:]
         pose = standing.expand(bodies, -1, -1).clone()
     return {
         "orient": orient,
@@ -74,14 +76,25 @@ def neutral(problem: Problem) -> dict[str, Tensor]:
 
 
 def before_camera(problem: Problem, yaws: int = 4, iterations: int = 12) -> dict[str, Tensor]:
-    """Variables with the body placed before the camera, which stays. Needs points in an image."""
-    return _best(problem, neutral(problem), yaws, ("orient", "transl"), iterations, moves_camera=False)
+    """Variables with the body placed before the camera, which stays: in the presented pose, or in the one of the named
+    poses of `ipman_rs.body.poses` that explains the points best. Needs points in an image."""
+    poses = [neutral(problem)]
+    if problem.presented is None:
+        poses += [_posed(poses[0], problem, name) for name in NAMES]
+    return _best(problem, poses, yaws, ("orient", "transl"), iterations, moves_camera=False)
+
+
+def _posed(variables: Variables, problem: Problem, name: str) -> dict[str, Tensor]:
+    """The body in a named pose, its pelvis turned as there."""
+    pose = torch.as_tensor(pose_of(problem.body.body, name))
+    own = {"orient": pose[0], "pose": pose[1:]}
+    return {**variables, **{key: value.expand_as(variables[key]).clone() for key, value in own.items()}}
 
 
 def camera_around(problem: Problem, yaws: int = 12, iterations: int = 12) -> dict[str, Tensor]:
     """Variables with the camera placed around the body, which stays in its own frame with its ground."""
     free = ("camera_orient", "camera_transl")
-    return _best(problem, neutral(problem), yaws, free, iterations, moves_camera=True)
+    return _best(problem, [neutral(problem)], yaws, free, iterations, moves_camera=True)
 
 
 def at_points(problem: Problem) -> dict[str, Tensor]:
@@ -89,12 +102,10 @@ def at_points(problem: Problem) -> dict[str, Tensor]:
     nearest when it is moved and turned as a whole (Kabsch). Points that are not finite count as not seen."""
     if problem.points_3d is None:
         raise ValueError("points_3d: expected points (B, K, 3) in the world, got none")
-    from ipman_rs.body import poses
-
     variables = neutral(problem)
     best, nearest_yet = _onto_points(problem, variables)
-    for name in poses.NAMES if problem.presented is None else ():
-        pose = torch.as_tensor(poses.pose_of(problem.body.body, name))[1:].expand_as(variables["pose"])
+    for name in NAMES if problem.presented is None else ():
+        pose = torch.as_tensor(pose_of(problem.body.body, name))[1:].expand_as(variables["pose"])
         found, away = _onto_points(problem, {**variables, "pose": pose})
         nearer = away < nearest_yet
         best = {key: torch.where(nearer.reshape(-1, *[1] * (a.ndim - 1)), found[key], a) for key, a in best.items()}
@@ -125,28 +136,43 @@ def _onto_points(problem: Problem, variables: Variables) -> tuple[dict[str, Tens
 
 def _best(
     problem: Problem,
-    variables: Mapping[str, Tensor],
+    poses: Sequence[Variables],
     yaws: int,
     free: tuple[str, ...],
     iterations: int,
     moves_camera: bool,
 ) -> dict[str, Tensor]:
+    """Of all poses and yaws, each placed, the `TRIED` that explain the points best are fitted; the lowest cost wins."""
     from .config import Stage
     from .fit import run_stage
+    from .objective import Objective
 
-    copies = torch.arange(problem.num_bodies).repeat_interleave(yaws)
-    many = problem.rows(copies)
-    starts = {name: value[copies] for name, value in variables.items()}
-    turns = torch.arange(yaws, dtype=torch.float64).repeat(problem.num_bodies) * (2 * math.pi / yaws)
-    starts = _placed(many, starts, turns, moves_camera)
+    bodies, count = problem.num_bodies, len(poses) * yaws
+    many = problem.rows(torch.arange(bodies).repeat_interleave(count))
+    starts = {
+        name: torch.stack([pose[name] for pose in poses], dim=1).repeat_interleave(yaws, dim=1).flatten(0, 1)
+        for name in poses[0]
+    }
+    turns = torch.arange(yaws, dtype=torch.float64).repeat(bodies * len(poses)) * (2 * math.pi / yaws)
+    # Named poses lie or stand on their heads by themselves: only the first one is rolled as the image is.
+    rolls = (torch.arange(count) < yaws).repeat(bodies)
+    starts = _placed(many, starts, turns, rolls, moves_camera)
+    with torch.no_grad():
+        placed = Objective(many, starts, free, WEIGHTS)
+        costs = torch.stack(list(placed.costs(placed.candidate(pack(starts, free))).values())).sum(dim=0)
+    tried = min(TRIED, count)
+    order = costs.nan_to_num(nan=torch.inf).reshape(bodies, count).argsort(dim=1, stable=True)[:, :tried]
+    rows = (order + count * torch.arange(bodies)[:, None]).flatten()
     stage = Stage("start", free, WEIGHTS, "levenberg", Options(iterations=iterations, gradient=1.0, decrease=1.0))
-    found, report = run_stage(many, starts, stage, {})
-    costs = np.nan_to_num(sum(report.terms.values()), nan=np.inf).reshape(-1, yaws)
-    winners = torch.from_numpy(costs.argmin(axis=1)) + yaws * torch.arange(problem.num_bodies)
+    found, report = run_stage(many.rows(rows), {name: value[rows] for name, value in starts.items()}, stage, {})
+    ends = np.nan_to_num(sum(report.terms.values()), nan=np.inf).reshape(bodies, tried)
+    winners = torch.from_numpy(ends.argmin(axis=1)) + tried * torch.arange(bodies)
     return {name: value[winners] for name, value in found.items()}
 
 
-def _placed(problem: Problem, variables: Variables, yaws: Tensor, moves_camera: bool) -> dict[str, Tensor]:
+def _placed(
+    problem: Problem, variables: Variables, yaws: Tensor, rolls: Tensor, moves_camera: bool
+) -> dict[str, Tensor]:
     """The body, or the camera, turned by the yaws and moved so that the trunk is seen where it was in the image."""
     zero = torch.zeros_like(yaws)
     turn = matrix(torch.stack([zero, yaws, zero], dim=-1))
@@ -155,7 +181,7 @@ def _placed(problem: Problem, variables: Variables, yaws: Tensor, moves_camera: 
         rotation = rotation @ turn
         variables = {**variables, "camera_orient": vector(rotation)}
     else:
-        roll = _roll(problem)
+        roll = torch.where(rolls, _roll(problem), 0.0)
         tilt = matrix(torch.stack([zero, zero, roll], dim=-1))  # about the camera's line of sight
         upright = rotation.transpose(1, 2) @ tilt @ rotation
         variables = {**variables, "orient": vector(upright @ turn @ matrix(variables["orient"]))}

@@ -140,16 +140,13 @@ def _pressure(vertices: NDArray[Any], model: BodyModel, ground: Ground, true: Fr
         center = ip.center_of_pressure(vertices, model.template, ground, **curve)
         return {"cop_error": cop_error(center, true.center_of_pressure, ground)}
     samples = ip.sample_surface(vertices, model.template)
-    normals, heights = np.broadcast_to(ground.normal, (len(true), 3)), np.broadcast_to(ground.height, len(true))
-    rows = np.empty((4, len(true)))
-    for row in range(len(true)):  # frame by frame, for each may have its own place of the mat
-        one = slice(row, row + 1)
-        floor = Ground(normals[row], heights[row])
-        mat, center = true.pressure[one], true.center_of_pressure[one]
-        found = moyo(samples[one], floor, mat, center, constants.alpha, constants.gamma)
-        best, nearest = found.best_iou, found.best_cop_error
-        rows[:, row] = found.fixed.iou[0], found.fixed.cop_error[0], best.iou[0], nearest.cop_error[0]
-    return dict(zip(("pressure_iou", "cop_error", "pressure_iou_chosen", "cop_error_chosen"), rows, strict=True))
+    found = moyo(samples, ground, true.pressure, true.center_of_pressure, constants.alpha, constants.gamma)
+    return {
+        "pressure_iou": found.fixed.iou,
+        "cop_error": found.fixed.cop_error,
+        "pressure_iou_chosen": found.best_iou.iou,
+        "cop_error_chosen": found.best_cop_error.cop_error,
+    }
 
 
 @lru_cache(maxsize=4)

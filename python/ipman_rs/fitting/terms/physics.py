@@ -20,6 +20,7 @@ import ipman_rs.torch as ipt
 from ipman_rs import BodyTemplate
 from ipman_rs.body import BodyModel
 from ipman_rs.checks import not_negative
+from ipman_rs.losses import Wrap
 
 from ..candidate import Candidate
 from ..problem import Problem
@@ -36,6 +37,7 @@ class Physics(Term):
     usual = "paper-o"
     quantities: tuple[str, ...]  # of IntuitivePhysicsLoss, summed
     factors: Mapping[str, float] = {}  # of the quantities, 1 where nothing is said
+    wrap: Wrap = "log"  # of the balance cost
 
     def __init__(
         self, problem: Problem, preset: str | None = None, samples: int | None = None, only_static: bool = False
@@ -43,7 +45,7 @@ class Physics(Term):
         super().__init__(problem)
         if problem.ground is None:
             raise ValueError("ground: expected one for terms of physics; give it, or let a stage find it (find_ground)")
-        self.loss = _loss(problem.body.body, preset or self.usual, samples)
+        self.loss = _loss(problem.body.body, preset or self.usual, samples, self.wrap)
         missing = set(self.quantities) - set(self.loss.terms)
         if missing:
             raise ValueError(f"preset: {preset!r} has {', '.join(self.loss.terms)}, but no {', '.join(missing)}")
@@ -72,14 +74,20 @@ class Ground(Physics):
 
 
 class Balance(Physics):
+    """wrap: as in `balance_cost`; "saturate" lets a body that falls alone."""
+
     usual = "balanced"
     quantities = ("balance",)
 
+    def __init__(self, problem: Problem, wrap: Wrap = "log", **options: Any):
+        self.wrap = wrap
+        super().__init__(problem, **options)
+
 
 @lru_cache(maxsize=16)
-def _loss(body: BodyModel, preset: str, samples: int | None) -> ipt.IntuitivePhysicsLoss:
+def _loss(body: BodyModel, preset: str, samples: int | None, wrap: Wrap = "log") -> ipt.IntuitivePhysicsLoss:
     """One object for all terms of the same constants: by it they find each other's evaluation."""
-    return ipt.IntuitivePhysicsLoss(_template(body, samples), preset=preset, reduction="none")
+    return ipt.IntuitivePhysicsLoss(_template(body, samples), preset=preset, reduction="none", wrap=wrap)
 
 
 @lru_cache(maxsize=16)
