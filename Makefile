@@ -124,7 +124,7 @@ $(VENV)/fit-tools: pyproject.toml | $(VENV)/built
 	touch $@
 
 $(VENV)/test-tools: pyproject.toml | $(VENV)/built
-	$(MATURIN_DEVELOP) --extras fit,c3d,render,train --group test
+	$(MATURIN_DEVELOP) --extras fit,c3d,render,train,evaluate --group test
 	touch $@
 
 $(VENV)/bench-tools: pyproject.toml | $(VENV)/test-tools

@@ -11,6 +11,7 @@ import click
 from .benchmark import benchmark
 from .data import data
 from .errors import FileError
+from .evaluate import evaluate
 from .fit import fit
 from .options import GROUND, PRESETS, UP
 from .predict import predict
@@ -44,6 +45,7 @@ def main() -> None:
     ipman demo -o out               the named poses of the built-in body
     ipman analyze body.obj -o out   your own mesh; open out/report.html afterwards
     ipman fit photo.jpg -o out      a body for the person in a photo
+    ipman evaluate pred.npz --data own --path true.npz -o out   predictions against the truth
     ipman validate folder/ -o out   the engine against force plates and OpenSim
     """
 
@@ -52,6 +54,7 @@ main.add_command(fit)
 main.add_command(benchmark)
 main.add_command(train)
 main.add_command(predict)
+main.add_command(evaluate)
 main.add_command(validate)
 main.add_command(data)
 

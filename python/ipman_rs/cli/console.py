@@ -107,6 +107,19 @@ def _row(study: Study, frames: int | slice) -> list[Text]:
     return [*map(Text, cells), Text(said, style="green" if stable.all() else "red")]
 
 
+def print_rows(head: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
+    """A table of text, its first column to the left."""
+    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
+    for number, title in enumerate(head):
+        table.add_column(title, justify="left" if number == 0 else "right", overflow="fold")
+    for line in lines:
+        table.add_row(*(Text(one_line(cell)) for cell in line))
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 200
+    console.print(table)
+
+
 def print_fits(studies: Sequence[Study]) -> None:
     """A line for each fitted body: how its fit went, how it stands, and what to look at."""
     table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
