@@ -1,0 +1,245 @@
+//! The tip test: how firmly a stiff body stands, without a simulation.
+//!
+//! It stands on the hull of its vertices that are nearly as low as its lowest one. Over an edge of that hull, with the
+//! centre of mass at height h and s inside, it must be lifted by E = m g (√(h² + s²) − h), and an angular velocity of
+//! √(2E / I) tips it, I the inertia about the edge. With the centre outside it falls like an inverted pendulum,
+//! d(t) ≈ |s| (cosh λt − 1), λ = √(m g h / I). Where it comes to rest if nothing is quick, [`roll`] finds.
+
+pub mod roll;
+
+use crate::error::{Error, Result};
+use crate::ground::{Ground, Plane};
+use crate::number::vector::{Vec3, dot, scale, sub};
+use crate::number::{Real, Room, Scalar};
+use crate::scene::{self, Scene};
+use crate::solid::{GRAVITY, Solid};
+use crate::support::hull::convex_hull;
+use crate::support::margin::{Margin, Nearest};
+use crate::volume::MassProperties;
+use roll::{Cloud, Rest};
+
+/// Vertices up to this height above the lowest are collected at first, m; the higher ones are looked at when the body
+/// rolls so far that they may touch.
+pub const BAND: f64 = 0.05;
+
+/// What is asked of each body.
+pub struct TipTest {
+    /// kg/m³, one for all parts or one for each.
+    pub densities: MassProperties,
+    /// A body with its lowest vertex higher than this is in the air, m.
+    pub contact: f64,
+    /// It stands on the vertices up to this height above its lowest one, m; at most [`BAND`].
+    pub tolerance: f64,
+}
+
+/// How firmly one body stands: NaN for a body that is no solid, or in the air.
+#[derive(Clone, Debug)]
+pub struct Tipping {
+    pub solid: Solid,
+    /// Where it comes to rest.
+    pub rest: Rest,
+    pub stance: Stance,
+}
+
+/// The first tip, at rest as the body is posed.
+#[derive(Clone, Copy, Debug)]
+pub struct Stance {
+    /// h: the centre of mass above the lowest vertex, m.
+    pub height: f64,
+    /// s: from the centre of mass, on the ground, to the nearest edge of what the body stands on, m; positive inside.
+    pub margin: f64,
+    /// The least E over the edges, J; 0 with the centre outside.
+    pub barrier: f64,
+    /// The least angular velocity that tips it over an edge, rad/s; 0 with the centre outside.
+    pub push: f64,
+    /// λ about the nearest edge, 1/s.
+    pub rate: f64,
+}
+
+impl TipTest {
+    /// An error for a tolerance out of range.
+    pub fn new(densities: &[f64], contact: f64, tolerance: f64) -> Result<Self> {
+        if !(0.0..=BAND).contains(&tolerance) {
+            let expected = format!("0 to {BAND} m");
+            return Err(Error::Argument { name: "tolerance", expected, got: tolerance.to_string() });
+        }
+        Ok(TipTest { densities: MassProperties { densities: densities.to_vec() }, contact, tolerance })
+    }
+
+    /// That of each lane, in the world.
+    pub fn of_lanes<R: Real>(&self, scene: &Scene<R>) -> Vec<Tipping> {
+        let solids = Solid::of_lanes(scene, &self.densities, self.contact);
+        let low = R::apart::<Low, _>((scene,));
+        let of_lane = |(lane, (solid, low)): (usize, (Solid, Vec<u32>))| {
+            let value = |x: R::Wide| x.lane(lane).value();
+            let origin = scene.origin.map(value);
+            if !solid.is_grounded() {
+                return Tipping::undefined(solid.moved(origin));
+            }
+            let ground = Ground { normal: scene.ground.normal.map(value), height: value(scene.ground.height) };
+            let points = LanePoints { scene, lane, centre: solid.centre };
+            let stance = self.stance(&solid, &ground, &points, &low);
+            let rest = roll::to_rest(scale(-1.0, ground.normal), &low, &points);
+            Tipping { solid: solid.moved(origin), rest, stance }
+        };
+        solids.into_iter().zip(low).enumerate().map(of_lane).collect()
+    }
+
+    fn stance<R: Real>(&self, solid: &Solid, ground: &Ground<f64>, points: &LanePoints<R>, low: &[u32]) -> Stance {
+        let plane = Plane { axes: ground.axes() };
+        let offsets: Vec<Vec3<f64>> = low.iter().map(|&vertex| points.offset(vertex)).collect();
+        let depth = |offset: &Vec3<f64>| -dot(ground.normal, *offset);
+        let height = offsets.iter().map(depth).fold(f64::NEG_INFINITY, f64::max);
+        let stands = offsets.iter().filter(|offset| depth(offset) >= height - self.tolerance);
+        let feet: Vec<[f64; 2]> = stands.map(|offset| plane.flatten(*offset)).collect();
+        let corners: Vec<[f64; 2]> = convex_hull(&feet).into_iter().map(|i| feet[i]).collect();
+        let turned = |axis: Vec3<f64>| {
+            let rows: Vec3<f64> = std::array::from_fn(|k| dot(solid.inertia[k], axis));
+            dot(rows, axis)
+        };
+        let pendulum = |axis: [f64; 2], arm: f64| Pendulum {
+            weight: solid.mass * GRAVITY,
+            height,
+            arm,
+            inertia: turned(plane.raise(axis)) + solid.mass * (arm * arm + height * height),
+        };
+        Stance::on(&corners, height, pendulum)
+    }
+}
+
+/// A body that turns about an axis on the ground.
+struct Pendulum {
+    /// N
+    weight: f64,
+    /// The centre above the axis, and beside it, m.
+    height: f64,
+    arm: f64,
+    /// About the axis, kg m².
+    inertia: f64,
+}
+
+impl Pendulum {
+    /// What lifts the centre until it is above the axis, J. √(h² + s²) − h without its cancellation.
+    fn barrier(&self) -> f64 {
+        self.weight * self.arm * self.arm / (self.height.hypot(self.arm) + self.height)
+    }
+
+    fn push(&self) -> f64 {
+        (2.0 * self.barrier() / self.inertia).sqrt()
+    }
+
+    fn rate(&self) -> f64 {
+        (self.weight * self.height / self.inertia).sqrt()
+    }
+}
+
+impl Stance {
+    /// On a convex polygon around the foot of the centre of mass, which is at the origin: of any number of corners.
+    fn on(corners: &[[f64; 2]], height: f64, pendulum: impl Fn([f64; 2], f64) -> Pendulum) -> Self {
+        const FOOT: [f64; 2] = [0.0; 2];
+        let unknown = Stance { height, margin: f64::NAN, barrier: f64::NAN, push: f64::NAN, rate: f64::NAN };
+        let Some(nearest) = Nearest::find(corners, FOOT).filter(|_| height > 0.0) else { return unknown };
+        let margin = Margin::new(nearest.map(|i| corners[i]), FOOT);
+        // The margin grows at right angles to the axis over which the body would go.
+        let [x, y] = margin.direction;
+        let first = pendulum([-y, x], margin.value);
+        if margin.value <= 0.0 {
+            return Stance { height, margin: margin.value, barrier: 0.0, push: 0.0, rate: first.rate() };
+        }
+        let mut stance = Stance {
+            height,
+            margin: margin.value,
+            barrier: first.barrier(),
+            push: first.push(),
+            rate: first.rate(),
+        };
+        for (k, &a) in corners.iter().enumerate() {
+            let b = corners[(k + 1) % corners.len()];
+            let length = f64::hypot(b[0] - a[0], b[1] - a[1]);
+            let axis = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+            let arm = a[0] * axis[1] - a[1] * axis[0];
+            stance.push = stance.push.min(pendulum(axis, arm).push());
+        }
+        stance
+    }
+}
+
+impl Tipping {
+    pub const ROW: usize = 22;
+
+    /// A body that is not finite.
+    pub fn nowhere() -> Self {
+        Self::undefined(Solid::nowhere())
+    }
+
+    fn undefined(solid: Solid) -> Self {
+        let [height, margin, barrier, push, rate] = [f64::NAN; 5];
+        let stance = Stance { height, margin, barrier, push, rate };
+        Tipping { solid: solid.or_nowhere(), rest: Rest::unknown(), stance }
+    }
+
+    /// status, mass, centre, inertia row by row, lowest; height, margin, barrier, push, rate; tilt and drop (J) to rest.
+    pub fn row(&self) -> [f64; Self::ROW] {
+        let Tipping { solid, rest, stance } = self;
+        let mut row = [0.0; Self::ROW];
+        row[..15].copy_from_slice(&solid.row());
+        row[15..20].copy_from_slice(&[stance.height, stance.margin, stance.barrier, stance.push, stance.rate]);
+        row[20..].copy_from_slice(&[rest.tilt, solid.mass * GRAVITY * rest.sunk]);
+        row
+    }
+}
+
+/// The vertices of one lane as seen from its centre of mass.
+struct LanePoints<'a, R: Real> {
+    scene: &'a Scene<'a, R>,
+    lane: usize,
+    centre: Vec3<f64>,
+}
+
+impl<R: Real> LanePoints<'_, R> {
+    #[inline(always)]
+    fn offset(&self, vertex: u32) -> Vec3<f64> {
+        let point = self.scene.points[vertex as usize];
+        sub([0, 1, 2].map(|k| point[k].lane(self.lane).value()), self.centre)
+    }
+}
+
+impl<R: Real> Cloud for LanePoints<'_, R> {
+    fn offsets(&self, vertices: impl Iterator<Item = u32>) -> Vec<Vec3<f64>> {
+        vertices.map(|vertex| self.offset(vertex)).collect()
+    }
+
+    fn len(&self) -> usize {
+        self.scene.template.mesh.num_vertices
+    }
+
+    /// From the centre to the farthest corner of the box around the body.
+    fn reach(&self) -> f64 {
+        let [low, high] = self.scene.bounds().map(|corner| corner.map(|x| x.lane(self.lane).value()));
+        let far: Vec3<f64> =
+            std::array::from_fn(|k| f64::max(self.centre[k] - low[k], high[k] - self.centre[k]).max(0.0));
+        dot(far, far).sqrt()
+    }
+}
+
+/// For each lane its vertices within [`BAND`] of the lowest.
+struct Low;
+
+impl<R: Real> Room<(&Scene<'_, R>,)> for Low {
+    type Output = Vec<Vec<u32>>;
+
+    #[inline(always)]
+    fn enter((scene,): (&Scene<R>,)) -> Vec<Vec<u32>> {
+        let heights = scene.heights();
+        let limit = scene::lowest(&heights) + R::of(BAND);
+        let mut low = vec![Vec::new(); R::LANES];
+        for (vertex, &height) in heights.iter().enumerate() {
+            let mut lanes = (height - limit).negative();
+            while lanes != 0 {
+                low[lanes.trailing_zeros() as usize].push(vertex as u32);
+                lanes &= lanes - 1;
+            }
+        }
+        low
+    }
+}

@@ -1,0 +1,241 @@
+//! The quasi-static roll: where a stiff body comes to rest on level ground if nothing is quick.
+//!
+//! In the body's own coordinates it is the ground that turns around it. With `down` towards the ground, the centre of mass
+//! is at the height H(down) = max over the points p of down · p, p from the centre. Gravity turns `down` where H falls
+//! fastest: away from the nearest point of what touches, so that the body pivots over a vertex or an edge until another
+//! point touches. It rests where the centre lies over what touches.
+
+use crate::ground::{Ground, Plane};
+use crate::number::vector::{Vec3, add, cross, dot, scale, sub};
+use crate::number::{Fused, Real, Room};
+use crate::support::hull::convex_hull;
+use crate::support::margin::{Margin, Nearest};
+use crate::tipping::BAND;
+
+/// Points within this height of the lowest touch, m.
+const TOUCH: f64 = 1e-9;
+/// So many turns no body needs: a ball of a million points has fewer on any way down.
+const MOST_TURNS: usize = 10_000;
+
+/// Where a body came to rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rest {
+    /// Between up in the pose and up at rest, rad; 0 to π.
+    pub tilt: f64,
+    /// How far the centre of mass went down, m.
+    pub sunk: f64,
+}
+
+impl Rest {
+    pub fn unknown() -> Self {
+        Rest { tilt: f64::NAN, sunk: f64::NAN }
+    }
+}
+
+/// The points of a body as seen from its centre of mass.
+pub trait Cloud {
+    fn offsets(&self, points: impl Iterator<Item = u32>) -> Vec<Vec3<f64>>;
+    fn len(&self) -> usize;
+    /// No point is farther from the centre, m.
+    fn reach(&self) -> f64;
+}
+
+/// Rolls a body to rest that first touches in the direction `down`. `low` are its points within [`BAND`] of the lowest.
+/// Unknown for a body whose centre lies outside of its own hull.
+pub fn to_rest(down: Vec3<f64>, low: &[u32], cloud: &impl Cloud) -> Rest {
+    let mut body = Body { reach: cloud.reach(), near: Near::new(cloud.offsets(low.iter().copied()), down), all: None };
+    let start = down;
+    let first = body.near.height;
+    let mut down = down;
+    for _ in 0..MOST_TURNS {
+        let stop = body.near.points.stop(down);
+        let Some(way) = stop.downhill(down) else {
+            return Rest { tilt: angle(start, down), sunk: (first - stop.height).max(0.0) };
+        };
+        let Some(next) = body.turn(down, &way, stop.height, cloud) else { return Rest::unknown() };
+        down = next;
+    }
+    Rest::unknown()
+}
+
+fn angle(a: Vec3<f64>, b: Vec3<f64>) -> f64 {
+    let across = cross(a, b);
+    dot(across, across).sqrt().atan2(dot(a, b))
+}
+
+/// The points that may touch next, and all.
+struct Body {
+    reach: f64,
+    near: Near,
+    /// Read when they are first needed.
+    all: Option<Points>,
+}
+
+impl Body {
+    /// The direction down when the next point touches. None where there is none, or not within a right angle.
+    fn turn(&mut self, down: Vec3<f64>, way: &Way, height: f64, cloud: &impl Cloud) -> Option<Vec3<f64>> {
+        let pivot = dot(way.pivot, way.towards);
+        let turned = self.near.points.turned(down, way, height, pivot);
+        if let Some(next) = turned.filter(|next| self.near.holds(*next, dot(*next, way.pivot), self.reach)) {
+            return Some(next);
+        }
+        let all = self.all.get_or_insert_with(|| Points::new(&cloud.offsets(0..cloud.len() as u32)));
+        let next = all.turned(down, way, height, pivot)?;
+        self.near = Near::new(all.near(next), next);
+        Some(next)
+    }
+}
+
+/// The points within [`BAND`] of the lowest in one direction.
+struct Near {
+    points: Points,
+    down: Vec3<f64>,
+    height: f64,
+}
+
+impl Near {
+    fn new(offsets: Vec<Vec3<f64>>, down: Vec3<f64>) -> Self {
+        let points = Points::new(&offsets);
+        let height = points.height(down);
+        Near { points, down, height }
+    }
+
+    /// Whether in another direction, with the centre at `height`, every point that touches is one of them: the others have
+    /// come down by less than `reach` times the turn, and were higher by [`BAND`].
+    fn holds(&self, down: Vec3<f64>, height: f64, reach: f64) -> bool {
+        let turn = sub(down, self.down);
+        height > self.height - BAND + TOUCH + reach * dot(turn, turn).sqrt()
+    }
+}
+
+/// x, y and z apart, so that the loops over them vectorise.
+struct Points {
+    axes: [Vec<f64>; 3],
+}
+
+/// What touches in one direction, and the height of the centre.
+struct Stop {
+    height: f64,
+    touching: Vec<Vec3<f64>>,
+}
+
+/// Where `down` turns to, a unit vector at right angles to it, and a point over which the body pivots.
+struct Way {
+    towards: Vec3<f64>,
+    pivot: Vec3<f64>,
+}
+
+impl Stop {
+    /// None where the body is at rest.
+    fn downhill(&self, down: Vec3<f64>) -> Option<Way> {
+        let plane = Plane { axes: Ground { normal: down, height: 0.0 }.axes() };
+        let flat: Vec<[f64; 2]> = self.touching.iter().map(|point| plane.flatten(*point)).collect();
+        let corners = convex_hull(&flat);
+        let feet: Vec<[f64; 2]> = corners.iter().map(|&i| flat[i]).collect();
+        let nearest = Nearest::find(&feet, [0.0; 2])?;
+        let margin = Margin::new(nearest.map(|i| feet[i]), [0.0; 2]);
+        let towards = plane.raise(margin.direction.map(|x| -x));
+        (margin.value < 0.0).then(|| Way { towards, pivot: self.touching[corners[nearest.ends()[0]]] })
+    }
+}
+
+impl Points {
+    fn new(offsets: &[Vec3<f64>]) -> Self {
+        Points { axes: [0, 1, 2].map(|k| offsets.iter().map(|offset| offset[k]).collect()) }
+    }
+
+    fn heights(&self, down: Vec3<f64>) -> Vec<f64> {
+        Fused::<f64>::apart::<Along, _>((self, down))
+    }
+
+    fn height(&self, down: Vec3<f64>) -> f64 {
+        self.heights(down).into_iter().fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    fn stop(&self, down: Vec3<f64>) -> Stop {
+        let heights = self.heights(down);
+        let height = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let touching = heights.iter().enumerate().filter(|(_, own)| **own >= height - TOUCH);
+        Stop { height, touching: touching.map(|(point, _)| self.at(point)).collect() }
+    }
+
+    fn at(&self, point: usize) -> Vec3<f64> {
+        [0, 1, 2].map(|k| self.axes[k][point])
+    }
+
+    fn near(&self, down: Vec3<f64>) -> Vec<Vec3<f64>> {
+        let heights = self.heights(down);
+        let limit = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max) - BAND;
+        (0..heights.len()).filter(|&point| heights[point] >= limit).map(|point| self.at(point)).collect()
+    }
+
+    /// The direction in which the first of the points touches that do not yet.
+    fn turned(&self, down: Vec3<f64>, way: &Way, height: f64, pivot: f64) -> Option<Vec3<f64>> {
+        // At the angle θ a point touches that is a above the ground and b beyond the pivot with a cos θ = b sin θ.
+        let steepest = Fused::<f64>::apart::<Steepest, _>((self, down, way.towards, height, pivot));
+        if steepest <= 0.0 {
+            return None;
+        }
+        let next = add(scale(steepest, down), way.towards);
+        Some(scale(1.0 / dot(next, next).sqrt(), next))
+    }
+}
+
+/// [`Points::heights`]
+struct Along;
+
+impl Room<(&Points, Vec3<f64>)> for Along {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn enter((points, down): (&Points, Vec3<f64>)) -> Vec<f64> {
+        let [x, y, z] = &points.axes;
+        let mut out = vec![0.0; x.len()];
+        for (((out, x), y), z) in out.iter_mut().zip(x).zip(y).zip(z) {
+            *out = x * down[0] + y * down[1] + z * down[2];
+        }
+        out
+    }
+}
+
+/// The largest b / a of [`Points::turned`].
+struct Steepest;
+
+/// Sums that run side by side.
+const WIDTH: usize = 16;
+
+impl Room<(&Points, Vec3<f64>, Vec3<f64>, f64, f64)> for Steepest {
+    type Output = f64;
+
+    #[inline(always)]
+    fn enter((points, down, towards, height, pivot): (&Points, Vec3<f64>, Vec3<f64>, f64, f64)) -> f64 {
+        let [x, y, z] = &points.axes;
+        let (xs, rest_x) = x.as_chunks::<WIDTH>();
+        let (ys, rest_y) = y.as_chunks::<WIDTH>();
+        let (zs, rest_z) = z.as_chunks::<WIDTH>();
+        let mut best = [0.0_f64; WIDTH];
+        for ((x, y), z) in xs.iter().zip(ys).zip(zs) {
+            for k in 0..WIDTH {
+                let own = slope([x[k], y[k], z[k]], down, towards, height, pivot);
+                best[k] = if own > best[k] { own } else { best[k] };
+            }
+        }
+        let mut all = 0.0;
+        for own in best {
+            all = if own > all { own } else { all };
+        }
+        for k in 0..rest_x.len() {
+            let own = slope([rest_x[k], rest_y[k], rest_z[k]], down, towards, height, pivot);
+            all = if own > all { own } else { all };
+        }
+        all
+    }
+}
+
+/// b / a of one point; 0 for one that touches already.
+#[inline(always)]
+fn slope([x, y, z]: Vec3<f64>, down: Vec3<f64>, towards: Vec3<f64>, height: f64, pivot: f64) -> f64 {
+    let above = height - (x * down[0] + y * down[1] + z * down[2]);
+    let beyond = x * towards[0] + y * towards[1] + z * towards[2] - pivot;
+    if above > TOUCH { beyond / above } else { 0.0 }
+}
