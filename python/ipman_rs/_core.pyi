@@ -304,7 +304,7 @@ def tip_test(
     normal: NDArray[np.float64],
     height: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The tip test, (B, 22): the solid's 15, then height, margin, barrier, push, rate, and tilt and drop to rest."""
+    """The tip test, (B, 25): the solid's 15, height, margin, barrier, push, rate; tilt, drop, margin, barrier, push at rest."""
 
 def touching(
     template: Template,

@@ -47,6 +47,7 @@ class TipTest:
     rate: λ about the nearest edge, 1/s.
     tilt: of the up axis, from the pose to where the roll comes to rest, rad, 0 to π.
     drop: potential energy that the roll sets free, J.
+    rest_margin, rest_barrier, rest_push: as margin, barrier and push, where the roll comes to rest.
     """
 
     status: NDArray[np.int64]
@@ -61,6 +62,9 @@ class TipTest:
     rate: NDArray[np.float64]
     tilt: NDArray[np.float64]
     drop: NDArray[np.float64]
+    rest_margin: NDArray[np.float64]
+    rest_barrier: NDArray[np.float64]
+    rest_push: NDArray[np.float64]
 
     def stands(self, tilt: float = FALLEN) -> Any:
         """(...,) whether the roll comes to rest within so many radians; False where it is unknown."""
@@ -99,7 +103,7 @@ def tip_test(
         not_negative("tolerance", tolerance), *bodies.over(ground),
     )  # fmt: skip
     solids = Solids.of_rows(rows)
-    names = ("height", "margin", "barrier", "push", "rate", "tilt", "drop")
+    names = ("height", "margin", "barrier", "push", "rate", "tilt", "drop", "rest_margin", "rest_barrier", "rest_push")
     return TipTest(
         status=bodies.unfold(solids.status),
         mass=bodies.unfold(solids.mass),

@@ -9,6 +9,26 @@ use crate::volume::{MassProperties, part_moments};
 /// m/s²
 pub const GRAVITY: f64 = 9.81;
 
+/// How far the bodies of the lanes reach.
+pub struct Extent<R: Real> {
+    /// h of each vertex.
+    pub heights: Vec<R>,
+    pub lowest: R,
+    bounds: [Vec3<R>; 2],
+}
+
+impl<R: Real> Extent<R> {
+    pub fn of(scene: &Scene<R>) -> Self {
+        let heights = scene.heights();
+        Extent { lowest: scene::lowest(&heights), heights, bounds: scene.bounds() }
+    }
+
+    /// The lowest and the highest coordinates of one body.
+    pub fn bounds_of(&self, lane: usize) -> [Vec3<f64>; 2] {
+        self.bounds.map(|corner| corner.map(|x| x.lane(lane).value()))
+    }
+}
+
 #[derive(Clone, Debug)]
 pub struct Solid {
     /// The bits of [`status`]. A body in the air has [`status::NO_CONTACT`].
@@ -42,16 +62,20 @@ impl Solid {
 
     /// The bodies of the lanes, each in its own coordinates, for one number or one a part of `densities`. A body with its
     /// lowest vertex higher than `contact` metres is in the air.
-    pub fn of_lanes<R: Real>(scene: &Scene<R>, densities: &MassProperties, contact: f64) -> Vec<Self> {
+    pub fn of_lanes<R: Real>(
+        scene: &Scene<R>,
+        extent: &Extent<R>,
+        densities: &MassProperties,
+        contact: f64,
+    ) -> Vec<Self> {
         let parts = part_moments(&scene.template.closing, scene.points);
         let row = densities.whole(&parts);
-        let lowest = scene::lowest(&scene.heights());
-        let [low, high] = scene.bounds();
         let of_lane = |lane: usize| {
             let number = |k: usize| row[k].lane(lane).value();
-            let lowest = lowest.lane(lane).value();
+            let lowest = extent.lowest.lane(lane).value();
             let volumes: Vec<f64> = parts.iter().map(|part| part.volume.lane(lane).value()).collect();
-            let sides = sub(high.map(|x| x.lane(lane).value()), low.map(|x| x.lane(lane).value()));
+            let [low, high] = extent.bounds_of(lane);
+            let sides = sub(high, low);
             let inertia = [5, 8, 11].map(|k| [number(k), number(k + 1), number(k + 2)]);
             let mut status = status::bits(&volumes, sides, lowest <= contact);
             if !(number(0) > 0.0 && is_of_matter(inertia)) {

@@ -44,7 +44,7 @@ pub fn solids<'py>(
     rows(py, solids.iter().map(|solid| solid.row()).collect())
 }
 
-/// The tip test, (B, 22): the solid's 15, then height, margin, barrier, push, rate, and tilt and drop to rest.
+/// The tip test, (B, 25): the solid's 15, height, margin, barrier, push, rate; tilt, drop, margin, barrier, push at rest.
 #[pyfunction]
 pub fn tip_test<'py>(
     py: Python<'py>,

@@ -6,7 +6,7 @@ use crate::mass::Method;
 use crate::number::vector::{Vec3, sub};
 use crate::number::{Data, Real, Scalar};
 use crate::scene::Scene;
-use crate::solid::Solid;
+use crate::solid::{Extent, Solid};
 use crate::support::{BaseOfSupport, Contact};
 use crate::tipping::{TipTest, Tipping};
 use crate::volume::{MassProperties, SignedVolumes};
@@ -76,7 +76,7 @@ impl Finding for Solids<'_> {
     type Of = Solid;
     fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<Solid> {
         let origin = |lane: usize| scene.origin.map(|x| x.lane(lane).value());
-        let solids = Solid::of_lanes(scene, self.densities, self.contact);
+        let solids = Solid::of_lanes(scene, &Extent::of(scene), self.densities, self.contact);
         solids.into_iter().enumerate().map(|(lane, solid)| solid.moved(origin(lane)).or_nowhere()).collect()
     }
 }

@@ -11,8 +11,8 @@ use crate::error::{Error, Result};
 use crate::ground::{Ground, Plane};
 use crate::number::vector::{Vec3, dot, scale, sub};
 use crate::number::{Real, Room, Scalar};
-use crate::scene::{self, Scene};
-use crate::solid::{GRAVITY, Solid};
+use crate::scene::Scene;
+use crate::solid::{Extent, GRAVITY, Solid};
 use crate::support::hull::convex_hull;
 use crate::support::margin::{Margin, Nearest};
 use crate::volume::MassProperties;
@@ -36,12 +36,14 @@ pub struct TipTest {
 #[derive(Clone, Debug)]
 pub struct Tipping {
     pub solid: Solid,
-    /// Where it comes to rest.
-    pub rest: Rest,
+    /// As the body is posed.
     pub stance: Stance,
+    /// Where the roll comes to rest.
+    pub rest: Rest,
+    pub stance_at_rest: Stance,
 }
 
-/// The first tip, at rest as the body is posed.
+/// Standing still on a polygon.
 #[derive(Clone, Copy, Debug)]
 pub struct Stance {
     /// h: the centre of mass above the lowest vertex, m.
@@ -68,32 +70,35 @@ impl TipTest {
 
     /// That of each lane, in the world.
     pub fn of_lanes<R: Real>(&self, scene: &Scene<R>) -> Vec<Tipping> {
-        let solids = Solid::of_lanes(scene, &self.densities, self.contact);
-        let low = R::apart::<Low, _>((scene,));
+        let extent = Extent::of(scene);
+        let solids = Solid::of_lanes(scene, &extent, &self.densities, self.contact);
+        let low = R::apart::<Low, _>((&extent,));
         let of_lane = |(lane, (solid, low)): (usize, (Solid, Vec<u32>))| {
-            let value = |x: R::Wide| x.lane(lane).value();
-            let origin = scene.origin.map(value);
+            let origin = scene.origin.map(|x| x.lane(lane).value());
             if !solid.is_grounded() {
                 return Tipping::undefined(solid.moved(origin));
             }
-            let ground = Ground { normal: scene.ground.normal.map(value), height: value(scene.ground.height) };
-            let points = LanePoints { scene, lane, centre: solid.centre };
-            let stance = self.stance(&solid, &ground, &points, &low);
-            let rest = roll::to_rest(scale(-1.0, ground.normal), &low, &points);
-            Tipping { solid: solid.moved(origin), rest, stance }
+            let down = scene.ground.normal.map(|x| -x.lane(lane).value());
+            let points = LanePoints { scene, lane, centre: solid.centre, bounds: extent.bounds_of(lane) };
+            let low = points.offsets(low.into_iter());
+            let stance = self.stance(&solid, down, &low);
+            let (rest, stance_at_rest) = match roll::to_rest(down, low, &points) {
+                Some(end) => (end.rest, self.stance(&solid, end.down, &end.low)),
+                None => (Rest::unknown(), Stance::unknown()),
+            };
+            Tipping { solid: solid.moved(origin), stance, rest, stance_at_rest }
         };
         solids.into_iter().zip(low).enumerate().map(of_lane).collect()
     }
 
-    fn stance<R: Real>(&self, solid: &Solid, ground: &Ground<f64>, points: &LanePoints<R>, low: &[u32]) -> Stance {
-        let plane = Plane { axes: ground.axes() };
-        let offsets: Vec<Vec3<f64>> = low.iter().map(|&vertex| points.offset(vertex)).collect();
-        let depth = |offset: &Vec3<f64>| -dot(ground.normal, *offset);
-        let height = offsets.iter().map(depth).fold(f64::NEG_INFINITY, f64::max);
-        let stands = offsets.iter().filter(|offset| depth(offset) >= height - self.tolerance);
-        let feet: Vec<[f64; 2]> = stands.map(|offset| plane.flatten(*offset)).collect();
+    /// On the lowest of some points, as seen from the centre of mass.
+    fn stance(&self, solid: &Solid, down: Vec3<f64>, points: &[Vec3<f64>]) -> Stance {
+        let plane = Plane { axes: Ground { normal: scale(-1.0, down), height: 0.0 }.axes() };
+        let height = points.iter().map(|point| dot(down, *point)).fold(f64::NEG_INFINITY, f64::max);
+        let stands = points.iter().filter(|point| dot(down, **point) >= height - self.tolerance);
+        let feet: Vec<[f64; 2]> = stands.map(|point| plane.flatten(*point)).collect();
         let corners: Vec<[f64; 2]> = convex_hull(&feet).into_iter().map(|i| feet[i]).collect();
-        let turned = |axis: Vec3<f64>| {
+        let about = |axis: Vec3<f64>| {
             let rows: Vec3<f64> = std::array::from_fn(|k| dot(solid.inertia[k], axis));
             dot(rows, axis)
         };
@@ -101,7 +106,7 @@ impl TipTest {
             weight: solid.mass * GRAVITY,
             height,
             arm,
-            inertia: turned(plane.raise(axis)) + solid.mass * (arm * arm + height * height),
+            inertia: about(plane.raise(axis)) + solid.mass * (arm * arm + height * height),
         };
         Stance::on(&corners, height, pendulum)
     }
@@ -134,11 +139,14 @@ impl Pendulum {
 }
 
 impl Stance {
+    fn unknown() -> Self {
+        Stance { height: f64::NAN, margin: f64::NAN, barrier: f64::NAN, push: f64::NAN, rate: f64::NAN }
+    }
+
     /// On a convex polygon around the foot of the centre of mass, which is at the origin: of any number of corners.
     fn on(corners: &[[f64; 2]], height: f64, pendulum: impl Fn([f64; 2], f64) -> Pendulum) -> Self {
         const FOOT: [f64; 2] = [0.0; 2];
-        let unknown = Stance { height, margin: f64::NAN, barrier: f64::NAN, push: f64::NAN, rate: f64::NAN };
-        let Some(nearest) = Nearest::find(corners, FOOT).filter(|_| height > 0.0) else { return unknown };
+        let Some(nearest) = Nearest::find(corners, FOOT).filter(|_| height > 0.0) else { return Stance::unknown() };
         let margin = Margin::new(nearest.map(|i| corners[i]), FOOT);
         // The margin grows at right angles to the axis over which the body would go.
         let [x, y] = margin.direction;
@@ -165,7 +173,7 @@ impl Stance {
 }
 
 impl Tipping {
-    pub const ROW: usize = 22;
+    pub const ROW: usize = 25;
 
     /// A body that is not finite.
     pub fn nowhere() -> Self {
@@ -173,18 +181,19 @@ impl Tipping {
     }
 
     fn undefined(solid: Solid) -> Self {
-        let [height, margin, barrier, push, rate] = [f64::NAN; 5];
-        let stance = Stance { height, margin, barrier, push, rate };
-        Tipping { solid: solid.or_nowhere(), rest: Rest::unknown(), stance }
+        let unknown = Stance::unknown();
+        Tipping { solid: solid.or_nowhere(), stance: unknown, rest: Rest::unknown(), stance_at_rest: unknown }
     }
 
-    /// status, mass, centre, inertia row by row, lowest; height, margin, barrier, push, rate; tilt and drop (J) to rest.
+    /// status, mass, centre, inertia row by row, lowest; height, margin, barrier, push, rate; tilt and drop (J) to rest;
+    /// margin, barrier and push there.
     pub fn row(&self) -> [f64; Self::ROW] {
-        let Tipping { solid, rest, stance } = self;
+        let Tipping { solid, stance, rest, stance_at_rest: end } = self;
         let mut row = [0.0; Self::ROW];
         row[..15].copy_from_slice(&solid.row());
         row[15..20].copy_from_slice(&[stance.height, stance.margin, stance.barrier, stance.push, stance.rate]);
-        row[20..].copy_from_slice(&[rest.tilt, solid.mass * GRAVITY * rest.sunk]);
+        row[20..22].copy_from_slice(&[rest.tilt, solid.mass * GRAVITY * rest.sunk]);
+        row[22..].copy_from_slice(&[end.margin, end.barrier, end.push]);
         row
     }
 }
@@ -194,30 +203,26 @@ struct LanePoints<'a, R: Real> {
     scene: &'a Scene<'a, R>,
     lane: usize,
     centre: Vec3<f64>,
-}
-
-impl<R: Real> LanePoints<'_, R> {
-    #[inline(always)]
-    fn offset(&self, vertex: u32) -> Vec3<f64> {
-        let point = self.scene.points[vertex as usize];
-        sub([0, 1, 2].map(|k| point[k].lane(self.lane).value()), self.centre)
-    }
+    bounds: [Vec3<f64>; 2],
 }
 
 impl<R: Real> Cloud for LanePoints<'_, R> {
     fn offsets(&self, vertices: impl Iterator<Item = u32>) -> Vec<Vec3<f64>> {
-        vertices.map(|vertex| self.offset(vertex)).collect()
+        let offset = |vertex: u32| {
+            let point = self.scene.points[vertex as usize];
+            sub([0, 1, 2].map(|k| point[k].lane(self.lane).value()), self.centre)
+        };
+        vertices.map(offset).collect()
     }
 
     fn len(&self) -> usize {
         self.scene.template.mesh.num_vertices
     }
 
-    /// From the centre to the farthest corner of the box around the body.
+    /// To the farthest corner of the box around the body.
     fn reach(&self) -> f64 {
-        let [low, high] = self.scene.bounds().map(|corner| corner.map(|x| x.lane(self.lane).value()));
-        let far: Vec3<f64> =
-            std::array::from_fn(|k| f64::max(self.centre[k] - low[k], high[k] - self.centre[k]).max(0.0));
+        let [low, high] = self.bounds;
+        let far: Vec3<f64> = std::array::from_fn(|k| f64::max(self.centre[k] - low[k], high[k] - self.centre[k]));
         dot(far, far).sqrt()
     }
 }
@@ -225,15 +230,14 @@ impl<R: Real> Cloud for LanePoints<'_, R> {
 /// For each lane its vertices within [`BAND`] of the lowest.
 struct Low;
 
-impl<R: Real> Room<(&Scene<'_, R>,)> for Low {
+impl<R: Real> Room<(&Extent<R>,)> for Low {
     type Output = Vec<Vec<u32>>;
 
     #[inline(always)]
-    fn enter((scene,): (&Scene<R>,)) -> Vec<Vec<u32>> {
-        let heights = scene.heights();
-        let limit = scene::lowest(&heights) + R::of(BAND);
+    fn enter((extent,): (&Extent<R>,)) -> Vec<Vec<u32>> {
+        let limit = extent.lowest + R::of(BAND);
         let mut low = vec![Vec::new(); R::LANES];
-        for (vertex, &height) in heights.iter().enumerate() {
+        for (vertex, &height) in extent.heights.iter().enumerate() {
             let mut lanes = (height - limit).negative();
             while lanes != 0 {
                 low[lanes.trailing_zeros() as usize].push(vertex as u32);

@@ -14,6 +14,8 @@ use crate::tipping::BAND;
 
 /// Points within this height of the lowest touch, m.
 const TOUCH: f64 = 1e-9;
+/// The same of a body that rolls on: wide enough for some ten degrees.
+const WIDE: f64 = 0.2;
 /// So many turns no body needs: a ball of a million points has fewer on any way down.
 const MOST_TURNS: usize = 10_000;
 
@@ -32,6 +34,14 @@ impl Rest {
     }
 }
 
+/// Where a roll ended.
+pub struct End {
+    pub rest: Rest,
+    pub down: Vec3<f64>,
+    /// All points within [`BAND`] of the lowest, as seen from the centre of mass.
+    pub low: Vec<Vec3<f64>>,
+}
+
 /// The points of a body as seen from its centre of mass.
 pub trait Cloud {
     fn offsets(&self, points: impl Iterator<Item = u32>) -> Vec<Vec3<f64>>;
@@ -41,21 +51,20 @@ pub trait Cloud {
 }
 
 /// Rolls a body to rest that first touches in the direction `down`. `low` are its points within [`BAND`] of the lowest.
-/// Unknown for a body whose centre lies outside of its own hull.
-pub fn to_rest(down: Vec3<f64>, low: &[u32], cloud: &impl Cloud) -> Rest {
-    let mut body = Body { reach: cloud.reach(), near: Near::new(cloud.offsets(low.iter().copied()), down), all: None };
-    let start = down;
+/// None for a body whose centre lies outside of its own hull.
+pub fn to_rest(down: Vec3<f64>, low: Vec<Vec3<f64>>, cloud: &impl Cloud) -> Option<End> {
+    let (start, mut down) = (down, down);
+    let mut body = Body { cloud, reach: cloud.reach(), near: Near::new(&low, down, BAND), all: None };
     let first = body.near.height;
-    let mut down = down;
     for _ in 0..MOST_TURNS {
         let stop = body.near.points.stop(down);
         let Some(way) = stop.downhill(down) else {
-            return Rest { tilt: angle(start, down), sunk: (first - stop.height).max(0.0) };
+            let rest = Rest { tilt: angle(start, down), sunk: (first - stop.height).max(0.0) };
+            return Some(End { rest, down, low: body.low(down) });
         };
-        let Some(next) = body.turn(down, &way, stop.height, cloud) else { return Rest::unknown() };
-        down = next;
+        down = body.turn(down, &way, stop.height)?;
     }
-    Rest::unknown()
+    None
 }
 
 fn angle(a: Vec3<f64>, b: Vec3<f64>) -> f64 {
@@ -64,47 +73,61 @@ fn angle(a: Vec3<f64>, b: Vec3<f64>) -> f64 {
 }
 
 /// The points that may touch next, and all.
-struct Body {
+struct Body<'a, C: Cloud> {
+    cloud: &'a C,
     reach: f64,
     near: Near,
     /// Read when they are first needed.
     all: Option<Points>,
 }
 
-impl Body {
+impl<C: Cloud> Body<'_, C> {
+    fn all(&mut self) -> &Points {
+        let cloud = self.cloud;
+        self.all.get_or_insert_with(|| Points::new(&cloud.offsets(0..cloud.len() as u32)))
+    }
+
     /// The direction down when the next point touches. None where there is none, or not within a right angle.
-    fn turn(&mut self, down: Vec3<f64>, way: &Way, height: f64, cloud: &impl Cloud) -> Option<Vec3<f64>> {
-        let pivot = dot(way.pivot, way.towards);
-        let turned = self.near.points.turned(down, way, height, pivot);
+    fn turn(&mut self, down: Vec3<f64>, way: &Way, height: f64) -> Option<Vec3<f64>> {
+        let turned = self.near.points.turned(down, way, height);
         if let Some(next) = turned.filter(|next| self.near.holds(*next, dot(*next, way.pivot), self.reach)) {
             return Some(next);
         }
-        let all = self.all.get_or_insert_with(|| Points::new(&cloud.offsets(0..cloud.len() as u32)));
-        let next = all.turned(down, way, height, pivot)?;
-        self.near = Near::new(all.near(next), next);
+        let all = self.all();
+        let next = all.turned(down, way, height)?;
+        self.near = Near::new(&all.near(next, WIDE), next, WIDE);
         Some(next)
+    }
+
+    fn low(&mut self, down: Vec3<f64>) -> Vec<Vec3<f64>> {
+        let bottom = self.near.points.height(down) - BAND;
+        if self.near.holds(down, bottom, self.reach) {
+            return self.near.points.near(down, BAND);
+        }
+        self.all().near(down, BAND)
     }
 }
 
-/// The points within [`BAND`] of the lowest in one direction.
+/// The points within `band` of the lowest in one direction.
 struct Near {
     points: Points,
     down: Vec3<f64>,
     height: f64,
+    band: f64,
 }
 
 impl Near {
-    fn new(offsets: Vec<Vec3<f64>>, down: Vec3<f64>) -> Self {
-        let points = Points::new(&offsets);
+    fn new(offsets: &[Vec3<f64>], down: Vec3<f64>, band: f64) -> Self {
+        let points = Points::new(offsets);
         let height = points.height(down);
-        Near { points, down, height }
+        Near { points, down, height, band }
     }
 
-    /// Whether in another direction, with the centre at `height`, every point that touches is one of them: the others have
-    /// come down by less than `reach` times the turn, and were higher by [`BAND`].
+    /// Whether in another direction every point that is `height` below the centre or more is one of them: the others have
+    /// come down by less than `reach` times the turn, and were higher by `band`.
     fn holds(&self, down: Vec3<f64>, height: f64, reach: f64) -> bool {
         let turn = sub(down, self.down);
-        height > self.height - BAND + TOUCH + reach * dot(turn, turn).sqrt()
+        height > self.height - self.band + TOUCH + reach * dot(turn, turn).sqrt()
     }
 }
 
@@ -163,16 +186,16 @@ impl Points {
         [0, 1, 2].map(|k| self.axes[k][point])
     }
 
-    fn near(&self, down: Vec3<f64>) -> Vec<Vec3<f64>> {
+    fn near(&self, down: Vec3<f64>, band: f64) -> Vec<Vec3<f64>> {
         let heights = self.heights(down);
-        let limit = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max) - BAND;
+        let limit = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max) - band;
         (0..heights.len()).filter(|&point| heights[point] >= limit).map(|point| self.at(point)).collect()
     }
 
     /// The direction in which the first of the points touches that do not yet.
-    fn turned(&self, down: Vec3<f64>, way: &Way, height: f64, pivot: f64) -> Option<Vec3<f64>> {
+    fn turned(&self, down: Vec3<f64>, way: &Way, height: f64) -> Option<Vec3<f64>> {
         // At the angle θ a point touches that is a above the ground and b beyond the pivot with a cos θ = b sin θ.
-        let steepest = Fused::<f64>::apart::<Steepest, _>((self, down, way.towards, height, pivot));
+        let steepest = Fused::<f64>::apart::<Steepest, _>((self, down, way.towards, height, dot(way.pivot, way.towards)));
         if steepest <= 0.0 {
             return None;
         }
@@ -238,4 +261,57 @@ fn slope([x, y, z]: Vec3<f64>, down: Vec3<f64>, towards: Vec3<f64>, height: f64,
     let above = height - (x * down[0] + y * down[1] + z * down[2]);
     let beyond = x * towards[0] + y * towards[1] + z * towards[2] - pivot;
     if above > TOUCH { beyond / above } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Points3(Vec<Vec3<f64>>);
+
+    impl Cloud for Points3 {
+        fn offsets(&self, points: impl Iterator<Item = u32>) -> Vec<Vec3<f64>> {
+            points.map(|point| self.0[point as usize]).collect()
+        }
+        fn len(&self) -> usize {
+            self.0.len()
+        }
+        fn reach(&self) -> f64 {
+            self.0.iter().map(|p| dot(*p, *p).sqrt()).fold(0.0, f64::max)
+        }
+    }
+
+    /// Points on an ellipsoid with half axes 0.25, 0.85 and 0.15 m, spread by the golden angle.
+    fn ellipsoid(count: usize) -> Points3 {
+        let point = |k: usize| {
+            let y = 1.0 - (2.0 * k as f64 + 1.0) / count as f64;
+            let (sin, cos) = (2.399_963_229_728_653 * k as f64).sin_cos();
+            let r = (1.0 - y * y).sqrt();
+            [0.25 * r * cos, 0.85 * y, 0.15 * r * sin]
+        };
+        Points3((0..count).map(point).collect())
+    }
+
+    #[test]
+    fn looking_at_the_near_points_only_changes_nothing() {
+        let cloud = ellipsoid(3000);
+        for tilt in [0.1_f64, 0.5, 1.2, 2.0] {
+            let down = [0.3 * tilt.sin(), -tilt.cos(), tilt.sin()];
+            let down = scale(1.0 / dot(down, down).sqrt(), down);
+            let low = Points::new(&cloud.0).near(down, BAND);
+            assert!(low.len() < cloud.len() / 2);
+            let near = to_rest(down, low, &cloud).unwrap();
+            // With a reach of nothing the near points always hold; here these are all points.
+            let all = to_rest(down, cloud.0.clone(), &Points3(cloud.0.clone())).unwrap();
+            assert_eq!(near.rest, all.rest);
+            assert_eq!(near.low, Points::new(&cloud.0).near(near.down, BAND));
+            assert!((near.down[2].abs() - 1.0).abs() < 1e-2, "lies on its flat side: {:?}", near.down);
+        }
+    }
+
+    #[test]
+    fn a_centre_outside_of_the_hull_never_rests() {
+        let corners = [[0.1, -0.2, 0.1], [0.3, -0.2, 0.1], [0.1, -0.2, 0.3], [0.1, -0.1, 0.1]];
+        assert!(to_rest([0.0, -1.0, 0.0], corners.to_vec(), &Points3(corners.to_vec())).is_none());
+    }
 }
