@@ -298,13 +298,14 @@ def solids(
 def tip_test(
     template: Template,
     densities: Sequence[float],
-    contact: float,
-    tolerance: float,
+    options: Sequence[float],
     vertices: NDArray[Any],
     normal: NDArray[np.float64],
     height: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The tip test, (B, 25): the solid's 15, height, margin, barrier, push, rate; tilt, drop, margin, barrier, push at rest."""
+    """The tip test, (B, 26): the solid's 15; height, margin, barrier, push, rate; tilt, drop, nudged tilt; at rest the
+    margin, barrier and push. options: contact, tolerance, nudge, fallen.
+    """
 
 def touching(
     template: Template,

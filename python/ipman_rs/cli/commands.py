@@ -12,6 +12,7 @@ from .benchmark import benchmark
 from .errors import FileError
 from .fit import fit
 from .options import GROUND, PRESETS, UP
+from .simulate import simulate
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -40,10 +41,12 @@ def main() -> None:
     ipman demo -o out               the named poses of the built-in body
     ipman analyze body.obj -o out   your own mesh; open out/report.html afterwards
     ipman fit photo.jpg -o out      a body for the person in a photo
+    ipman simulate body.obj         how firmly it stands, and what becomes of it when it is let go
     """
 
 
 main.add_command(fit)
+main.add_command(simulate)
 main.add_command(benchmark)
 
 

@@ -1,8 +1,8 @@
 """The test of a pose by simulation: stiff bodies are put on their ground and let go.
 
 A stiff body touches a plane through its convex hull alone. Mass, centre of mass and inertia are the exact ones of the
-mesh, never those of the hull. `shape="vhacd"` is the paper's mode, which decomposes the body into convex hulls first; that
-moves its soles by up to a voxel, so it is put on the lowest point of these hulls.
+mesh, never those of the hull. `shape="vhacd"` is the paper's mode, which decomposes the body into convex hulls first;
+that moves its soles by up to a voxel, so it is put on the lowest point of these hulls.
 """
 
 from __future__ import annotations

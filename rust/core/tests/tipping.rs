@@ -21,7 +21,7 @@ fn tip(vertices: &[[f64; 3]], faces: &[[i64; 3]]) -> Tipping {
 fn tip_on(template: &Template, vertices: &[[f64; 3]], up: [f64; 3], height: f64) -> Tipping {
     let flat = common::flat(vertices);
     let batch = Batch::new(template, &flat, &up, &[height], &|| false).unwrap();
-    batch.tip_test(&TipTest::new(&[DENSITY], 0.1, 0.005).unwrap()).unwrap().remove(0)
+    batch.tip_test(&TipTest::new(&[DENSITY], 0.1, 0.005, 0.001, 0.26).unwrap()).unwrap().remove(0)
 }
 
 fn turned(vertices: &[[f64; 3]], turn: &Rotation3<f64>) -> Vec<[f64; 3]> {
@@ -100,6 +100,19 @@ fn a_prism_rolls_onto_its_nearest_side() {
     }
 }
 
+/// On an edge that is 2 mm wide a plate of 1 m stands, until it is nudged.
+#[test]
+fn what_rests_on_a_narrow_edge_falls_when_it_is_nudged() {
+    let (vertices, faces) = common::cuboid([0.002, 1.0, 1.0]);
+    let found = tip(&vertices, &faces);
+    assert_eq!(found.rest.tilt, 0.0);
+    close(found.rest.nudged_tilt, 0.0, 1e-9); // 0.001 < atan(1 mm / 0.5 m)
+    let (vertices, faces) = common::cuboid([0.0009, 1.0, 1.0]);
+    let found = tip(&vertices, &faces);
+    assert_eq!(found.rest.tilt, 0.0);
+    close(found.rest.nudged_tilt, std::f64::consts::FRAC_PI_2, 1e-9);
+}
+
 /// A regular prism that lies along x on one of its sides.
 fn prism(sides: usize, radius: f64, length: f64) -> (Vec<[f64; 3]>, Vec<[i64; 3]>) {
     let step = std::f64::consts::TAU / sides as f64;
@@ -155,7 +168,7 @@ fn bodies_that_cannot_stand_have_a_status_and_leave_the_others_alone() {
     let bodies = [vertices.clone(), broken, flat, inside_out, raised, vertices.clone()].concat();
     let (flat, normals, heights) = (common::flat(&bodies), UP.repeat(6), [0.0; 6]);
     let batch = Batch::new(&template, &flat, &normals, &heights, &|| false).unwrap();
-    let found = batch.tip_test(&TipTest::new(&[DENSITY], 0.1, 0.005).unwrap()).unwrap();
+    let found = batch.tip_test(&TipTest::new(&[DENSITY], 0.1, 0.005, 0.001, 0.26).unwrap()).unwrap();
     let bits: Vec<u32> = found.iter().map(|one| one.solid.status).collect();
     assert_eq!(bits[..3], [OK, status::NON_FINITE, status::NO_VOLUME]);
     assert_eq!(bits[3], status::NO_VOLUME | status::INVERTED_PART);
@@ -175,7 +188,7 @@ fn threads_and_neighbours_change_no_bit() {
         .flat_map(|k| turned(&vertices, &Rotation3::from_euler_angles(0.02 * k as f64, 0.3, 0.01 * k as f64)))
         .collect();
     let single: Vec<f32> = bodies.as_flattened().iter().map(|&x| x as f32).collect();
-    let test = TipTest::new(&[900.0, 1000.0, 1100.0, 1200.0], 0.1, 0.005).unwrap();
+    let test = TipTest::new(&[900.0, 1000.0, 1100.0, 1200.0], 0.1, 0.005, 0.001, 0.26).unwrap();
     let rows = |vertices: &[f32]| -> Vec<[u64; Tipping::ROW]> {
         let count = vertices.len() / (3 * template.mesh.num_vertices);
         let (normals, heights) = (UP.repeat(count), vec![0.0; count]);
@@ -194,13 +207,13 @@ fn threads_and_neighbours_change_no_bit() {
 
 #[test]
 fn numbers_out_of_range_are_named() {
-    assert!(TipTest::new(&[985.0], 0.1, 0.2).err().unwrap().to_string().starts_with("tolerance: expected 0 to 0.05"));
-    assert!(TipTest::new(&[985.0], 0.1, f64::NAN).is_err());
+    assert!(TipTest::new(&[985.0], 0.1, 0.2, 0.0, 0.0).err().unwrap().to_string().starts_with("tolerance: expected 0 to 0.03"));
+    assert!(TipTest::new(&[985.0], 0.1, f64::NAN, 0.0, 0.0).is_err());
     let (vertices, faces) = common::cuboid([0.4, 1.6, 0.6]);
     let template = Template::new(&vertices, &faces, &[], 10, 0).unwrap();
     let flat = common::flat(&vertices);
     let batch = Batch::new(&template, &flat, &UP, &[0.0], &|| false).unwrap();
-    let wrong = batch.tip_test(&TipTest::new(&[1.0, 2.0], 0.1, 0.005).unwrap());
+    let wrong = batch.tip_test(&TipTest::new(&[1.0, 2.0], 0.1, 0.005, 0.0, 0.0).unwrap());
     assert!(wrong.unwrap_err().to_string().starts_with("densities"));
 }
 
@@ -232,7 +245,7 @@ proptest! {
         let test = |tolerance, vertices: &[[f64; 3]], up: [f64; 3], height| {
             let flat = common::flat(vertices);
             let batch = Batch::new(&template, &flat, &up, &[height], &|| false).unwrap();
-            batch.tip_test(&TipTest::new(&[DENSITY], 0.1, tolerance).unwrap()).unwrap().remove(0)
+            batch.tip_test(&TipTest::new(&[DENSITY], 0.1, tolerance, 0.0, 0.0).unwrap()).unwrap().remove(0)
         };
         let here = test(0.01, &vertices, UP, 0.0);
         let turn = Rotation3::from_euler_angles(angles[0], angles[1], angles[2]);

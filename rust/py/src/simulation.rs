@@ -44,19 +44,20 @@ pub fn solids<'py>(
     rows(py, solids.iter().map(|solid| solid.row()).collect())
 }
 
-/// The tip test, (B, 25): the solid's 15, height, margin, barrier, push, rate; tilt, drop, margin, barrier, push at rest.
+/// The tip test, (B, 26): the solid's 15; height, margin, barrier, push, rate; tilt, drop, nudged tilt; at rest the
+/// margin, barrier and push. options: contact, tolerance, nudge, fallen.
 #[pyfunction]
 pub fn tip_test<'py>(
     py: Python<'py>,
     template: &Template,
     densities: Vec<f64>,
-    contact: f64,
-    tolerance: f64,
+    options: [f64; 4],
     vertices: Vertices<'py>,
     normal: PyReadonlyArray2<'py, f64>,
     height: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let test = TipTest::new(&densities, contact, tolerance).map_err(value_error)?;
+    let [contact, tolerance, nudge, fallen] = options;
+    let test = TipTest::new(&densities, contact, tolerance, nudge, fallen).map_err(value_error)?;
     let found = on_either!(py, template, vertices, Grounds::new(normal, height), |batch| batch.tip_test(&test))?;
     rows(py, found.iter().map(|tipping| tipping.row()).collect())
 }

@@ -8,7 +8,7 @@ use crate::number::{Data, Real, Scalar};
 use crate::scene::Scene;
 use crate::solid::{Extent, Solid};
 use crate::support::{BaseOfSupport, Contact};
-use crate::tipping::{TipTest, Tipping};
+use crate::tipping::{Footing, TipTest};
 use crate::volume::{MassProperties, SignedVolumes};
 
 /// What is found of a body besides quantities.
@@ -82,9 +82,9 @@ impl Finding for Solids<'_> {
 }
 
 impl Finding for TipTest {
-    type Of = Tipping;
-    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<Tipping> {
-        self.of_lanes(scene)
+    type Of = Footing;
+    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<Footing> {
+        self.footings(scene)
     }
 }
 

@@ -20,7 +20,7 @@ use crate::solid::Solid;
 use crate::support::{BaseOfSupport, Contact};
 use crate::template::Template;
 use crate::threads::{self, num_threads};
-use crate::tipping::{TipTest, Tipping};
+use crate::tipping::{Footing, TipTest, Tipping};
 use crate::volume::MassProperties;
 #[cfg(feature = "lp")]
 use findings::SupportedLp;
@@ -246,7 +246,17 @@ impl<'a, T: Data> Batch<'a, T> {
     /// The tip test of each body.
     pub fn tip_test(&self, test: &TipTest) -> Result<Vec<Tipping>> {
         self.check_densities(test.densities.has_densities_for(self.template.mesh.num_parts))?;
-        self.find(Tipping::nowhere(), test)
+        let mut out = vec![Tipping::nowhere(); self.len()];
+        let bodies =
+            out.iter_mut().enumerate().filter_map(|(body, row)| Some((body, self.origin(body)?, row))).collect();
+        self.each_group(bodies, |group, out| {
+            let mut footings = vec![Footing::nowhere(); out.len()];
+            self.on_lanes(group, Find { finding: test, out: footings.iter_mut().collect() });
+            for ((out, footing), &body) in out.into_iter().zip(footings).zip(&group.bodies) {
+                *out = test.of_body(footing, self.vertices_of(body));
+            }
+        })?;
+        Ok(out)
     }
 
     fn check_densities(&self, fit: bool) -> Result<()> {

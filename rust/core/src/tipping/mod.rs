@@ -9,18 +9,19 @@ pub mod roll;
 
 use crate::error::{Error, Result};
 use crate::ground::{Ground, Plane};
-use crate::number::vector::{Vec3, dot, scale, sub};
-use crate::number::{Real, Room, Scalar};
+use crate::number::vector::{Vec3, add_scaled, dot, scale};
+use crate::number::{Data, Real, Room, Scalar};
 use crate::scene::Scene;
 use crate::solid::{Extent, GRAVITY, Solid};
 use crate::support::hull::convex_hull;
 use crate::support::margin::{Margin, Nearest};
 use crate::volume::MassProperties;
-use roll::{Cloud, Rest};
+use std::f64::consts::TAU;
+use roll::{Cloud, Place, Roller, angle};
 
 /// Vertices up to this height above the lowest are collected at first, m; the higher ones are looked at when the body
 /// rolls so far that they may touch.
-pub const BAND: f64 = 0.05;
+pub const BAND: f64 = 0.03;
 
 /// What is asked of each body.
 pub struct TipTest {
@@ -30,7 +31,13 @@ pub struct TipTest {
     pub contact: f64,
     /// It stands on the vertices up to this height above its lowest one, m; at most [`BAND`].
     pub tolerance: f64,
+    /// Where it rests it is tilted by so much in each of [`HEADINGS`], and let roll again, rad.
+    pub nudge: f64,
+    /// One that has tilted by more than this has fallen, and is not nudged, rad.
+    pub fallen: f64,
 }
+
+const HEADINGS: usize = 8;
 
 /// How firmly one body stands: NaN for a body that is no solid, or in the air.
 #[derive(Clone, Debug)]
@@ -41,6 +48,23 @@ pub struct Tipping {
     /// Where the roll comes to rest.
     pub rest: Rest,
     pub stance_at_rest: Stance,
+}
+
+/// Where the roll comes to rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rest {
+    /// Between up in the pose and up at rest, rad; 0 to π.
+    pub tilt: f64,
+    /// How far the centre of mass went down, m.
+    pub sunk: f64,
+    /// The largest tilt where it comes to rest after a nudge.
+    pub nudged_tilt: f64,
+}
+
+impl Rest {
+    fn unknown() -> Self {
+        Rest { tilt: f64::NAN, sunk: f64::NAN, nudged_tilt: f64::NAN }
+    }
 }
 
 /// Standing still on a polygon.
@@ -60,35 +84,64 @@ pub struct Stance {
 
 impl TipTest {
     /// An error for a tolerance out of range.
-    pub fn new(densities: &[f64], contact: f64, tolerance: f64) -> Result<Self> {
+    pub fn new(densities: &[f64], contact: f64, tolerance: f64, nudge: f64, fallen: f64) -> Result<Self> {
         if !(0.0..=BAND).contains(&tolerance) {
             let expected = format!("0 to {BAND} m");
             return Err(Error::Argument { name: "tolerance", expected, got: tolerance.to_string() });
         }
-        Ok(TipTest { densities: MassProperties { densities: densities.to_vec() }, contact, tolerance })
+        Ok(TipTest { densities: MassProperties { densities: densities.to_vec() }, contact, tolerance, nudge, fallen })
     }
 
-    /// That of each lane, in the world.
-    pub fn of_lanes<R: Real>(&self, scene: &Scene<R>) -> Vec<Tipping> {
+    /// What the lanes know of each body.
+    pub fn footings<R: Real>(&self, scene: &Scene<R>) -> Vec<Footing> {
         let extent = Extent::of(scene);
         let solids = Solid::of_lanes(scene, &extent, &self.densities, self.contact);
         let low = R::apart::<Low, _>((&extent,));
-        let of_lane = |(lane, (solid, low)): (usize, (Solid, Vec<u32>))| {
-            let origin = scene.origin.map(|x| x.lane(lane).value());
-            if !solid.is_grounded() {
-                return Tipping::undefined(solid.moved(origin));
-            }
-            let down = scene.ground.normal.map(|x| -x.lane(lane).value());
-            let points = LanePoints { scene, lane, centre: solid.centre, bounds: extent.bounds_of(lane) };
-            let low = points.offsets(low.into_iter());
-            let stance = self.stance(&solid, down, &low);
-            let (rest, stance_at_rest) = match roll::to_rest(down, low, &points) {
-                Some(end) => (end.rest, self.stance(&solid, end.down, &end.low)),
-                None => (Rest::unknown(), Stance::unknown()),
-            };
-            Tipping { solid: solid.moved(origin), stance, rest, stance_at_rest }
+        let footing = |(lane, (solid, low)): (usize, (Solid, Vec<u32>))| {
+            let value = |x: R::Wide| x.lane(lane).value();
+            let (down, origin) = (scene.ground.normal.map(|x| -value(x)), scene.origin.map(value));
+            Footing { solid, down, origin, low, bounds: extent.bounds_of(lane) }
         };
-        solids.into_iter().zip(low).enumerate().map(of_lane).collect()
+        solids.into_iter().zip(low).enumerate().map(footing).collect()
+    }
+
+    /// The test of one body, in the world.
+    pub fn of_body<T: Data>(&self, footing: Footing, vertices: &[T]) -> Tipping {
+        let Footing { solid, down, origin, low, bounds } = footing;
+        if !solid.is_grounded() {
+            return Tipping::undefined(solid.moved(origin));
+        }
+        let vertices = Vertices { vertices: vertices.as_chunks().0, origin, centre: solid.centre, bounds };
+        let low = vertices.offsets(low.into_iter());
+        let stance = self.stance(&solid, down, &low);
+        let mut roller = Roller::new(down, &low, &vertices);
+        let (rest, stance_at_rest) = match roller.to_rest(down) {
+            Some(end) => {
+                let stance_at_rest = self.stance(&solid, end.down, &roller.low(end.down));
+                let (tilt, sunk) = (angle(down, end.down), (stance.height - end.height).max(0.0));
+                (Rest { tilt, sunk, nudged_tilt: self.nudged_tilt(&mut roller, down, end, tilt) }, stance_at_rest)
+            }
+            None => (Rest::unknown(), Stance::unknown()),
+        };
+        Tipping { solid: solid.moved(origin), stance, rest, stance_at_rest }
+    }
+
+    /// A pose that rests on a facet of a millimetre only does not stand: the largest tilt after a nudge in any direction.
+    fn nudged_tilt(&self, roller: &mut Roller<impl Cloud>, start: Vec3<f64>, end: Place, tilt: f64) -> f64 {
+        let mut largest = tilt;
+        let [e1, e2] = Ground { normal: end.down, height: 0.0 }.axes();
+        for k in 0..HEADINGS {
+            if largest > self.fallen || self.nudge == 0.0 {
+                break;
+            }
+            let (sin, cos) = (TAU * k as f64 / HEADINGS as f64).sin_cos();
+            let mut down = end.down;
+            add_scaled(&mut down, self.nudge * cos, e1);
+            add_scaled(&mut down, self.nudge * sin, e2);
+            let down = scale(1.0 / dot(down, down).sqrt(), down);
+            largest = largest.max(roller.to_rest(down).map_or(f64::NAN, |rest| angle(start, rest.down)));
+        }
+        largest
     }
 
     /// On the lowest of some points, as seen from the centre of mass.
@@ -173,7 +226,7 @@ impl Stance {
 }
 
 impl Tipping {
-    pub const ROW: usize = 25;
+    pub const ROW: usize = 26;
 
     /// A body that is not finite.
     pub fn nowhere() -> Self {
@@ -185,38 +238,58 @@ impl Tipping {
         Tipping { solid: solid.or_nowhere(), stance: unknown, rest: Rest::unknown(), stance_at_rest: unknown }
     }
 
-    /// status, mass, centre, inertia row by row, lowest; height, margin, barrier, push, rate; tilt and drop (J) to rest;
-    /// margin, barrier and push there.
+    /// status, mass, centre, inertia row by row, lowest; height, margin, barrier, push, rate; tilt and drop (J) to rest,
+    /// the tilt after nudges; margin, barrier and push at rest.
     pub fn row(&self) -> [f64; Self::ROW] {
         let Tipping { solid, stance, rest, stance_at_rest: end } = self;
         let mut row = [0.0; Self::ROW];
         row[..15].copy_from_slice(&solid.row());
         row[15..20].copy_from_slice(&[stance.height, stance.margin, stance.barrier, stance.push, stance.rate]);
-        row[20..22].copy_from_slice(&[rest.tilt, solid.mass * GRAVITY * rest.sunk]);
-        row[22..].copy_from_slice(&[end.margin, end.barrier, end.push]);
+        row[20..23].copy_from_slice(&[rest.tilt, solid.mass * GRAVITY * rest.sunk, rest.nudged_tilt]);
+        row[23..].copy_from_slice(&[end.margin, end.barrier, end.push]);
         row
     }
 }
 
-/// The vertices of one lane as seen from its centre of mass.
-struct LanePoints<'a, R: Real> {
-    scene: &'a Scene<'a, R>,
-    lane: usize,
+/// A body on its ground, in coordinates with an origin of its own.
+#[derive(Clone)]
+pub struct Footing {
+    solid: Solid,
+    down: Vec3<f64>,
+    origin: Vec3<f64>,
+    /// The vertices within [`BAND`] of the lowest.
+    low: Vec<u32>,
+    bounds: [Vec3<f64>; 2],
+}
+
+impl Footing {
+    /// Of a body that is not finite.
+    pub fn nowhere() -> Self {
+        let nan = [f64::NAN; 3];
+        Footing { solid: Solid::nowhere(), down: nan, origin: nan, low: Vec::new(), bounds: [nan; 2] }
+    }
+}
+
+/// The vertices of one body as seen from its centre of mass.
+struct Vertices<'a, T> {
+    vertices: &'a [[T; 3]],
+    origin: Vec3<f64>,
     centre: Vec3<f64>,
     bounds: [Vec3<f64>; 2],
 }
 
-impl<R: Real> Cloud for LanePoints<'_, R> {
+impl<T: Data> Cloud for Vertices<'_, T> {
     fn offsets(&self, vertices: impl Iterator<Item = u32>) -> Vec<Vec3<f64>> {
+        // The origin is a number of the caller's precision, and near: nothing rounds before the centre is subtracted.
         let offset = |vertex: u32| {
-            let point = self.scene.points[vertex as usize];
-            sub([0, 1, 2].map(|k| point[k].lane(self.lane).value()), self.centre)
+            let point = self.vertices[vertex as usize];
+            [0, 1, 2].map(|k| (point[k].value() - self.origin[k]) - self.centre[k])
         };
         vertices.map(offset).collect()
     }
 
     fn len(&self) -> usize {
-        self.scene.template.mesh.num_vertices
+        self.vertices.len()
     }
 
     /// To the farthest corner of the box around the body.

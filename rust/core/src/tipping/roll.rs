@@ -19,29 +19,6 @@ const WIDE: f64 = 0.2;
 /// So many turns no body needs: a ball of a million points has fewer on any way down.
 const MOST_TURNS: usize = 10_000;
 
-/// Where a body came to rest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rest {
-    /// Between up in the pose and up at rest, rad; 0 to π.
-    pub tilt: f64,
-    /// How far the centre of mass went down, m.
-    pub sunk: f64,
-}
-
-impl Rest {
-    pub fn unknown() -> Self {
-        Rest { tilt: f64::NAN, sunk: f64::NAN }
-    }
-}
-
-/// Where a roll ended.
-pub struct End {
-    pub rest: Rest,
-    pub down: Vec3<f64>,
-    /// All points within [`BAND`] of the lowest, as seen from the centre of mass.
-    pub low: Vec<Vec3<f64>>,
-}
-
 /// The points of a body as seen from its centre of mass.
 pub trait Cloud {
     fn offsets(&self, points: impl Iterator<Item = u32>) -> Vec<Vec3<f64>>;
@@ -50,41 +27,62 @@ pub trait Cloud {
     fn reach(&self) -> f64;
 }
 
-/// Rolls a body to rest that first touches in the direction `down`. `low` are its points within [`BAND`] of the lowest.
-/// None for a body whose centre lies outside of its own hull.
-pub fn to_rest(down: Vec3<f64>, low: Vec<Vec3<f64>>, cloud: &impl Cloud) -> Option<End> {
-    let (start, mut down) = (down, down);
-    let mut body = Body { cloud, reach: cloud.reach(), near: Near::new(&low, down, BAND), all: None };
-    let first = body.near.height;
-    for _ in 0..MOST_TURNS {
-        let stop = body.near.points.stop(down);
-        let Some(way) = stop.downhill(down) else {
-            let rest = Rest { tilt: angle(start, down), sunk: (first - stop.height).max(0.0) };
-            return Some(End { rest, down, low: body.low(down) });
-        };
-        down = body.turn(down, &way, stop.height)?;
-    }
-    None
-}
-
-fn angle(a: Vec3<f64>, b: Vec3<f64>) -> f64 {
+/// Between two directions, rad.
+pub fn angle(a: Vec3<f64>, b: Vec3<f64>) -> f64 {
     let across = cross(a, b);
     dot(across, across).sqrt().atan2(dot(a, b))
 }
 
-/// The points that may touch next, and all.
-struct Body<'a, C: Cloud> {
+/// A body that rolls.
+pub struct Roller<'a, C: Cloud> {
     cloud: &'a C,
     reach: f64,
+    /// The points that may touch next.
     near: Near,
     /// Read when they are first needed.
     all: Option<Points>,
 }
 
-impl<C: Cloud> Body<'_, C> {
+impl<'a, C: Cloud> Roller<'a, C> {
+    /// `low` are the points within [`BAND`] of the lowest in the direction `down`.
+    pub fn new(down: Vec3<f64>, low: &[Vec3<f64>], cloud: &'a C) -> Self {
+        Roller { cloud, reach: cloud.reach(), near: Near::new(low, down, BAND), all: None }
+    }
+
+    /// Rolls until it rests, from the orientation in which `down` is down. None for a body whose centre of mass lies
+    /// outside of its own hull.
+    pub fn to_rest(&mut self, down: Vec3<f64>) -> Option<Place> {
+        let mut down = down;
+        for _ in 0..MOST_TURNS {
+            let stop = self.stop(down);
+            let Some(way) = stop.downhill(down) else { return Some(Place { down, height: stop.height }) };
+            down = self.turn(down, &way, stop.height)?;
+        }
+        None
+    }
+
+    /// All points within [`BAND`] of the lowest.
+    pub fn low(&mut self, down: Vec3<f64>) -> Vec<Vec3<f64>> {
+        let bottom = self.near.points.height(down) - BAND;
+        if self.near.holds(down, bottom, self.reach) {
+            return self.near.points.near(down, BAND);
+        }
+        self.all().near(down, BAND)
+    }
+
     fn all(&mut self) -> &Points {
         let cloud = self.cloud;
         self.all.get_or_insert_with(|| Points::new(&cloud.offsets(0..cloud.len() as u32)))
+    }
+
+    fn stop(&mut self, down: Vec3<f64>) -> Stop {
+        let stop = self.near.points.stop(down);
+        if self.near.holds(down, stop.height - TOUCH, self.reach) {
+            return stop;
+        }
+        let near = Near::new(&self.all().near(down, WIDE), down, WIDE);
+        self.near = near;
+        self.near.points.stop(down)
     }
 
     /// The direction down when the next point touches. None where there is none, or not within a right angle.
@@ -93,19 +91,15 @@ impl<C: Cloud> Body<'_, C> {
         if let Some(next) = turned.filter(|next| self.near.holds(*next, dot(*next, way.pivot), self.reach)) {
             return Some(next);
         }
-        let all = self.all();
-        let next = all.turned(down, way, height)?;
-        self.near = Near::new(&all.near(next, WIDE), next, WIDE);
-        Some(next)
+        self.all().turned(down, way, height)
     }
+}
 
-    fn low(&mut self, down: Vec3<f64>) -> Vec<Vec3<f64>> {
-        let bottom = self.near.points.height(down) - BAND;
-        if self.near.holds(down, bottom, self.reach) {
-            return self.near.points.near(down, BAND);
-        }
-        self.all().near(down, BAND)
-    }
+/// An orientation, and the height of the centre of mass in it.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    pub down: Vec3<f64>,
+    pub height: f64,
 }
 
 /// The points within `band` of the lowest in one direction.
@@ -301,17 +295,21 @@ mod tests {
             let low = Points::new(&cloud.0).near(down, BAND);
             assert!(low.len() < cloud.len() / 2);
             let near = to_rest(down, low, &cloud).unwrap();
-            // With a reach of nothing the near points always hold; here these are all points.
-            let all = to_rest(down, cloud.0.clone(), &Points3(cloud.0.clone())).unwrap();
-            assert_eq!(near.rest, all.rest);
-            assert_eq!(near.low, Points::new(&cloud.0).near(near.down, BAND));
-            assert!((near.down[2].abs() - 1.0).abs() < 1e-2, "lies on its flat side: {:?}", near.down);
+            // Whose points are all near from the start, never looks again.
+            let whole = Points3(cloud.0.clone());
+            let mut roller = Roller::new(down, &low, &cloud);
+            let rest = roller.to_rest(down).unwrap();
+            let wanted = Roller::new(down, &cloud.0, &whole).to_rest(down).unwrap();
+            assert_eq!((rest.down, rest.height), (wanted.down, wanted.height));
+            assert_eq!(roller.low(rest.down), Points::new(&cloud.0).near(rest.down, BAND));
+            assert!((rest.down[2].abs() - 1.0).abs() < 1e-2, "lies on its flat side: {:?}", rest.down);
         }
     }
 
     #[test]
     fn a_centre_outside_of_the_hull_never_rests() {
         let corners = [[0.1, -0.2, 0.1], [0.3, -0.2, 0.1], [0.1, -0.2, 0.3], [0.1, -0.1, 0.1]];
-        assert!(to_rest([0.0, -1.0, 0.0], corners.to_vec(), &Points3(corners.to_vec())).is_none());
+        let cloud = Points3(corners.to_vec());
+        assert!(Roller::new([0.0, -1.0, 0.0], &corners, &cloud).to_rest([0.0, -1.0, 0.0]).is_none());
     }
 }
