@@ -4,12 +4,12 @@
     python tools/validate_simulation.py --write    and puts them into docs/simulation.md
     python tools/validate_simulation.py --people 2 --poses 4    fewer
 
-Needs torch (the people are made by the fitting benchmark), pybullet and mujoco: `make .venv/test-tools`.
+Needs torch (the people are made by the fitting benchmark), pybullet and mujoco.
 
-Of the poses a quarter is at rest: a named pose, perturbed joint by joint and laid on the facet of its convex hull that it
-rests on, where it must hold a nudge of a third of a degree. A quarter is such a standing person, tipped by 15° to 30°. Half
-is near the limit: the back of a person at rest is bent in a random direction to where the roll of the tip test goes from
-standing to falling, and then on or back until the centre of mass has moved by up to 10 mm.
+Of the poses a quarter is at rest: a named pose, perturbed joint by joint and laid on the facet of its convex hull that
+it rests on, where it must hold a nudge of a third of a degree. A quarter is such a standing person, tipped by 15° to
+30°. Half is near the limit: the back of a person at rest is bent in a random direction to where the roll of the tip
+test goes from standing to falling, and then on or back until the centre of mass has moved by up to 20 mm.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "simulation.md"
 FLOOR = ip.Ground.y_up()
 TIMES = (100 / 240, 2.0, 5.0)
-NEAR = 0.010  # m
+NEAR = 0.020  # m
 STANDING = ("standing", "one leg", "lunge", "crouch")
 FIRM = 0.006  # rad
 FARTHEST_BEND, BENDS = 75.0, 26  # degrees, and how many are looked at

@@ -89,7 +89,8 @@ def simulate(
     from .measure import Request
 
     request = Request(model=model, up=up, ground=ground, parts=parts)
-    films = options.pop("filmstrips") if output is not None else 0
+    films = options.pop("filmstrips")
+    films = films if output is not None else 0
     falls: list[Fall] = []
     failures: list[tuple[str, str]] = []
     for path in bodies:

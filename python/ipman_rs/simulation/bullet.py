@@ -1,8 +1,10 @@
-"""The same fall in Bullet (`pybullet`), with its own collision of the convex hull and a plane."""
+"""The same fall in Bullet (`pybullet`)."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pybullet
@@ -10,7 +12,7 @@ import pybullet
 from .cross_check import Array, UprightDrop
 from .solids import GRAVITY
 
-MARGIN = 0.001  # m, by which pybullet rounds the hulls that it is given
+RADIUS = 1e-4  # m
 
 
 def run(drop: UprightDrop, looks: Sequence[int], step: float, friction: float) -> list[tuple[Array, Array]]:
@@ -39,15 +41,26 @@ def run(drop: UprightDrop, looks: Sequence[int], step: float, friction: float) -
 
 
 def _body(client: int, drop: UprightDrop, principal: Array, moments: Array, friction: float) -> int:
-    vertices = (drop.points @ principal).tolist()
-    shape = pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=vertices, physicsClientId=client)
-    start = drop.start + [0.0, 0.0, MARGIN]
-    body = pybullet.createMultiBody(
-        drop.mass, shape, basePosition=start.tolist(), baseOrientation=_quaternion(principal), physicsClientId=client
+    """Tiny balls at the corners: of a hull Bullet keeps four contacts at a time, and bodies tip over the corners that
+    these cut off. Only a file may have so many, in short lines."""
+    balls = "".join(
+        f'<collision><origin xyz="{x!r} {y!r} {z!r}"/><geometry><sphere radius="{RADIUS}"/></geometry></collision>\n'
+        for x, y, z in (drop.points @ principal).tolist()
     )
+    x, y, z = moments.tolist()
+    inertia = f'<inertia ixx="{x!r}" iyy="{y!r}" izz="{z!r}" ixy="0" ixz="0" iyz="0"/>'
+    link = f'<link name="body">\n<inertial><mass value="{drop.mass!r}"/>{inertia}</inertial>\n{balls}</link>'
+    start = drop.start + [0.0, 0.0, RADIUS]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "body.urdf"
+        file.write_text(f'<robot name="body">\n{link}\n</robot>\n')
+        body = pybullet.loadURDF(
+            str(file), start.tolist(), _quaternion(principal), flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+            physicsClientId=client,
+        )  # fmt: skip
     pybullet.changeDynamics(
-        body, -1, localInertiaDiagonal=moments.tolist(), lateralFriction=friction, restitution=0, linearDamping=0,
-        angularDamping=0, activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client,
+        body, -1, lateralFriction=friction, restitution=0, linearDamping=0, angularDamping=0,
+        activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client,
     )  # fmt: skip
     return body
 

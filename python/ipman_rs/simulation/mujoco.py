@@ -10,16 +10,18 @@ import numpy as np
 from .cross_check import Array, UprightDrop
 from .solids import GRAVITY
 
+SUBSTEPS = 4  # of a step: with whole ones of 1/240 s its soft contacts tip one in ten bodies near their limit
+
 
 def run(drop: UprightDrop, looks: Sequence[int], step: float, friction: float) -> list[tuple[Array, Array]]:
     """Centre (3,) and rotation (3, 3) at the start and after `looks` steps."""
-    model = _model(drop, step, friction)
+    model = _model(drop, step / SUBSTEPS, friction)
     state = mujoco.MjData(model)
     mujoco.mj_forward(model, state)
     places = [_place(state)]
     done = 0
     for look in looks:
-        mujoco.mj_step(model, state, look - done)
+        mujoco.mj_step(model, state, SUBSTEPS * (look - done))
         done = look
         places.append(_place(state))
     return places

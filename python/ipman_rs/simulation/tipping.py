@@ -47,7 +47,7 @@ class TipTest:
     rate: λ about the nearest edge, 1/s.
     tilt: of the up axis, from the pose to where the roll comes to rest, rad, 0 to π.
     drop: potential energy that the roll sets free, J.
-    nudged_tilt: the largest tilt where it comes to rest again after a nudge in one of eight directions, rad.
+    nudged_tilt: the largest tilt where it comes to rest after a nudge in one of eight directions, or has fallen, rad.
     rest_margin, rest_barrier, rest_push: as margin, barrier and push, where the roll comes to rest.
     """
 

@@ -97,7 +97,12 @@ fn a_falling_box_is_an_inverted_pendulum() {
         theta += dt * rate;
     }
     let motion = &run(&setting(&[100]), &[tipped(angle)])[0];
-    assert!((tilt(motion, 1) - (theta - start)).abs() < 0.03 * (theta - start), "{} {}", tilt(motion, 1), theta - start);
+    assert!(
+        (tilt(motion, 1) - (theta - start)).abs() < 0.03 * (theta - start),
+        "{} {}",
+        tilt(motion, 1),
+        theta - start
+    );
 }
 
 #[test]

@@ -9,8 +9,8 @@ mod world;
 
 use crate::batch::Batch;
 use crate::error::{Error, Result, status};
-use crate::number::{Data, all_finite};
 use crate::number::vector::{Vec3, add_scaled, dot};
+use crate::number::{Data, all_finite};
 use crate::solid::Solid;
 use crate::threads;
 use crate::volume::MassProperties;

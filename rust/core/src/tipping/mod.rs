@@ -16,8 +16,8 @@ use crate::solid::{Extent, GRAVITY, Solid};
 use crate::support::hull::convex_hull;
 use crate::support::margin::{Margin, Nearest};
 use crate::volume::MassProperties;
-use std::f64::consts::TAU;
 use roll::{Cloud, Place, Roller, angle};
+use std::f64::consts::TAU;
 
 /// Vertices up to this height above the lowest are collected at first, m; the higher ones are looked at when the body
 /// rolls so far that they may touch.
@@ -57,7 +57,7 @@ pub struct Rest {
     pub tilt: f64,
     /// How far the centre of mass went down, m.
     pub sunk: f64,
-    /// The largest tilt where it comes to rest after a nudge.
+    /// The largest tilt where it comes to rest after a nudge, or has fallen.
     pub nudged_tilt: f64,
 }
 
@@ -117,7 +117,7 @@ impl TipTest {
         let mut roller = Roller::new(down, &low, &vertices);
         let (rest, stance_at_rest) = match roller.to_rest(down) {
             Some(end) => {
-                let stance_at_rest = self.stance(&solid, end.down, &roller.low(end.down));
+                let stance_at_rest = self.stance(&solid, end.down, &roller.low(end.down, self.tolerance));
                 let (tilt, sunk) = (angle(down, end.down), (stance.height - end.height).max(0.0));
                 (Rest { tilt, sunk, nudged_tilt: self.nudged_tilt(&mut roller, down, end, tilt) }, stance_at_rest)
             }
@@ -139,7 +139,8 @@ impl TipTest {
             add_scaled(&mut down, self.nudge * cos, e1);
             add_scaled(&mut down, self.nudge * sin, e2);
             let down = scale(1.0 / dot(down, down).sqrt(), down);
-            largest = largest.max(roller.to_rest(down).map_or(f64::NAN, |rest| angle(start, rest.down)));
+            let rest = roller.while_within(down, start, self.fallen);
+            largest = largest.max(rest.map_or(f64::NAN, |rest| angle(start, rest.down)));
         }
         largest
     }
@@ -207,13 +208,8 @@ impl Stance {
         if margin.value <= 0.0 {
             return Stance { height, margin: margin.value, barrier: 0.0, push: 0.0, rate: first.rate() };
         }
-        let mut stance = Stance {
-            height,
-            margin: margin.value,
-            barrier: first.barrier(),
-            push: first.push(),
-            rate: first.rate(),
-        };
+        let mut stance =
+            Stance { height, margin: margin.value, barrier: first.barrier(), push: first.push(), rate: first.rate() };
         for (k, &a) in corners.iter().enumerate() {
             let b = corners[(k + 1) % corners.len()];
             let length = f64::hypot(b[0] - a[0], b[1] - a[1]);

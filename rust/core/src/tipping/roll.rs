@@ -52,22 +52,30 @@ impl<'a, C: Cloud> Roller<'a, C> {
     /// Rolls until it rests, from the orientation in which `down` is down. None for a body whose centre of mass lies
     /// outside of its own hull.
     pub fn to_rest(&mut self, down: Vec3<f64>) -> Option<Place> {
+        self.while_within(down, down, std::f64::consts::PI)
+    }
+
+    /// [`Roller::to_rest`], or where the body has turned by more than `most` from where `start` was down.
+    pub fn while_within(&mut self, down: Vec3<f64>, start: Vec3<f64>, most: f64) -> Option<Place> {
         let mut down = down;
         for _ in 0..MOST_TURNS {
             let stop = self.stop(down);
+            if angle(start, down) > most {
+                return Some(Place { down, height: stop.height });
+            }
             let Some(way) = stop.downhill(down) else { return Some(Place { down, height: stop.height }) };
             down = self.turn(down, &way, stop.height)?;
         }
         None
     }
 
-    /// All points within [`BAND`] of the lowest.
-    pub fn low(&mut self, down: Vec3<f64>) -> Vec<Vec3<f64>> {
-        let bottom = self.near.points.height(down) - BAND;
+    /// All points within `band` of the lowest.
+    pub fn low(&mut self, down: Vec3<f64>, band: f64) -> Vec<Vec3<f64>> {
+        let bottom = self.near.points.heights(down).1 - band;
         if self.near.holds(down, bottom, self.reach) {
-            return self.near.points.near(down, BAND);
+            return self.near.points.near(down, band);
         }
-        self.all().near(down, BAND)
+        self.all().near(down, band)
     }
 
     fn all(&mut self) -> &Points {
@@ -113,7 +121,7 @@ struct Near {
 impl Near {
     fn new(offsets: &[Vec3<f64>], down: Vec3<f64>, band: f64) -> Self {
         let points = Points::new(offsets);
-        let height = points.height(down);
+        let (_, height) = points.heights(down);
         Near { points, down, height, band }
     }
 
@@ -161,17 +169,13 @@ impl Points {
         Points { axes: [0, 1, 2].map(|k| offsets.iter().map(|offset| offset[k]).collect()) }
     }
 
-    fn heights(&self, down: Vec3<f64>) -> Vec<f64> {
+    /// Of all points, towards `down`, and the largest.
+    fn heights(&self, down: Vec3<f64>) -> (Vec<f64>, f64) {
         Fused::<f64>::apart::<Along, _>((self, down))
     }
 
-    fn height(&self, down: Vec3<f64>) -> f64 {
-        self.heights(down).into_iter().fold(f64::NEG_INFINITY, f64::max)
-    }
-
     fn stop(&self, down: Vec3<f64>) -> Stop {
-        let heights = self.heights(down);
-        let height = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (heights, height) = self.heights(down);
         let touching = heights.iter().enumerate().filter(|(_, own)| **own >= height - TOUCH);
         Stop { height, touching: touching.map(|(point, _)| self.at(point)).collect() }
     }
@@ -181,15 +185,16 @@ impl Points {
     }
 
     fn near(&self, down: Vec3<f64>, band: f64) -> Vec<Vec3<f64>> {
-        let heights = self.heights(down);
-        let limit = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max) - band;
-        (0..heights.len()).filter(|&point| heights[point] >= limit).map(|point| self.at(point)).collect()
+        let (heights, height) = self.heights(down);
+        let low = heights.iter().enumerate().filter(|(_, own)| **own >= height - band);
+        low.map(|(point, _)| self.at(point)).collect()
     }
 
     /// The direction in which the first of the points touches that do not yet.
     fn turned(&self, down: Vec3<f64>, way: &Way, height: f64) -> Option<Vec3<f64>> {
         // At the angle θ a point touches that is a above the ground and b beyond the pivot with a cos θ = b sin θ.
-        let steepest = Fused::<f64>::apart::<Steepest, _>((self, down, way.towards, height, dot(way.pivot, way.towards)));
+        let steepest =
+            Fused::<f64>::apart::<Steepest, _>((self, down, way.towards, height, dot(way.pivot, way.towards)));
         if steepest <= 0.0 {
             return None;
         }
@@ -202,24 +207,41 @@ impl Points {
 struct Along;
 
 impl Room<(&Points, Vec3<f64>)> for Along {
-    type Output = Vec<f64>;
+    type Output = (Vec<f64>, f64);
 
     #[inline(always)]
-    fn enter((points, down): (&Points, Vec3<f64>)) -> Vec<f64> {
+    fn enter((points, down): (&Points, Vec3<f64>)) -> (Vec<f64>, f64) {
         let [x, y, z] = &points.axes;
         let mut out = vec![0.0; x.len()];
         for (((out, x), y), z) in out.iter_mut().zip(x).zip(y).zip(z) {
             *out = x * down[0] + y * down[1] + z * down[2];
         }
-        out
+        let height = largest(&out, f64::NEG_INFINITY);
+        (out, height)
     }
+}
+
+/// Maxima that run side by side.
+const WIDTH: usize = 16;
+
+#[inline(always)]
+fn largest(numbers: &[f64], least: f64) -> f64 {
+    let (whole, rest) = numbers.as_chunks::<WIDTH>();
+    let mut best = [least; WIDTH];
+    for numbers in whole {
+        for k in 0..WIDTH {
+            best[k] = if numbers[k] > best[k] { numbers[k] } else { best[k] };
+        }
+    }
+    let mut all = least;
+    for &own in best.iter().chain(rest) {
+        all = if own > all { own } else { all };
+    }
+    all
 }
 
 /// The largest b / a of [`Points::turned`].
 struct Steepest;
-
-/// Sums that run side by side.
-const WIDTH: usize = 16;
 
 impl Room<(&Points, Vec3<f64>, Vec3<f64>, f64, f64)> for Steepest {
     type Output = f64;
@@ -227,25 +249,11 @@ impl Room<(&Points, Vec3<f64>, Vec3<f64>, f64, f64)> for Steepest {
     #[inline(always)]
     fn enter((points, down, towards, height, pivot): (&Points, Vec3<f64>, Vec3<f64>, f64, f64)) -> f64 {
         let [x, y, z] = &points.axes;
-        let (xs, rest_x) = x.as_chunks::<WIDTH>();
-        let (ys, rest_y) = y.as_chunks::<WIDTH>();
-        let (zs, rest_z) = z.as_chunks::<WIDTH>();
-        let mut best = [0.0_f64; WIDTH];
-        for ((x, y), z) in xs.iter().zip(ys).zip(zs) {
-            for k in 0..WIDTH {
-                let own = slope([x[k], y[k], z[k]], down, towards, height, pivot);
-                best[k] = if own > best[k] { own } else { best[k] };
-            }
+        let mut slopes = vec![0.0; x.len()];
+        for (((out, &x), &y), &z) in slopes.iter_mut().zip(x).zip(y).zip(z) {
+            *out = slope([x, y, z], down, towards, height, pivot);
         }
-        let mut all = 0.0;
-        for own in best {
-            all = if own > all { own } else { all };
-        }
-        for k in 0..rest_x.len() {
-            let own = slope([rest_x[k], rest_y[k], rest_z[k]], down, towards, height, pivot);
-            all = if own > all { own } else { all };
-        }
-        all
+        largest(&slopes, 0.0)
     }
 }
 
@@ -294,14 +302,13 @@ mod tests {
             let down = scale(1.0 / dot(down, down).sqrt(), down);
             let low = Points::new(&cloud.0).near(down, BAND);
             assert!(low.len() < cloud.len() / 2);
-            let near = to_rest(down, low, &cloud).unwrap();
             // Whose points are all near from the start, never looks again.
             let whole = Points3(cloud.0.clone());
             let mut roller = Roller::new(down, &low, &cloud);
             let rest = roller.to_rest(down).unwrap();
             let wanted = Roller::new(down, &cloud.0, &whole).to_rest(down).unwrap();
             assert_eq!((rest.down, rest.height), (wanted.down, wanted.height));
-            assert_eq!(roller.low(rest.down), Points::new(&cloud.0).near(rest.down, BAND));
+            assert_eq!(roller.low(rest.down, 0.01), Points::new(&cloud.0).near(rest.down, 0.01));
             assert!((rest.down[2].abs() - 1.0).abs() < 1e-2, "lies on its flat side: {:?}", rest.down);
         }
     }
