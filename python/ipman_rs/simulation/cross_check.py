@@ -77,9 +77,9 @@ def each_drop(
 def _engine(engine: str):
     try:
         if engine == "bullet":
-            from .bullet import run
+            from .bullet_engine import run
         else:
-            from .mujoco import run
+            from .mujoco_engine import run
     except ImportError as error:
         message = f"engine {engine!r} needs another package: pip install 'ipman_rs[{engine}]' ({error})"
         raise ImportError(message) from error

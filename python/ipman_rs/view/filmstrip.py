@@ -64,7 +64,7 @@ def turn_across(motion: np.ndarray, up: np.ndarray, otherwise: float = 35.0) -> 
     across = np.cross(up, level)
     turn = np.degrees(np.arctan2(across @ np.cross(up, front), across @ front))
     choices = [(turn + half - otherwise + 180.0) % 360.0 - 180.0 for half in (0.0, 180.0)]
-    return otherwise + min(choices, key=abs)
+    return float(otherwise + min(choices, key=abs))
 
 
 def _draw_floor(axes: Axes, camera: Camera, study: Study, bodies: np.ndarray) -> None:
