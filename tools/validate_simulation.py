@@ -245,8 +245,8 @@ def times(found: People, tip: TipTest) -> str:
     head = "| CPU time a body, one thread | tip test | rapier, 2 s | Bullet, 2 s | MuJoCo, 2 s |\n|---|---|---|---|---|"
     vertices = found.vertices.shape[1]
     return "\n".join([head, *rows]) + (
-        f"\n\n{vertices:,} vertices, float32; {1e6 * of_mass:.0f} µs of the tip test are mass, centre and inertia. A body "
-        "that falls rolls over all of its hull."
+        f"\n\n{vertices:,} vertices, float32; {1e6 * of_mass:.0f} µs of the tip test are mass, centre and inertia. "
+        "A body that falls rolls over all of its hull."
     )
 
 
