@@ -194,8 +194,10 @@ def verdicts(runs: dict[str, Simulation], found: People) -> str:
 
 def tips(tip: TipTest, rapier: Simulation, mujoco: Simulation, found: People) -> str:
     """The tip test's verdicts, and its predictions of those that fall."""
-    rows = ["| tip test | agrees with rapier, % | with MuJoCo, % | not near the limit (MuJoCo) | near the limit (MuJoCo) |",
-            "|---|---|---|---|---|"]  # fmt: skip
+    rows = [
+        "| tip test | agrees with rapier, % | with MuJoCo, % | not near the limit (MuJoCo) | near the limit (MuJoCo) |",
+        "|---|---|---|---|---|",
+    ]
     ways = {
         "centre of mass over the vertices within 5 mm of the lowest": tip.margin >= 0,
         "roll: comes to rest within 15°": tip.tilt <= FALLEN,

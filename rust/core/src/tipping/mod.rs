@@ -284,7 +284,7 @@ impl<T: Data> Cloud for Vertices<'_, T> {
         vertices.map(offset).collect()
     }
 
-    fn len(&self) -> usize {
+    fn count(&self) -> usize {
         self.vertices.len()
     }
 

@@ -22,7 +22,7 @@ const MOST_TURNS: usize = 10_000;
 /// The points of a body as seen from its centre of mass.
 pub trait Cloud {
     fn offsets(&self, points: impl Iterator<Item = u32>) -> Vec<Vec3<f64>>;
-    fn len(&self) -> usize;
+    fn count(&self) -> usize;
     /// No point is farther from the centre, m.
     fn reach(&self) -> f64;
 }
@@ -80,7 +80,7 @@ impl<'a, C: Cloud> Roller<'a, C> {
 
     fn all(&mut self) -> &Points {
         let cloud = self.cloud;
-        self.all.get_or_insert_with(|| Points::new(&cloud.offsets(0..cloud.len() as u32)))
+        self.all.get_or_insert_with(|| Points::new(&cloud.offsets(0..cloud.count() as u32)))
     }
 
     fn stop(&mut self, down: Vec3<f64>) -> Stop {
@@ -275,7 +275,7 @@ mod tests {
         fn offsets(&self, points: impl Iterator<Item = u32>) -> Vec<Vec3<f64>> {
             points.map(|point| self.0[point as usize]).collect()
         }
-        fn len(&self) -> usize {
+        fn count(&self) -> usize {
             self.0.len()
         }
         fn reach(&self) -> f64 {
@@ -301,7 +301,7 @@ mod tests {
             let down = [0.3 * tilt.sin(), -tilt.cos(), tilt.sin()];
             let down = scale(1.0 / dot(down, down).sqrt(), down);
             let low = Points::new(&cloud.0).near(down, BAND);
-            assert!(low.len() < cloud.len() / 2);
+            assert!(low.len() < cloud.count() / 2);
             // Whose points are all near from the start, never looks again.
             let whole = Points3(cloud.0.clone());
             let mut roller = Roller::new(down, &low, &cloud);
