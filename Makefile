@@ -63,8 +63,9 @@ test: test-rust test-python test-levels
 	@echo 'All tests passed: Rust (cargo) and Python (pytest).'
 
 test-rust:
-	if cargo nextest --version >/dev/null 2>&1; then cargo nextest run --locked && cargo test --locked --doc; \
-	else cargo test --locked; fi
+	if cargo nextest --version >/dev/null 2>&1; then \
+		cargo nextest run --locked --features simulation && cargo test --locked --features simulation --doc; \
+	else cargo test --locked --features simulation; fi
 
 # One process a core, one thread each: torch would otherwise start its threads in every process.
 test-python: $(VENV)/test-tools $(VENV)/browser | test-rust
@@ -124,7 +125,7 @@ $(VENV)/fit-tools: pyproject.toml | $(VENV)/built
 	touch $@
 
 $(VENV)/test-tools: pyproject.toml | $(VENV)/built
-	$(MATURIN_DEVELOP) --extras fit,c3d --group test
+	$(MATURIN_DEVELOP) --extras fit,c3d,evaluate --group test
 	touch $@
 
 $(VENV)/bench-tools: pyproject.toml | $(VENV)/test-tools

@@ -57,12 +57,23 @@ def random_people():
 
 
 @pytest.fixture(scope="session")
-def real_people():
-    """Two people reconstructed from photos, (2, V, 3) metres in a y-down camera frame, and their faces."""
+def shared():
+    """shared("photo") -> that folder of real data; skips, saying so, without it."""
     root = os.environ.get("IPMAN_SHARED_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data"
-    folder = Path(root) / "mhr_bodies"
-    if not folder.is_dir():
-        pytest.skip(f"mhr_bodies is not at {root}: set IPMAN_SHARED_DATA")
+
+    def folder(name):
+        path = Path(root) / name
+        if not path.is_dir():
+            pytest.skip(f"{name} is not at {root}: set IPMAN_SHARED_DATA")
+        return path
+
+    return folder
+
+
+@pytest.fixture(scope="session")
+def real_people(shared):
+    """Two people reconstructed from photos, (2, V, 3) metres in a y-down camera frame, and their faces."""
+    folder = shared("mhr_bodies")
     faces = np.array(trimesh.load(folder / "mhr_face_mask.ply", process=False).faces)
     vertices = np.stack([np.load(folder / f"img_subj0{index}.npz")["pred_vertices"] for index in range(2)])
     return vertices.astype(np.float64), faces

@@ -18,15 +18,14 @@ import trimesh
 from numpy.typing import NDArray
 
 import ipman_rs as ip
+from ipman_rs.data import opensim
+from ipman_rs.validation import measured
+from ipman_rs.validation.zero_moment_point import GRAVITY
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("IPMAN_SHARED_DATA") or ROOT.parent / "shared" / "data")
 DOCUMENT = ROOT / "docs" / "validation.md"
-GRAVITY = 9.80665  # m/s²
-LOADED = 20.0  # N; with less, a plate's centre of pressure is noise
-TWO_PLATES = ("ground_force_1_{}", "ground_force_2_{}")
-
-Table = dict[str, NDArray[np.float64]]
+Array = NDArray[np.float64]
 
 
 def main() -> None:
@@ -78,22 +77,23 @@ def plates() -> Iterator[str]:
 
 
 def quiet_standing() -> Iterator[str]:
-    trial = storage(DATA / "squat_forceplates" / "static1_grf.mot")
-    force, cop = combined(trial, TWO_PLATES)
+    found = measured.plates(DATA / "squat_forceplates" / "static1_grf.mot")
+    force, cop = found.loads.sum(axis=1), found.center()[:, [0, 2]]
     yield f"body mass by the plates, ± over time | {force.mean() / GRAVITY:.2f} ± {force.std() / GRAVITY:.2f} kg"
-    for name, plate in zip(("first", "second"), TWO_PLATES, strict=True):
-        load, centre = combined(trial, (plate,))
-        yield f"CoP of the {name} plate (x, z) | {pair(centre.mean(0))} m, {load.mean() / force.mean():.1%} of the load"
+    for plate, name in enumerate(("first", "second")):
+        center, load = found.points[:, plate, [0, 2]].mean(axis=0), found.loads[:, plate].mean()
+        yield f"CoP of the {name} plate (x, z) | {pair(center)} m, {load / force.mean():.1%} of the load"
     sway = np.sqrt(((cop - cop.mean(0)) ** 2).sum(1).mean())
     yield f"CoP of both (x, z) | {pair(cop.mean(0))} m, sway {1e3 * sway:.1f} mm rms"
 
 
 def squats() -> Iterator[str]:
     folder = DATA / "squat_forceplates"
-    force, cop = combined(storage(folder / "squats1_grf.mot"), TWO_PLATES)
-    com = np.loadtxt(folder / "squats1_opensim_com_manually_scaled.csv", delimiter=",")[:, 1:]
+    found = measured.plates(folder / "squats1_grf.mot")
+    cop = found.center()[:, [0, 2]]
+    com = measured.center_of_mass(folder / "squats1_opensim_com_manually_scaled.csv", found.times)
     apart = np.linalg.norm(cop.mean(0) - com[:, [0, 2]].mean(0))
-    yield f"body mass by the plates, mean over the trial | {force.mean() / GRAVITY:.2f} kg"
+    yield f"body mass by the plates, mean over the trial | {found.loads.sum(axis=1).mean() / GRAVITY:.2f} kg"
     yield f"CoP of both: range of x, of z | {ranges(cop)}"
     yield f"CoM by OpenSim: range of x, of z | {ranges(com[:, [0, 2]])}"
     yield f"CoM by OpenSim: range of height | {ranges(com[:, [1]])}"
@@ -101,44 +101,24 @@ def squats() -> Iterator[str]:
 
 
 def walking() -> Iterator[str]:
-    trial = storage(DATA / "gait2354" / "subject01_walk1_grf.mot")
-    com = storage(DATA / "gait2354" / "g2354_bodykin.sto")
-    time, height = com["time"], com["center_of_mass_Y"]
+    found = measured.plates(DATA / "gait2354" / "subject01_walk1_grf.mot")
+    table = opensim.storage(DATA / "gait2354" / "g2354_bodykin.sto")
+    time, height = table.times, opensim.center_of_mass(table)[:, 1]
     # Mean force = m (g + mean acceleration); the CoM's speed at both ends comes from a polynomial through its heights.
     speed = np.polynomial.Polynomial.fit(time, height, 5).deriv()
     acceleration = (speed(time[-1]) - speed(time[0])) / (time[-1] - time[0])
-    force, _ = combined(trial, ("ground_force_{}", "1_ground_force_{}"))
-    mass = force[(trial["time"] >= time[0]) & (trial["time"] <= time[-1])].mean() / (GRAVITY + acceleration)
+    force = found.loads.sum(axis=1)
+    mass = force[(found.times >= time[0]) & (found.times <= time[-1])].mean() / (GRAVITY + acceleration)
     window = f"t {time[0]:.2f}–{time[-1]:.2f} s"
     yield f"body mass by the plates and the CoM's acceleration, {window} | {mass:.1f} kg"
     yield f"CoM by OpenSim: range of height, {window} | {ranges(height[:, None])}"
 
 
-def storage(path: Path) -> Table:
-    """An OpenSim .mot or .sto file by column."""
-    lines = path.read_text().splitlines()
-    start = next(number for number, line in enumerate(lines) if line.strip() == "endheader") + 1
-    while not lines[start].strip():
-        start += 1
-    numbers = np.array([line.split() for line in lines[start + 1 :] if line.strip()], dtype=np.float64)
-    return dict(zip(lines[start].split(), numbers.T, strict=True))
-
-
-def combined(trial: Table, plates: tuple[str, ...]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Vertical force (T,) N of the plates together, and their centre of pressure (t, 2) m where they carry a load."""
-    forces = np.stack([trial[plate.format("vy")] for plate in plates])
-    loads = np.where(forces > LOADED, forces, 0.0)
-    points = np.stack([[trial[plate.format(axis)] for axis in ("px", "pz")] for plate in plates])  # (plates, 2, T)
-    loaded = loads.sum(0) > 0
-    centre = (loads[:, None] * points).sum(0)[:, loaded] / loads.sum(0)[loaded]
-    return forces.sum(0), centre.T
-
-
-def pair(point: NDArray[np.float64]) -> str:
+def pair(point: Array) -> str:
     return f"({point[0]:.3f}, {point[1]:.3f})"
 
 
-def ranges(columns: NDArray[np.float64]) -> str:
+def ranges(columns: Array) -> str:
     return ", ".join(f"{low:.3f} to {high:.3f} m" for low, high in zip(columns.min(0), columns.max(0), strict=True))
 
 

@@ -53,7 +53,10 @@ class Ground:
     def signed_height(self, points: ArrayLike) -> NDArray[np.float64]:
         """h(u), metres above the ground. points (..., 3) for one ground, (..., N, 3) for one ground a body."""
         normal, height = self._beside_points()
-        return (plain("points", points) * normal).sum(axis=-1) - height
+        where = plain("points", points).astype(np.float64, copy=False)
+        # Axis by axis: a sum along an axis of 3 takes many times as long.
+        x, y, z = (where[..., axis] * normal[..., axis] for axis in range(3))
+        return x + y + z - height
 
     def project(self, points: ArrayLike) -> NDArray[np.float64]:
         """g(u), the points' feet on the ground, in the shape of `points` (see signed_height)."""

@@ -34,7 +34,7 @@ def standing(shared, body):
 @pytest.fixture(scope="module")
 def squatting(shared, body, standing):
     tracks = markers.read(shared("squat_forceplates") / "squats1.trc")
-    return recorded.fit_tracks(body, tracks, every=EVERY["squats1"], person=standing)
+    return recorded.fit_tracks(body, tracks, every=EVERY["squats1"], person=standing.person)
 
 
 def solid(fit):

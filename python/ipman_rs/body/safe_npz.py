@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import struct
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, Literal
 
 import numpy as np
 from numpy.lib import format as npy
@@ -29,14 +30,67 @@ def read(path: Path, name: str) -> NDArray[Any]:
             packed = archive.getinfo(f"{name}.npy")
             if packed.file_size > MAX_BYTES:
                 raise ValueError(f"unpacks to {packed.file_size} bytes, more than the {MAX_BYTES} that are read")
-            reader = npy.read_array_header_1_0 if npy.read_magic(stream)[0] == 1 else npy.read_array_header_2_0
-            shape, fortran, dtype = reader(stream)
-            if dtype.hasobject:
-                raise ValueError("holds Python objects, which are not loaded; save it again as plain numbers")
-            count = int(np.prod([int(size) for size in shape], dtype=object))
+            shape, order, dtype = _header(stream)
             data = stream.read(packed.file_size)
-            if count * dtype.itemsize != len(data):
-                raise ValueError(f"claims shape {shape} of {dtype}, but carries {len(data)} bytes")
-            return np.frombuffer(data, dtype).reshape(shape, order="F" if fortran else "C")
+            _fits(shape, dtype, len(data))
+            return np.frombuffer(data, dtype).reshape(shape, order=order)
     except Exception as error:  # damaged bytes can fail in any way (zlib, struct, header syntax)
         raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
+
+
+def shape_of(path: Path, name: str) -> tuple[int, ...]:
+    """The shape that array `name` of `path` claims; a few bytes are read. Raises as `read`."""
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as stream:
+            return tuple(int(size) for size in _header(stream)[0])
+    except Exception as error:
+        raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
+
+
+def mapped(path: Path, name: str) -> NDArray[Any]:
+    """Array `name` of `path` without reading it: the rows that are looked at come from the disk, however long it is.
+
+    numpy.savez stores its arrays as they are, so they can be mapped into memory in place, read-only (and, unlike with
+    `read`, without a comparison of checksums). A packed one (numpy.savez_compressed) is read as a whole, once.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            packed = archive.getinfo(f"{name}.npy")
+        if packed.compress_type != zipfile.ZIP_STORED:
+            return read(path, name)
+        with path.open("rb") as stream:
+            end = _data_offset(stream, packed.header_offset) + packed.file_size
+            shape, order, dtype = _header(stream)
+            start = stream.tell()
+            _fits(shape, dtype, min(end, path.stat().st_size) - start)
+        if 0 in shape:
+            return np.empty(shape, dtype)
+        return np.memmap(path, dtype, "r", start, shape, order)  # type: ignore[call-overload]
+    except Exception as error:
+        text = str(error)
+        raise ValueError(
+            text if text.startswith(f"{path}: ") else f"{path}: array {name!r} cannot be read: {text}"
+        ) from error
+
+
+def _data_offset(stream: IO[bytes], start: int) -> int:
+    """Where the data of the member begin whose local header is at `start`; the stream stands there afterwards."""
+    stream.seek(start)
+    fields = struct.unpack("<4s22xHH", stream.read(30))
+    if fields[0] != b"PK\3\4":
+        raise ValueError("no member where the archive's directory says one is")
+    return stream.seek(start + 30 + fields[1] + fields[2])
+
+
+def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], Literal["C", "F"], np.dtype[Any]]:
+    """Shape, order and type of a `.npy` array of numbers or text, from its first bytes."""
+    reader = npy.read_array_header_1_0 if npy.read_magic(stream)[0] == 1 else npy.read_array_header_2_0
+    shape, fortran, dtype = reader(stream)
+    if dtype.hasobject:
+        raise ValueError("holds Python objects, which are not loaded; save it again as plain numbers")
+    return shape, "F" if fortran else "C", dtype
+
+
+def _fits(shape: tuple[int, ...], dtype: np.dtype[Any], size: int) -> None:
+    if int(np.prod([int(length) for length in shape], dtype=object)) * dtype.itemsize != size:
+        raise ValueError(f"claims shape {shape} of {dtype}, but carries {size} bytes")

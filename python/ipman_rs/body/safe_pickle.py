@@ -1,4 +1,4 @@
-"""Read the arrays of a pickled body model without executing anything from the file.
+"""Read the arrays of a pickled body model, or of a data set's file, without executing anything from the file.
 
 SMPL files are pickles of Python 2 dictionaries that hold numpy arrays, chumpy arrays and scipy sparse matrices. A
 pickle is a program, so this one runs on a short allow-list: every global it may name becomes an inert record of ours,
@@ -13,6 +13,7 @@ import io
 import math
 import pickle
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+BODY_MODEL, BODY_MODELS = "body model", "an unmodified SMPL, SMPL+H or SMPL-X file"
 MAX_BYTES = 1 << 30  # the largest upstream file (SMPL-X with 400 components, in float64) has about half of that
 
 
@@ -95,8 +97,26 @@ class SparseRowsRecord(SparseRecord):
     by_column = False
 
 
+class ScalarRecord(Record):
+    """`numpy.core.multiarray.scalar`: args = (dtype, bytes)."""
+
+    def resolve(self) -> NDArray[Any]:
+        dtype, data = self.args
+        if not isinstance(dtype, DtypeRecord):
+            raise ValueError("number without its type")
+        return _array(data, dtype.resolve(), (), "C")
+
+
 class Marker(Record):
     """A class that the file may name (`numpy.ndarray`, `object`) and a set, whose contents nobody needs."""
+
+
+class Stranger(Record):
+    """An object of some other program's class, such as its settings. Whatever is put into it is dropped."""
+
+    def append(self, _: Any) -> None: ...
+
+    def extend(self, _: Any) -> None: ...
 
 
 def _array(data: Any, dtype: np.dtype, shape: Any, order: str) -> NDArray[Any]:
@@ -160,7 +180,7 @@ def _allowed() -> dict[tuple[str, str], Callable[..., Any]]:
     }
     for core in ("numpy.core", "numpy._core"):  # numpy 1 and 2
         table[f"{core}.multiarray", "_reconstruct"] = _reconstruct
-        table[f"{core}.multiarray", "scalar"] = Marker
+        table[f"{core}.multiarray", "scalar"] = ScalarRecord
         table[f"{core}.numeric", "_frombuffer"] = _from_buffer
     for builtins, copyreg in (("__builtin__", "copy_reg"), ("builtins", "copyreg")):  # Python 2 and 3
         table[builtins, "object"] = Marker
@@ -175,6 +195,10 @@ def _allowed() -> dict[tuple[str, str], Callable[..., Any]]:
 
 
 ALLOWED = _allowed()
+# What other programs' settings are made of; another name of the standard library means that a file wants to do things.
+HARMLESS = ("collections", "datetime", "enum", "pathlib", "typing", "copy_reg", "copyreg", "uuid")
+HARMLESS_TYPES = ("bool", "bytes", "complex", "dict", "float", "frozenset", "int", "list", "long", "object", "range",
+                  "set", "slice", "str", "tuple", "type", "unicode")  # fmt: skip
 FORBIDDEN_OPCODES = (
     pickle.EXT1, pickle.EXT2, pickle.EXT4, pickle.PERSID, pickle.BINPERSID, pickle.NEXT_BUFFER, pickle.READONLY_BUFFER,
     pickle.ADDITEMS, pickle.FROZENSET, pickle.NEWOBJ_EX, pickle.INST, pickle.OBJ,
@@ -191,9 +215,13 @@ class RestrictedUnpickler(_Interpreter):
         code: run for code, run in _Interpreter.dispatch.items() if bytes([code]) not in FORBIDDEN_OPCODES
     }
 
+    def __init__(self, stream: io.BytesIO, what: str) -> None:
+        super().__init__(stream, encoding="latin1")
+        self.what = what
+
     def find_class(self, module: str, name: str) -> Callable[..., Any]:
         if (module, name) not in ALLOWED:
-            raise pickle.UnpicklingError(f"names {module}.{name}, which no body model needs; it is refused")
+            raise pickle.UnpicklingError(f"names {module}.{name}, which no {self.what} needs; it is refused")
         return ALLOWED[module, name]
 
     def load_build(self) -> None:
@@ -214,6 +242,8 @@ class RestrictedUnpickler(_Interpreter):
     def _fill(self, items: list[Any]) -> None:
         """Keys are plain: hashing a tuple nested a million deep would overflow the stack."""
         target = self.stack[-1]
+        if isinstance(target, Stranger):
+            return
         if not isinstance(target, dict) or not all(isinstance(key, (str, bytes, int, float)) for key in items[::2]):
             raise pickle.UnpicklingError("has a dictionary key that is neither text nor a number")
         target.update(zip(items[::2], items[1::2], strict=True))
@@ -227,23 +257,58 @@ class RestrictedUnpickler(_Interpreter):
     dispatch[pickle.BYTEARRAY8[0]] = load_bytearray8
 
 
-def read(path: Path) -> dict[str, Any]:
+class TolerantUnpickler(RestrictedUnpickler):
+    """Classes of other programs become strangers, which do nothing; the standard library's functions stay refused."""
+
+    def find_class(self, module: str, name: str) -> Callable[..., Any]:
+        if (module, name) in ALLOWED:
+            return ALLOWED[module, name]
+        if module in ("builtins", "__builtin__"):
+            harmless = name in HARMLESS_TYPES
+        else:
+            first = module.partition(".")[0]
+            harmless = first in HARMLESS or first not in sys.stdlib_module_names
+        return Stranger if harmless else super().find_class(module, name)
+
+    def load_additems(self) -> None:
+        """A set's contents are dropped: nobody needs them, and hashing runs what they say."""
+        self.pop_mark()
+
+    def load_frozenset(self) -> None:
+        self.pop_mark()
+        self.append(Stranger())
+
+    dispatch = RestrictedUnpickler.dispatch | {
+        pickle.ADDITEMS[0]: load_additems,
+        pickle.FROZENSET[0]: load_frozenset,
+        pickle.NEWOBJ_EX[0]: _Interpreter.load_newobj_ex,
+    }
+
+
+def read(path: Path, what: str = BODY_MODEL, expected: str = BODY_MODELS, tolerant: bool = False) -> dict[str, Any]:
     """The pickled dictionary in `path`: numbers and text as they are, arrays as records for `as_array`.
 
-    Raises ValueError when the file is too large, truncated, damaged, not a dictionary, or names anything not allowed.
+    `what` and `expected` name the file in messages. `tolerant`: objects of other programs' classes are passed over,
+    such as settings beside the arrays. Raises ValueError when the file is missing, too large, truncated, damaged, not a
+    dictionary, or names anything not allowed.
     """
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        raise ValueError(f"{path}: {size} bytes is more than any body model has ({MAX_BYTES}); is it the right file?")
     try:
-        content = RestrictedUnpickler(io.BytesIO(path.read_bytes()), encoding="latin1").load()
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise ValueError(f"{path}: {size} bytes is more than any {what} has ({MAX_BYTES}); is it the right file?")
+        data = path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from error
+    try:
+        interpreter = TolerantUnpickler if tolerant else RestrictedUnpickler
+        content = interpreter(io.BytesIO(data), what).load()
     except Exception as error:  # damaged bytes can fail in any way
         reason = (
             f"the pickle {error}" if isinstance(error, pickle.UnpicklingError) else f"{type(error).__name__}: {error}"
         )
         raise ValueError(
-            f"{path}: cannot be read as a pickled body model: {reason}. Expected an unmodified SMPL, SMPL+H or SMPL-X "
-            "file; download it again, or save its arrays with numpy.savez and load that"
+            f"{path}: cannot be read as a pickled {what}: {reason}. Expected {expected}; download it again, or save "
+            "its arrays with numpy.savez and load that"
         ) from error
     if not isinstance(content, dict):
         raise ValueError(f"{path}: expected a pickled dictionary of arrays, found a {type(content).__name__}")
@@ -256,4 +321,4 @@ def as_array(value: Any, shape: tuple[int, ...] | None = None) -> NDArray[Any]:
         if value.shape != shape:
             raise ValueError(f"expected shape {shape}, got a sparse matrix of shape {value.shape}")
         return value.dense()
-    return _resolved(value, (ArrayRecord, ChumpyRecord, SelectRecord))
+    return _resolved(value, (ArrayRecord, ChumpyRecord, ScalarRecord, SelectRecord))

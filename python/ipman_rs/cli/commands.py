@@ -9,9 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .benchmark import benchmark
+from .data import data
 from .errors import FileError
+from .evaluate import evaluate
 from .fit import fit
 from .options import GROUND, PRESETS, UP
+from .simulate import simulate
+from .validate import validate
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -40,11 +44,18 @@ def main() -> None:
     ipman demo -o out               the named poses of the built-in body
     ipman analyze body.obj -o out   your own mesh; open out/report.html afterwards
     ipman fit photo.jpg -o out      a body for the person in a photo
+    ipman evaluate pred.npz --data own --path true.npz -o out   predictions against the truth
+    ipman validate folder/ -o out   the engine against force plates and OpenSim
+    ipman simulate body.obj         how firmly it stands, and what becomes of it when it is let go
     """
 
 
 main.add_command(fit)
+main.add_command(simulate)
 main.add_command(benchmark)
+main.add_command(evaluate)
+main.add_command(validate)
+main.add_command(data)
 
 
 @main.command()

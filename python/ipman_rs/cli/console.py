@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -58,6 +58,14 @@ def progress(title: str, total: int) -> Iterator[Step]:
         yield Step(bar, total, title)
 
 
+@contextmanager
+def busy(title: str) -> Iterator[None]:
+    """A sign of life on stderr for work of unknown length; nothing where stderr is no terminal."""
+    console = Console(stderr=True)
+    with console.status(Text(one_line(title))) if console.is_terminal else nullcontext():
+        yield
+
+
 def print_table(studies: Sequence[Study]) -> None:
     """A line for each body or named pose; a recording's line has medians, and the smallest margin of its contacts.
 
@@ -99,6 +107,19 @@ def _row(study: Study, frames: int | slice) -> list[Text]:
     return [*map(Text, cells), Text(said, style="green" if stable.all() else "red")]
 
 
+def print_rows(head: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
+    """A table of text, its first column to the left."""
+    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
+    for number, title in enumerate(head):
+        table.add_column(title, justify="left" if number == 0 else "right", overflow="fold")
+    for line in lines:
+        table.add_row(*(Text(one_line(cell)) for cell in line))
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 200
+    console.print(table)
+
+
 def print_fits(studies: Sequence[Study]) -> None:
     """A line for each fitted body: how its fit went, how it stands, and what to look at."""
     table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
@@ -133,6 +154,39 @@ def _fit_row(study: Study, record: Mapping[str, Any]) -> list[Text]:
 
 def _number(value: float, factor: float, digits: int) -> str:
     return f"{value * factor:.{digits}f}" if np.isfinite(value) else "–"
+
+
+def print_validation(records: Sequence[Mapping[str, Any]]) -> None:
+    """A line for each phase of each recording: weight, centre of mass and centre of pressure against the measured."""
+    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
+    table.add_column("recording", overflow="fold", min_width=10)
+    table.add_column("", no_wrap=True)
+    for title in ("markers mm", "kg", "by plates", "CoM mm", "CoP: at rest mm", "ZMP mm", "γ = 10 mm"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for one in records:
+        compared = one["com"]["methods"]["exact"]["distance"] if one["com"] else None
+        told = [
+            (one["fit"]["markers"], 1e3),
+            (one["mass"]["volume_mean"], 1),
+            (one["mass"]["plates"], 1),
+            (compared, 1e3),
+        ]
+        first = [one["name"], one["kind"], *(_known(value, factor) for value, factor in told)]
+        phases = one["cop"] or {"all": {"distance": {}}}
+        for phase, found in phases.items():
+            lead = first if phase == next(iter(phases)) else [""] * len(first)
+            if phase != "all":
+                lead[1] = phase
+            away = [found["distance"].get(name) for name in ("at rest: g(CoM)", "moving: ZMP of the parts", "γ = 10")]
+            table.add_row(*(Text(one_line(cell)) for cell in [*lead, *(_known(value, 1e3) for value in away)]))
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 160
+    console.print(table)
+
+
+def _known(value: float | None, factor: float) -> str:
+    return "–" if value is None else _number(value, factor, 1)
 
 
 def print_notes(studies: Sequence[Study]) -> None:

@@ -89,7 +89,7 @@ def fit(
 
     Exit code: 0 when every item has a body, 1 when one has none (the others have), 2 for wrong usage.
     """
-    _needs("torch", "roma", "yaml")
+    needs("torch", "roma", "yaml")
     warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
     from . import console
     from .fit_inputs import Reading
@@ -122,7 +122,8 @@ def fit(
     sys.exit(1 if failures else 0)
 
 
-def _needs(*modules: str) -> None:
+def needs(*modules: str) -> None:
+    """Ends the command where a module of the extra `fit` is missing."""
     missing = [name for name in modules if importlib.util.find_spec(name) is None]
     if missing:
         raise click.ClickException(f"fitting needs {', '.join(missing)}: pip install 'ipman_rs[fit]'")

@@ -45,9 +45,9 @@ def write_files(folder: Path, files: dict[str, Any], record: dict[str, Any]) -> 
     folder.mkdir(parents=True, exist_ok=True)
     (folder / RECORD).unlink(missing_ok=True)  # incomplete from here on
     for name, content in files.items():
-        _replace(folder / name, content if isinstance(content, bytes) else _npz(content))
+        write_whole(folder / name, content if isinstance(content, bytes) else npz(content))
     record = {**record, "files": sorted(files)}
-    _replace(folder / RECORD, (json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1) + "\n").encode())
+    write_whole(folder / RECORD, (json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1) + "\n").encode())
 
 
 def complete(folder: Path, identity: str) -> dict[str, Any] | None:
@@ -115,13 +115,14 @@ def notes(record: dict[str, Any]) -> list[str]:
     return [*lines, *(f"look: {flag}" for flag in record["flags"]), *record["notes"]]
 
 
-def _npz(arrays: dict[str, np.ndarray]) -> bytes:
+def npz(arrays: dict[str, np.ndarray]) -> bytes:
+    """The file of these arrays."""
     stream = io.BytesIO()
     np.savez(stream, allow_pickle=False, **arrays)
     return stream.getvalue()
 
 
-def _replace(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes) -> None:
     """Write a file so that it is there whole or not at all."""
     partial = path.with_name(f".{path.name}.part")
     partial.write_bytes(content)

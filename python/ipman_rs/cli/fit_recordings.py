@@ -5,18 +5,20 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..body import safe_npz
 from . import console
 from .errors import FileError
-from .fit_outputs import complete, write_files
+from .fit_outputs import RECORD, complete, write_files
 
 if TYPE_CHECKING:
     from ..fitting.fit import Fit
+    from ..fitting.recorded import Person
     from ..view import Study
     from .fit_inputs import Item
     from .fit_run import Settings
@@ -42,21 +44,54 @@ class Pace:
 
 def fitted(recording: Recording, settings: Settings, pace: Pace, output: Path, resume: bool) -> Study:
     """Fit a recording, write its folder and measure it. Raises FileError."""
+    kept(recording, settings, pace, output, resume)
+    return _measured(recording, output / recording.name, settings)
+
+
+def kept(
+    recording: Recording, settings: Settings, pace: Pace, output: Path, resume: bool, person: str | None = None
+) -> dict[str, Any]:
+    """The record of a recording's fit, which is in its folder: made now, or before with the same input and options.
+
+    `person`: the name of a marker recording that is in `output`, whose shape and places of markers are kept. Raises
+    FileError.
+    """
     folder = output / recording.name
-    identity = _identity(recording, settings, pace)
-    if not (resume and complete(folder, identity)):
+    known = None if person is None else _record(output / person)
+    identity = _identity(recording, settings, pace, None if known is None else known["identity"])
+    record = complete(folder, identity) if resume else None
+    if record is None:
         try:
-            found, told, rate = (
-                _fit_markers(recording, settings, pace)
+            found, arrays, told, rate = (
+                _fit_markers(recording, settings, pace, None if person is None else person_of(output / person))
                 if recording.frames is None
                 else _fit_frames(recording, settings, pace)
             )
         except ValueError as error:
             raise FileError(recording.paths[0], str(error)) from error
         record = {"name": recording.name, "source": recording.source, **told, **_stages(found)}
-        record |= {"preset": _preset(recording, settings), "identity": identity}
-        write_files(folder, {f"{recording.name}.npz": _arrays(found, rate)}, record)
-    return _measured(recording, folder, settings)
+        record |= {"preset": _preset(recording, settings), "shape_from": person or "itself", "identity": identity}
+        write_files(folder, {f"{recording.name}.npz": {**_arrays(found, rate), **arrays}}, record)
+    return record
+
+
+def person_of(folder: Path) -> Person:
+    """Whose marker recording is kept in a folder."""
+    import torch
+
+    from ..fitting.markers import Site
+    from ..fitting.recorded import Person
+
+    record = _record(folder)
+    sites = {
+        name: site if isinstance(site, str) else Site(site["vertex"], tuple(site["shift"]))
+        for name, site in record["sites"].items()
+    }
+    return Person(torch.from_numpy(safe_npz.read(folder / f"{record['name']}.npz", "betas").copy()), sites)
+
+
+def _record(folder: Path) -> dict[str, Any]:
+    return json.loads((folder / RECORD).read_text(encoding="utf-8"))
 
 
 def _preset(recording: Recording, settings: Settings) -> str:
@@ -64,7 +99,10 @@ def _preset(recording: Recording, settings: Settings) -> str:
     return "markers" if recording.frames is None and settings.config.name == "fast" else settings.config.name
 
 
-def _fit_markers(recording: Recording, settings: Settings, pace: Pace) -> tuple[Fit, dict[str, Any], float]:
+Found = tuple["Fit", dict[str, np.ndarray], dict[str, Any], float]  # further arrays, what is told, frames a second
+
+
+def _fit_markers(recording: Recording, settings: Settings, pace: Pace, person: Person | None) -> Found:
     import ipman_rs.torch as ipt
 
     from ..fitting import config, markers, recorded
@@ -74,18 +112,20 @@ def _fit_markers(recording: Recording, settings: Settings, pace: Pace) -> tuple[
     tracks = markers.read(recording.paths[0])
     body, count = ipt.BodyModel(settings.model), len(range(0, len(tracks), pace.every))
     with console.progress(f"fitting {recording.name}", count) as step:
-        told = {"every": pace.every, "ground": settings.ground or 0.0}
+        told = {"every": pace.every, "ground": settings.ground or 0.0, "person": person}
         found = recorded.fit_tracks(
             body, tracks, chosen, **told, progress=lambda _stage, done: step.to(min(done, count))
         )
     errors = found.errors
     each = {name: _number(np.nanmean(column)) for name, column in zip(found.tracks.names, errors.T, strict=True)}
+    sites = {name: site if isinstance(site, str) else asdict(site) for name, site in found.sites.items()}
     record = {"mean_marker_error_m": _number(np.nanmean(errors)), "marker_errors_m": each, "unknown": [*found.unknown]}
     times = found.tracks.times
-    return found.fit, record, float(1 / np.median(np.diff(times))) if len(times) > 1 else 1.0
+    rate = float(1 / np.median(np.diff(times))) if len(times) > 1 else 1.0
+    return found.fit, {"times": times}, {**record, "sites": sites}, rate
 
 
-def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> tuple[Fit, dict[str, Any], float]:
+def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
     import ipman_rs.torch as ipt
 
     from ..fitting import start
@@ -116,7 +156,7 @@ def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> tuple[F
         found = fit_sequence(problem, variables, settings.config, **told)
     assert problem.points is not None
     median = (found.candidate.projected - problem.points).norm(dim=-1).median()
-    return found, {"frames_left_out": unseen, "median_error_px": _number(median)}, rate
+    return found, {}, {"frames_left_out": unseen, "median_error_px": _number(median)}, rate
 
 
 def _stages(found: Fit) -> dict[str, Any]:
@@ -153,8 +193,9 @@ def _measured(recording: Recording, folder: Path, settings: Settings) -> Study:
     return measure(path, Request(model=settings.model, ground=height))
 
 
-def _identity(recording: Recording, settings: Settings, pace: Pace) -> str:
-    digest = hashlib.sha256(json.dumps([settings.identity(), repr(pace)]).encode())
+def _identity(recording: Recording, settings: Settings, pace: Pace, person: str | None) -> str:
+    """A hash of all that a fit depends on; `person`: that of the fit whose shape is kept."""
+    digest = hashlib.sha256(json.dumps([settings.identity(), repr(pace), person]).encode())
     for path in recording.paths:
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()

@@ -1,6 +1,58 @@
-"""How far estimated bodies are from true ones, and what of a difference is chance."""
+"""How far estimated bodies are from true ones, whether they stand, and what of a difference is chance.
 
-from .bootstrap import Interval, paired
-from .errors import aligned, mpjpe, pa_mpjpe, pve, similarity
+Metrics take numpy arrays or torch tensors and give one number a body, (...), in metres, radians or shares; NaN where
+there is none (`alike`). `Accumulator` adds them up over shards, exactly.
+"""
 
-__all__ = ["Interval", "aligned", "mpjpe", "pa_mpjpe", "paired", "pve", "similarity"]
+from .accumulator import Accumulator, Summary
+from .bootstrap import Interval, bootstrap, paired
+from .bose import BoseMode, bose
+from .com_error import com_error
+from .comparison import Comparison, compare
+from .cop_error import cop_error
+from .foot_skating import foot_skating
+from .moyo_protocol import MoyoFigures, PressureFigures, moyo
+from .mpjpe import mpjpe, pa_mpjpe
+from .penetration import hover, penetration
+from .pressure_iou import PressureMode, frame_difference, pressure_iou
+from .pressure_map import Mat, pressure_map
+from .procrustes import aligned, similarity
+from .pve import pve
+from .reasons import reasons
+from .sign_flip import paired_test, sign_flip
+from .tilt import root_tilt, tilt
+
+__all__ = [
+    "Accumulator",
+    "BoseMode",
+    "Comparison",
+    "Interval",
+    "Mat",
+    "MoyoFigures",
+    "PressureFigures",
+    "PressureMode",
+    "Summary",
+    "aligned",
+    "bootstrap",
+    "bose",
+    "com_error",
+    "compare",
+    "cop_error",
+    "foot_skating",
+    "frame_difference",
+    "hover",
+    "moyo",
+    "mpjpe",
+    "pa_mpjpe",
+    "paired",
+    "paired_test",
+    "penetration",
+    "pressure_iou",
+    "pressure_map",
+    "pve",
+    "reasons",
+    "root_tilt",
+    "sign_flip",
+    "similarity",
+    "tilt",
+]

@@ -1,15 +1,24 @@
-"""Paired bootstrap: what the mean difference of two methods on the same bodies would be on other bodies."""
+"""Bootstrap intervals of a mean: what it would be on other bodies, or on other sequences of bodies.
+
+Frames of one sequence are alike, so it is sequences that are drawn with replacement, each with all its frames. Images
+are sequences of one frame. More than 4096 are pooled by chance into 4096 clusters first: that keeps memory and time
+flat, and makes a difference of about a hundredth to an interval's width.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+
+from .clusters import differences
+
+DRAWS = 1 << 20  # at a time
 
 
 class Interval(NamedTuple):
-    """The mean difference and the ends of its interval."""
+    """A mean, or the mean difference of two methods, and the ends of its interval."""
 
     mean: float
     low: float
@@ -21,17 +30,42 @@ class Interval(NamedTuple):
 
 
 def paired(
-    values: ArrayLike, baseline: ArrayLike, level: float = 0.95, resamples: int = 10_000, seed: int = 0
+    values: ArrayLike,
+    baseline: ArrayLike,
+    level: float = 0.95,
+    resamples: int = 10_000,
+    seed: int = 0,
+    sequences: ArrayLike | None = None,
 ) -> Interval:
     """Percentile interval of the mean of values (n,) − baseline (n,) over bodies drawn with replacement.
 
-    ValueError for arrays of different lengths, or without bodies.
+    Bodies where one of the two is no finite number are left out.
+
+    Args:
+        sequences: (n,) names; given, it is whole sequences that are drawn.
+
+    Raises:
+        ValueError: arrays of different lengths, or without a body where both are finite.
     """
-    values, baseline = np.asarray(values, float), np.asarray(baseline, float)
-    if values.shape != baseline.shape or values.ndim != 1 or not len(values):
-        raise ValueError(f"values: expected two arrays (n,) of one length, got {values.shape} and {baseline.shape}")
-    difference = values - baseline
-    drawn = np.random.default_rng(seed).integers(len(difference), size=(resamples, len(difference)))
+    difference, sums, counts = differences(values, baseline, sequences)
+    return bootstrap(sums, counts, float(difference.mean()), level, resamples, seed)
+
+
+def bootstrap(
+    sums: NDArray[Any], counts: NDArray[Any], mean: float, level: float = 0.95, resamples: int = 10_000, seed: int = 0
+) -> Interval:
+    """Percentile interval of the mean from the sum (G,) and the number (G,) of each cluster's values. The ends are NaN
+    for fewer than two clusters, which say nothing about others. ValueError for a level that is no share."""
+    if not 0 < level < 1:
+        raise ValueError(f"level: expected a share between 0 and 1, got {level!r}")
+    if len(sums) < 2:
+        return Interval(mean, np.nan, np.nan)
+    draw, means = np.random.default_rng(seed), np.empty(resamples)
+    block = max(1, DRAWS // len(sums))
+    for start in range(0, resamples, block):
+        part = means[start : start + block]
+        drawn = draw.integers(len(sums), size=(len(part), len(sums)))
+        part[:] = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
     tail = 100 * (1 - level) / 2
-    low, high = np.percentile(difference[drawn].mean(axis=1), [tail, 100 - tail])
-    return Interval(float(difference.mean()), float(low), float(high))
+    low, high = np.percentile(means, [tail, 100 - tail])
+    return Interval(mean, float(low), float(high))

@@ -32,6 +32,14 @@ POSES = 24  # of the recording, spread over it, that say where the markers are
 
 
 @dataclass(frozen=True, eq=False)
+class Person:
+    """What stays of somebody from one recording to the next: the shape (1, b), and where the markers are."""
+
+    betas: Tensor
+    sites: Mapping[str, markers.Site | str]
+
+
+@dataclass(frozen=True, eq=False)
 class Recorded:
     """The fit of T frames. `tracks` are their known markers (M), at these `sites` of the body; `unknown` are those that
     nobody knows the place of."""
@@ -40,6 +48,11 @@ class Recorded:
     tracks: markers.Tracks
     sites: Mapping[str, markers.Site | str]
     unknown: tuple[str, ...]
+
+    @property
+    def person(self) -> Person:
+        """Whose recording it is."""
+        return Person(self.fit.variables["betas"][:1], self.sites)
 
     @property
     def errors(self) -> NDArray[np.float64]:
@@ -58,14 +71,14 @@ def fit_tracks(
     calibrate: int = 2,
     smoothness: float = 0.01,
     ground: float = 0.0,
-    person: Recorded | None = None,
+    person: Person | None = None,
     progress: Callable[[str, int], None] | None = None,
 ) -> Recorded:
     """Fit every `every`-th frame, by the preset `markers` unless another is given, on the laboratory's floor at y =
     `ground` m.
 
-    `calibrate`: how often the markers are moved on the body to where fits of some frames see them. `person`: another
-    recording of the same person and day, usually of standing still, whose shape and places of markers are kept.
+    `calibrate`: how often the markers are moved on the body to where fits of some frames see them. `person`: of another
+    recording of the same day, usually of standing still; shape and places of markers are kept.
     `smoothness` as in `fit_sequence`. ValueError if too few of the markers are known.
     """
     if every < 1:
@@ -80,7 +93,7 @@ def fit_tracks(
     unknown = tuple(name for name in tracks.names if name not in sites)
     tracks = tracks.select(list(sites))
     if person is not None:
-        betas = person.fit.variables["betas"][:1]
+        betas = person.betas
         sites |= {name: site for name, site in person.sites.items() if name in sites}
         config = _shape_kept(config)
     else:

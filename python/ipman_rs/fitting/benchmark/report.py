@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.evaluation import Interval, paired
+from ipman_rs.plain import plain
 
 from . import scenes
 from .measure import Figures
@@ -31,7 +32,7 @@ DIFFERENCES = {"PVE": 1, "PVE world": 1, "BoSE 3 cm": 0}
 def write(found: Found, run: Benchmark) -> Path:
     """The files into the folder of the run; the page's path."""
     record = {"run": {**asdict(run), "folder": None}, "blocks": [_record(*block) for block in found]}
-    (run.folder / f"{NAME}.json").write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
+    (run.folder / f"{NAME}.json").write_text(json.dumps(plain(record), indent=1, allow_nan=False) + "\n")
     _write_csv(found, run.folder / f"{NAME}.csv")
     _plot(record["blocks"], run.folder / f"{NAME}.svg")
     environment = jinja2.Environment(
@@ -136,8 +137,9 @@ def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
 
 
 def _interval(interval: Sequence[float], digits: int = 1) -> str:
-    mean, low, high = (f"{value:+.{digits}f}".replace("-", "−") for value in interval)
-    return f"{mean} [{low}, {high}]"
+    """A family of one body has no interval."""
+    mean, *ends = (f"{value:+.{digits}f}".replace("-", "−") for value in interval if not np.isnan(value))
+    return f"{mean} [{', '.join(ends)}]" if ends else mean
 
 
 def _write_csv(found: Found, path: Path) -> None:

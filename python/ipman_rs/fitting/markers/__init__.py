@@ -13,14 +13,14 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from ipman_rs.body import BodyModel
+from ipman_rs.data import c3d, trc
+from ipman_rs.data.tracks import Tracks
 
 from ..landmarks import Site
-from . import c3d, trc
 from .anatomy import MIDDLE, RADIUS, SIDED, Anatomy
 from .sets import MARKERS, Meaning
-from .tracks import Tracks
 
-READERS: dict[str, Callable[..., Tracks]] = {".trc": trc.read, ".c3d": c3d.read}
+READERS: dict[str, Callable[..., Tracks]] = {".trc": trc.read, ".c3d": c3d.markers}
 
 __all__ = ["MARKERS", "READERS", "Site", "Tracks", "read", "sites"]
 

@@ -1,0 +1,75 @@
+"""`ipman validate`: bodies fitted to markers, against force plates and centres of mass by others."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+
+import click
+
+from .errors import FileError
+from .fit import needs
+
+
+@click.command()
+@click.argument("folder", metavar="FOLDER", type=click.Path(path_type=Path))
+@click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Output folder.")
+@click.option(
+    "--body", "model", default="anny-lite", show_default=True, metavar="NAME|PATH",
+    help="Body model: anny-lite, anny, or an SMPL, SMPL+H or SMPL-X file (.pkl, .npz).",
+)  # fmt: skip
+@click.option(
+    "--person", default="auto", show_default=True, metavar="auto|none|NAME",
+    help="The recording of standing still whose shape and places of markers are kept for all others; auto: the one "
+    "whose name says so (static, stand, neutral, calib), if there is one; none: every recording finds its own.",
+)  # fmt: skip
+@click.option(
+    "--rate", type=click.FloatRange(min=0, min_open=True), default=50.0, show_default=True, metavar="HZ",
+    help="Fit about so many frames a second. Accelerations, and with them the ZMP, need 24 or more.",
+)  # fmt: skip
+@click.option("--fresh", is_flag=True, help="Fit again what was fitted before with the same files and options.")
+def validate(folder: Path, output: Path, model: str, person: str, rate: float, fresh: bool) -> None:
+    """Compare the engine's centre of mass, centre of pressure and pressure with measurements.
+
+    FOLDER holds recordings of one person: markers (.trc, or .c3d with the extra c3d), force plates (.mot, or those of
+    the .c3d) and centres of mass by others, such as OpenSim's (.sto, or .csv with columns time_s, com_x_m, com_y_m,
+    com_z_m; y up). A file belongs to the recording whose name is in its own: squats.trc, squats_grf.mot,
+    squats_com.sto. Bodies are fitted to the markers alone, as by `ipman fit`, and are kept: run it again and it goes on
+    where it was.
+
+    OUTPUT gets validation.md and validation.json with all tables, and a folder for every recording: series.csv and
+    series.npz over time, the fit, and pictures of the pressure on the floor, of what happens over time, of the bodies.
+
+    \b
+    ipman validate gait2354 -o out
+    ipman validate squats/ -o out --body anny --person static1
+    ipman validate squats/ -o out --person none      every recording finds its own shape
+
+    Exit code: 0 when every recording was compared, 1 when one was not (the others are), 2 for wrong usage.
+    """
+    needs("torch", "roma", "yaml")
+    warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
+    from . import console, validate_run
+
+    try:
+        plan = validate_run.plan(folder, output, model, person, rate, not fresh)
+    except (ValueError, ImportError) as error:
+        raise click.UsageError(str(error)) from error
+    try:
+        records, notes, failures = validate_run.run(plan)
+        page = validate_run.write(plan, records, notes, failures) if records else None
+    except OSError as error:
+        what = f"{output}: outputs cannot be written ({error.strerror or error}); choose another folder"
+        raise click.ClickException(what) from error
+    for failure in failures:
+        console.error(str(failure))
+    if page is not None:
+        console.print_validation(records)
+        for note in notes:
+            console.say(note)
+        console.say(f"report: {page}")
+    sys.exit(1 if failures else 0)
+
+
+__all__ = ["FileError", "validate"]

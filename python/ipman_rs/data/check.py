@@ -1,0 +1,279 @@
+"""Whether frames of people can be right: units, axes, ground and cameras, judged by the size and the stance of a body.
+
+Every function takes the rows it judges (a few hundred are enough) and gives findings; `of_frames` is all of them for
+the common form. `demand` makes an error of what is wrong.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ipman_rs.body.rotations import from_axis_angle
+from ipman_rs.ground import Ground
+
+from .frames import Cameras, DataSet, Frames
+
+SAMPLE = 256  # frames that are looked at
+BODY = (0.25, 3.5)  # m: extent of a body's joints or markers, rolled up or with raised arms
+WORLD = 100.0  # m: no body or camera is farther from the origin of its world
+AXES = ("+x", "+y", "+z", "-x", "-y", "-z")
+HEADS = ("head_top", "head", "nose", "neck")  # the first of these that a data set has
+FEET = ("ankle", "foot", "heel", "toe")  # words in the names of what is low on a person who stands
+
+DS = TypeVar("DS", bound=DataSet)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that `ipman data check` tells: what was found, and what to do about it."""
+
+    level: Literal["ok", "missing", "wrong"]
+    what: str
+    advice: str = ""
+
+
+def demand(path: str | os.PathLike[str], findings: Iterable[Finding]) -> None:
+    """ValueError with the file's name and all that is wrong; what is merely missing passes."""
+    wrong = [f"{each.what}; {each.advice}" if each.advice else each.what for each in findings if each.level == "wrong"]
+    if wrong:
+        raise ValueError(f"{path}: {'. '.join(wrong)}")
+
+
+def demanded(path: str | os.PathLike[str], data: DS) -> DS:
+    """`data`, if a sample of its frames has plausible units, axes, ground and cameras; else ValueError."""
+    demand(path, of_frames(sample(data)))
+    return data
+
+
+def sample(data: DataSet, size: int = SAMPLE) -> Frames:
+    """Up to `size` frames, evenly spaced."""
+    return data[np.unique(np.linspace(0, len(data) - 1, size).astype(np.int64)) if len(data) > size else slice(None)]
+
+
+def of_frames(frames: Frames) -> list[Finding]:
+    """All that can be told from the frames alone: whatever they have is judged, whatever they lack is passed over."""
+    if not len(frames):
+        return [Finding("wrong", "no frame at all", "the file is empty: is the download complete?")]
+    found = names(frames.names) + _lengths(frames)
+    if frames.pose is not None:
+        found += finite("pose", frames.pose) + radians("pose", frames.pose)
+    if frames.betas is not None:
+        found += finite("betas", frames.betas)
+    if _any_wrong(found):  # floor and cameras would only repeat it
+        return found
+    standing = stance(frames, frames.ground) if frames.ground is not None else []
+    found += standing
+    if frames.ground is not None and not _any_wrong(standing):
+        found += _on_ground(frames, frames.ground)
+    if frames.cameras is not None:
+        found += cameras(frames.cameras)
+        found += [] if _any_wrong(standing) else _projections(frames, frames.cameras)
+    return found
+
+
+def _any_wrong(found: list[Finding]) -> bool:
+    return any(each.level == "wrong" for each in found)
+
+
+def _lengths(frames: Frames) -> list[Finding]:
+    found = []
+    for what in ("joints", "vertices"):
+        points = getattr(frames, what)
+        if points is not None:
+            found += finite_points(what, points) + size_of_body(what, points)
+    if frames.transl is not None:
+        found += finite("transl", frames.transl) + place("transl", frames.transl)
+    return found
+
+
+def names(values: NDArray[np.str_]) -> list[Finding]:
+    """Each frame has a name of its own."""
+    unique, counts = np.unique(values, return_counts=True)
+    if len(unique) == len(values):
+        return []
+    return [
+        Finding("wrong", f"{len(values) - len(unique)} frames share a name, such as {str(unique[counts.argmax()])!r}")
+    ]
+
+
+def finite(what: str, values: NDArray[Any]) -> list[Finding]:
+    """Whether every frame has the thing, values (F, …). A frame without it is NaN throughout: no figure needs it."""
+    good = np.isfinite(np.asarray(values).reshape(len(values), -1))
+    return _finite(what, good.any(axis=1), good.all(axis=1))
+
+
+def finite_points(what: str, points: NDArray[Any]) -> list[Finding]:
+    """The same for points (F, K, 3), of which a frame may lack some: those are NaN in x, y and z."""
+    good = np.isfinite(points)
+    return _finite(what, good.any(axis=(1, 2)), (good.all(axis=-1) | ~good.any(axis=-1)).all(axis=-1))
+
+
+def _finite(what: str, some: Any, whole: Any) -> list[Finding]:
+    found = []
+    if not some.all():
+        found.append(Finding("ok", f"{what}: {(~some).sum()} of {len(some)} frames have none"))
+    if (some & ~whole).any():
+        said = f"{what}: NaN or infinity among the numbers of {(some & ~whole).sum()} of {len(some)} frames"
+        found.append(Finding("missing", said, "no figure is computed for them"))
+    return found
+
+
+def size_of_body(what: str, points: NDArray[Any]) -> list[Finding]:
+    """Whether points (F, K, 3) of a person each, joints, vertices or markers, span a body in metres."""
+    points = np.asarray(points, np.float64)
+    points = np.where(np.isfinite(points).all(axis=-1, keepdims=True), points, np.nan)
+    seen = ~np.isnan(points).all(axis=(1, 2))
+    if not seen.any():
+        return []
+    span = np.nanmax(points[seen], axis=1) - np.nanmin(points[seen], axis=1)
+    extent = float(np.median(np.linalg.norm(span, axis=-1)))
+    low, high = BODY
+    if low <= extent <= high:
+        return [Finding("ok", f"{what}: metres (a body spans {extent:.2f})")]
+    if low * 1e3 <= extent <= high * 1e3:
+        unit, advice = "looks like millimetres", "divide by 1000"
+    elif low * 1e2 <= extent <= high * 1e2:
+        unit, advice = "looks like centimetres", "divide by 100"
+    else:
+        unit, advice = "no unit of length fits a person", ""
+    return [Finding("wrong", f"{what}: {unit}: a body spans {extent:.4g}, expected {low} to {high} metres", advice)]
+
+
+def place(what: str, positions: NDArray[Any]) -> list[Finding]:
+    """Whether positions (F, 3) of bodies or cameras can be metres in a world of people."""
+    distance = np.linalg.norm(np.asarray(positions, np.float64), axis=-1)
+    distance = distance[np.isfinite(distance)]
+    if not len(distance) or np.median(distance) <= WORLD:
+        return []
+    said = f"{what}: looks like millimetres: {np.median(distance):.4g} from the origin, expected up to {WORLD:g} metres"
+    return [Finding("wrong", said, "divide by 1000")]
+
+
+def radians(what: str, pose: NDArray[Any]) -> list[Finding]:
+    """Whether rotation vectors (F, J, 3) can be radians."""
+    largest = np.linalg.norm(np.asarray(pose, np.float64), axis=-1).max(axis=-1)
+    largest = largest[np.isfinite(largest)]
+    if not len(largest) or np.median(largest) <= 2 * np.pi:
+        return []
+    said = f"{what}: looks like degrees: rotations by up to {largest.max():.4g}, expected radians"
+    return [Finding("wrong", said, "multiply by π/180")]
+
+
+def upright(what: str, up: NDArray[Any], ground: Ground) -> list[Finding]:
+    """Whether the ways from the feet to the head (F, 3), of any length, agree on average with the ground's normal.
+
+    People who lie, crawl or stand on their hands give no verdict: only a clear majority along another axis is wrong.
+    """
+    up = np.asarray(up, np.float64)
+    normal = np.broadcast_to(ground.normal, up.shape)
+    length = np.linalg.norm(up, axis=-1)
+    seen = np.isfinite(length) & (length > 0)
+    if not seen.any():
+        return []
+    unit, normal = up[seen] / length[seen][:, None], normal[seen]
+    agreement = float((unit * normal).sum(axis=-1).mean())
+    expected = f"({', '.join(f'{number:.2g}' for number in normal[0])})"
+    if agreement > 0.5:
+        return [Finding("ok", f"{what}: people stand along up, {expected}")]
+    mean = unit.mean(axis=0)
+    axis = int(np.concatenate([mean, -mean]).argmax())
+    if np.abs(mean).max() < 0.6 or agreement > 0.3:
+        return []
+    said = f"{what}: looks like {AXES[axis]} up: heads lie that way from the feet, but up is said to be {expected}"
+    return [Finding("wrong", said, "these are other axes than the data set's own: were they turned or not turned?")]
+
+
+def stance(frames: Frames, ground: Ground) -> list[Finding]:
+    """`upright` of the frames' joints, or else of the roots of their SMPL bodies; the ground's height is not needed."""
+    if frames.joints is not None and frames.joint_names is not None:
+        seen = dict(zip(frames.joint_names, np.moveaxis(frames.joints, 1, 0), strict=True))
+        heads = [seen[name] for name in HEADS if name in seen and np.isfinite(seen[name]).any()]
+        feet = [points for name, points in seen.items() if any(word in name for word in FEET)]
+        if heads and feet:
+            return upright("joints", heads[0] - _mean(np.stack(feet)), ground)
+    if frames.pose is not None and (frames.body or "").startswith("smpl"):
+        return upright("pose", from_axis_angle(np.asarray(frames.pose[:, 0], np.float64))[..., 1], ground)
+    return []
+
+
+def heights(what: str, lowest: NDArray[Any], allowed: tuple[float, float] = (-0.3, 0.5)) -> list[Finding]:
+    """Whether heights (F,) in m above the ground, of the lowest point of each person, are those of people on it."""
+    lowest = np.asarray(lowest, np.float64)
+    lowest = lowest[np.isfinite(lowest)]
+    if not len(lowest):
+        return []
+    middle = float(np.median(lowest))
+    if allowed[0] <= middle <= allowed[1]:
+        return [Finding("ok", f"{what}: {1e3 * middle:.0f} mm from the ground in the median")]
+    side = "above" if middle > 0 else "below"
+    said = f"{what}: {abs(middle):.2f} m {side} the ground in the median"
+    return [Finding("wrong", said, "is the ground's height, or its axis, another one?")]
+
+
+def cameras(given: Cameras) -> list[Finding]:
+    """Rotations that are rotations, intrinsics of pinholes in pixels, positions in metres."""
+    found = finite("cameras.rotation", given.rotation) + place("cameras.translation", given.translation)
+    rotation = np.asarray(given.rotation, np.float64)
+    rotation = rotation[np.isfinite(rotation).all(axis=(1, 2))]
+    off = np.abs(rotation @ rotation.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2), initial=0) > 1e-3
+    mirrored = np.linalg.det(rotation) < 0
+    if off.any() or mirrored.any():
+        said = f"cameras.rotation: {off.sum()} of {len(rotation)} are no rotations, {mirrored.sum()} are mirrored"
+        found.append(Finding("wrong", said))
+    focal = np.asarray(given.intrinsics, np.float64)[:, [0, 1], [0, 1]]
+    focal = focal[np.isfinite(focal).all(axis=1)]
+    if len(focal) and (np.median(focal, axis=0) < 10).any():
+        said = f"cameras.intrinsics: focal lengths of {np.median(focal, axis=0)} are no pixels"
+        found.append(Finding("wrong", said, "they look divided by the image's size, or are another matrix"))
+    return found or [Finding("ok", "cameras: rotations, focal lengths in pixels, positions in metres")]
+
+
+def _mean(points: NDArray[Any]) -> NDArray[np.float64]:
+    """Mean of points (K, F, 3) over those of the K that are known; NaN where none is."""
+    known = np.isfinite(points).all(axis=-1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        return np.where(known, points, 0.0).sum(axis=0) / known.sum(axis=0)
+
+
+def _on_ground(frames: Frames, ground: Ground) -> list[Finding]:
+    for what, points in (("vertices", frames.vertices), ("joints", frames.joints)):
+        if points is not None:
+            height = ground.signed_height(points)
+            lowest = np.where(np.isfinite(height), height, np.inf).min(axis=-1)
+            return heights(f"lowest of the {what}", lowest)
+    if frames.transl is not None:  # the pelvis, give or take SMPL's offset of 0.2 to 0.4 m
+        return heights("transl", ground.signed_height(frames.transl[:, None])[:, 0], (-0.5, 2.5))
+    return []
+
+
+def _projections(frames: Frames, given: Cameras) -> list[Finding]:
+    """Joints seen through the camera, against the keypoints of the same names."""
+    if frames.joints is None or frames.joint_names is None:
+        return []
+    seen = np.einsum("fij,fkj->fki", given.rotation, frames.joints) + given.translation[:, None]
+    depth = seen[..., 2][np.isfinite(seen[..., 2])]
+    if len(depth) and np.median(depth) <= 0:
+        advice = "is the camera's transform that of the world to the camera?"
+        return [Finding("wrong", f"joints lie behind the camera ({np.median(depth):.2f} m)", advice)]
+    shared = [name for name in frames.joint_names if name in (frames.keypoint_names or ())]
+    if frames.keypoints is None or frames.keypoint_names is None or not shared:
+        return []
+    found = frames.keypoints[:, [list(frames.keypoint_names).index(name) for name in shared]]
+    seen = np.einsum("fij,fkj->fki", given.intrinsics, seen)
+    seen = seen[:, [list(frames.joint_names).index(name) for name in shared]]
+    known = (found[..., 2] > 0) & np.isfinite(seen).all(axis=-1) & np.isfinite(found).all(axis=-1) & (seen[..., 2] > 0)
+    if not known.any():
+        return []
+    pixels, labelled = seen[known], found[known]
+    off = np.median(np.linalg.norm(pixels[:, :2] / pixels[:, 2:] - labelled[:, :2], axis=-1))
+    size = np.linalg.norm(np.ptp(np.where(known[..., None], found[..., :2], found[..., :1, :2]), axis=1), axis=-1)
+    said = f"joints seen through the camera lie {off:.1f} pixels from the keypoints in the median"
+    if off <= max(0.25 * np.median(size), 5.0):
+        return [Finding("ok", said)]
+    return [Finding("wrong", said, "the camera, the joints or the image's size are of another frame")]

@@ -1,0 +1,404 @@
+"""RICH: people in scanned scenes, seen by six to eight still cameras, as the data set itself ships.
+
+    bodies/{train,val,test}/Pavallion_000_yoga1/00045/000.pkl    SMPL-X arguments of a frame and person
+    scan_calibration/Pavallion/calibration/000.xml               a camera: CameraMatrix, Intrinsics, Distortion
+    scan_calibration/Pavallion/ground_mesh.ply                   the ground of the laser scan (also beside the bodies,
+                                                                 bodies/{train,val,test}/SEQUENCE/ground_mesh.ply)
+    multicam2world/Pavallion_multicam2world.json                 R, t, c: world = c · X R + t
+    images/{train,val,test}/Pavallion_000_yoga1/cam_00/00045_00.jpeg
+
+World of the frames: camera 0's, metres, x right, y down, z forward, since the bodies are given in it; the ground is
+put into it. (The scan's own world is z up.) No `ground_mesh.ply`: no ground. 30 Hz where the numbers of the frames
+follow each other. Names are `SEQUENCE/00045_00`, the frame's number and the camera's, with `#1` for the second person;
+sequences are one camera's view of one person. Images keep their full size; the intrinsics know no distortion.
+
+Hands: 12 weights a hand of SMPL-X's components: `hands=load_body(...).hands` turns them into the fingers' absolute
+rotations (`flat_hand_mean=True`), without it fingers are straight.
+
+Splits: the data set's own train, val, test, camera 0 unless `cameras` says others; and IPMAN's, of its yoga and push-up
+sequences: ipman-train (all cameras but 0), ipman-val (the same sequences, camera 0) and ipman-test (all cameras).
+
+Where it comes from: the project's own site, RICH.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ipman_rs.body import safe_pickle
+from ipman_rs.body.hands import Hands
+from ipman_rs.body.joints import SMPLX
+from ipman_rs.ground import Ground
+
+from . import naming, safe_xml, sequences
+from .check import Finding
+from .frames import Cameras, DataSet, Frames
+
+NAME = "rich"
+
+Array = NDArray[np.float64]
+
+SPLITS = ("train", "val", "test")
+IPMAN_YOGA = ("Pavallion_000_yoga1", "Pavallion_000_yoga2", "Pavallion_006_yoga1", "Pavallion_018_yoga1")
+IPMAN = {
+    "ipman-train": IPMAN_YOGA,
+    "ipman-val": IPMAN_YOGA,
+    "ipman-test": (
+        "Pavallion_002_yoga1", "Pavallion_013_yoga2", "ParkingLot2_014_pushup2", "ParkingLot1_005_pushup1",
+    ),
+}  # fmt: skip
+RATE = 30.0  # Hz
+FEMALE = (9, 10, 12, 13, 16, 17, 18, 19, 21)  # of the subjects 0 to 21
+SUBJECTS = 22
+PARTS = {  # array -> the joints that it turns, in SMPL-X's order
+    "global_orient": slice(0, 1),
+    "body_pose": slice(1, 22),
+    "jaw_pose": slice(22, 23),
+    "leye_pose": slice(23, 24),
+    "reye_pose": slice(24, 25),
+}
+HANDS = ("left_hand_pose", "right_hand_pose")
+REQUIRED = ("transl", "global_orient", "body_pose", "betas")
+TILT = 30.0  # degrees: more than that from the scan's z is no ground
+IMAGES = (".jpeg", ".jpg", ".png", ".bmp")
+
+
+@dataclass(frozen=True)
+class View:
+    """One camera's view of one person: the files of its frames, in order."""
+
+    folder: Path  # of the sequence's bodies
+    person: int  # the how-manieth in the sequence
+    files: tuple[Path, ...]
+    camera: int
+
+    @property
+    def sequence(self) -> str:
+        return self.folder.name
+
+    @property
+    def scene(self) -> str:
+        return self.sequence.partition("_")[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What belongs to a place: its ground in camera 0's axes, and its cameras' rotation, translation, intrinsics."""
+
+    ground: Ground | None
+    cameras: dict[int, tuple[Array, Array, Array]]
+
+
+def open(
+    path: str | os.PathLike[str],
+    split: str | None = None,
+    *,
+    cameras: Sequence[int] | None = None,
+    hands: Hands | None = None,
+) -> DataSet:
+    """The frames of a split (see above; None: all sequences there are), seen by these cameras.
+
+    Only folders are listed when it is opened, and calibrations read. Raises ValueError naming the file for what is
+    missing, damaged, hostile, or in units or axes that cannot be.
+    """
+    root = Path(path)
+    folders = _folders(root, split)
+    views = [view for folder in folders for view in _views(root, folder, _cameras(root, folder, split, cameras))]
+    read = lru_cache(maxsize=None)(_scene)  # of a place, whose files are those of all its sequences
+    scenes = {folder: read(*_scene_files(root, folder)) for folder in folders}
+    _alike(root, scenes)
+    rate = _rate(views)
+    pictured = any(_image_folder(root, view).is_dir() for view in views)
+
+    def sequence(index: int) -> Frames:
+        frames = _frames(root, views[index], scenes[views[index].folder], hands, rate)
+        return frames if not pictured else replace(frames, images=_images(root, views[index]))
+
+    return sequences.demanded(root, sequences.sequences([len(view.files) for view in views], sequence, path))
+
+
+def _alike(root: Path, scenes: dict[Path, Scene]) -> None:
+    """ValueError if some scenes lack what others have."""
+    for what, there, file in (
+        ("ground", {folder: scene.ground is not None for folder, scene in scenes.items()}, "ground_mesh.ply"),
+        ("cameras", {folder: bool(scene.cameras) for folder, scene in scenes.items()}, "calibration/*.xml"),
+    ):
+        lacking = [folder.name for folder, has in there.items() if not has]
+        if lacking and len(lacking) < len(there):
+            raise ValueError(f"{root}: {what} of {', '.join(lacking)}: expected {file}, as other sequences have")
+
+
+def _folders(root: Path, split: str | None) -> list[Path]:
+    """The sequences' folders of a split."""
+    if split is not None and split not in (*SPLITS, *IPMAN):
+        raise ValueError(f"split: expected one of {', '.join((*SPLITS, *IPMAN))}, got {split!r}")
+    if not (root / "bodies").is_dir():
+        raise ValueError(f"{root}: expected a folder with bodies/train, bodies/val or bodies/test in it, found none")
+    pattern = f"{split}/*" if split in SPLITS else "*/*"
+    folders = {folder.name: folder for folder in sorted((root / "bodies").glob(pattern)) if folder.is_dir()}
+    if split in IPMAN:
+        lacking = [name for name in IPMAN[split] if name not in folders]
+        if lacking:
+            raise ValueError(f"{root}: {split}: expected bodies/*/{lacking[0]}, there is none")
+        return [folders[name] for name in IPMAN[split]]
+    if not folders:
+        raise ValueError(f"{root}: expected sequences in bodies/{split or '*'}, found none")
+    return list(folders.values())
+
+
+def _cameras(root: Path, folder: Path, split: str | None, wanted: Sequence[int] | None) -> Sequence[int]:
+    if wanted is not None:
+        return wanted
+    if split in ("ipman-train", "ipman-test"):
+        calibrated = sorted(_calibration(root, folder).glob("*.xml"))
+        numbers = [int(file.stem) for file in calibrated if file.stem.isdigit()]
+        return numbers if split == "ipman-test" else [number for number in numbers if number != 0]
+    return (0,)
+
+
+def _views(root: Path, folder: Path, cameras: Sequence[int]) -> list[View]:
+    files = sorted(folder.glob("*/*.pkl"))
+    if not files:
+        raise ValueError(f"{folder}: expected bodies such as 00045/000.pkl, found none")
+    people = sorted({file.stem for file in files})
+    return [
+        View(folder, number, tuple(file for file in files if file.stem == person), camera)
+        for camera in cameras
+        for number, person in enumerate(people)
+    ]
+
+
+def _rate(views: list[View]) -> float | None:
+    """Hz; None if frames do not follow each other at one distance."""
+    steps = {
+        int(later.parent.name) - int(earlier.parent.name)
+        for view in views
+        for earlier, later in zip(view.files, view.files[1:], strict=False)
+    }
+    return RATE / steps.pop() if len(steps) == 1 else None
+
+
+def _frames(root: Path, view: View, scene: Scene, hands: Hands | None, rate: float | None) -> Frames:
+    bodies = [_body(file, hands) for file in view.files]
+    pose, betas, transl = (np.stack(part) for part in zip(*bodies, strict=True))
+    count = len(view.files)
+    names = [f"{view.sequence}/{file.parent.name}_{view.camera:02d}" for file in view.files]
+    person = np.full(count, view.person)
+    camera = scene.cameras.get(view.camera)
+    if camera is None and scene.cameras:
+        calibration = _calibration(root, view.folder) / f"{view.camera:03d}.xml"
+        raise ValueError(f"{calibration}: expected the calibration of camera {view.camera}, no such file")
+    spread = None if camera is None else Cameras(*(np.broadcast_to(part, (count, *part.shape)) for part in camera))
+    frames = Frames(
+        names=naming.numbered(names, person),
+        sequences=naming.numbered([f"{view.sequence}/{view.camera:02d}"] * count, person),
+        ground=scene.ground,
+        frame_rate=rate,
+        body="smplx",
+        genders=np.full(count, _gender(view.files[0].stem)),
+        pose=pose,
+        betas=betas,
+        transl=transl,
+        cameras=spread,
+    )
+    return sequences.plausible(view.folder, frames)
+
+
+def _body(file: Path, hands: Hands | None) -> tuple[Array, Array, Array]:
+    """Pose (55, 3), betas (n,) and place (3,) of a frame."""
+    if not file.parent.name.isdigit():
+        raise ValueError(f"{file}: expected it in a folder with the frame's number, such as 00045")
+    content = safe_pickle.read(file, "body of RICH", "an unmodified file of its bodies folder")
+    lacking = [name for name in REQUIRED if name not in content]
+    if lacking:
+        raise ValueError(f"{file}: no {', '.join(lacking)} in it (it has {', '.join(sorted(map(str, content)))})")
+    pose = np.zeros((len(SMPLX), 3))
+    for name, joints in PARTS.items():
+        if name in content:
+            pose[joints] = _array(file, name, content[name], 3 * (joints.stop - joints.start)).reshape(-1, 3)
+    if hands is not None and all(name in content for name in HANDS):
+        weights = [_array(file, name, content[name], None) for name in HANDS]
+        pose[25:] = hands.mean + hands.from_components(*weights)
+    return pose, _array(file, "betas", content["betas"], None), _array(file, "transl", content["transl"], 3)
+
+
+def _array(file: Path, name: str, value: Any, size: int | None) -> Array:
+    """The numbers behind a value of the pickle, one dimension."""
+    try:
+        array = safe_pickle.as_array(value)
+    except ValueError as error:
+        raise ValueError(f"{file}: {name}: {error}") from error
+    if array.dtype.kind not in "fiu" or (size is not None and array.size != size):
+        raise ValueError(f"{file}: {name}: expected {size or 'some'} numbers, got {array.dtype} of {array.shape}")
+    return array.astype(np.float64).reshape(-1)
+
+
+def _gender(subject: str) -> str:
+    if not subject.isdigit() or int(subject) >= SUBJECTS:
+        return "neutral"
+    return "female" if int(subject) in FEMALE else "male"
+
+
+def _image_folder(root: Path, view: View) -> Path:
+    return root / "images" / view.folder.parent.name / view.sequence / f"cam_{view.camera:02d}"
+
+
+def _images(root: Path, view: View) -> NDArray[np.str_]:
+    """The images' paths; empty if the view has none."""
+    folder = _image_folder(root, view)
+    first = next((file for file in folder.glob("*") if file.suffix.lower() in IMAGES), None)
+    names = (f"{file.parent.name}_{view.camera:02d}" for file in view.files)
+    return np.array(["" if first is None else str(folder / name) + first.suffix for name in names])
+
+
+def _calibration(root: Path, folder: Path) -> Path:
+    return root / "scan_calibration" / folder.name.partition("_")[0] / "calibration"
+
+
+def _to_world(root: Path, folder: Path) -> Path:
+    """The file that leads to the scan's world; the lecture hall was scanned twice."""
+    scene = folder.name.partition("_")[0]
+    if scene == "LectureHall":
+        scene += "_chair" if "chair" in folder.name else "_yoga"
+    return root / "multicam2world" / f"{scene}_multicam2world.json"
+
+
+def _ground_mesh(root: Path, folder: Path) -> Path | None:
+    scene = folder.name.partition("_")[0]
+    places = (folder / "ground_mesh.ply", root / "scan_calibration" / scene / "ground_mesh.ply")
+    return next((place for place in places if place.is_file()), None)
+
+
+def _scene_files(root: Path, folder: Path) -> tuple[Path | None, Path, Path]:
+    """Ground, way to the scan's world, and folder of the cameras' calibrations."""
+    return _ground_mesh(root, folder), _to_world(root, folder), _calibration(root, folder)
+
+
+def _scene(mesh: Path | None, to_world: Path, calibration: Path) -> Scene:
+    files = sorted(file for file in calibration.glob("*.xml") if file.stem.isdigit())
+    return Scene(
+        ground=None if mesh is None else ground(mesh, to_world),
+        cameras={int(file.stem): camera(file) for file in files},
+    )
+
+
+def camera(file: Path) -> tuple[Array, Array, Array]:
+    """Rotation (3, 3), translation (3,) m and intrinsics (3, 3) pixels of a calibration's XML.
+
+    ValueError, naming the file, for a document type and for what is damaged or cannot be.
+    """
+    root = safe_xml.read(file)
+    extrinsics, intrinsics = (
+        _matrix(root, name, size, file) for name, size in (("CameraMatrix", 12), ("Intrinsics", 9))
+    )
+    rotation, translation = extrinsics.reshape(3, 4)[:, :3], extrinsics.reshape(3, 4)[:, 3]
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
+        raise ValueError(f"{file}: CameraMatrix: expected a rotation, got {rotation.round(3).tolist()}")
+    if np.linalg.norm(translation) > 100:
+        raise ValueError(f"{file}: CameraMatrix: looks like millimetres: {translation.tolist()}, expected metres")
+    return rotation, translation, intrinsics.reshape(3, 3)
+
+
+def _matrix(root: Any, name: str, size: int, file: Path) -> Array:
+    said = safe_xml.text(root, f"{name}/data", file).split()
+    try:
+        numbers = np.array(said, np.float64)
+    except ValueError as error:
+        raise ValueError(f"{file}: {name}: expected numbers: {error}") from None
+    if numbers.size != size or not np.isfinite(numbers).all():
+        raise ValueError(f"{file}: {name}: expected {size} finite numbers, got {numbers.size}")
+    return numbers
+
+
+def ground(mesh: Path, to_world: Path) -> Ground:
+    """The plane through the scan's ground, in camera 0's axes.
+
+    ValueError, naming the file, for what is missing or damaged, or a ground that is not level in a world that is z up.
+    """
+    import trimesh
+
+    try:
+        points = np.asarray(trimesh.load(mesh, process=False).vertices, np.float64)  # type: ignore[union-attr]
+    except Exception as error:  # of any type
+        raise ValueError(f"{mesh}: expected a mesh: {error}") from None
+    if len(points) < 3 or not np.isfinite(points).all():
+        raise ValueError(f"{mesh}: expected three vertices or more, finite, got {len(points)}")
+    if np.abs(points).max() > 1000:
+        raise ValueError(f"{mesh}: looks like millimetres: vertices up to {np.abs(points).max():.4g} from the origin")
+    middle = points.mean(axis=0)
+    normal = np.linalg.svd(points - middle, full_matrices=False)[2][2]
+    normal = normal if normal[2] > 0 else -normal
+    tilt = np.degrees(np.arccos(min(abs(normal[2]), 1.0)))
+    if tilt > TILT:
+        axis = "xyz"[int(np.abs(normal).argmax())]
+        raise ValueError(f"{mesh}: looks like {axis} up: the ground leans {tilt:.0f}° from the scan's z, its up axis")
+    rotation, translation, scale = _transform(to_world)
+    # normal · (c X R + t) = normal · middle, for a row X
+    return Ground(rotation @ normal, float(normal @ (middle - translation)) / scale)
+
+
+def _transform(file: Path) -> tuple[Array, Array, float]:
+    """R, t and c of world = c · X R + t."""
+    try:
+        said = json.loads(file.read_text(encoding="utf-8"))
+        rotation, translation = np.array(said["R"], float), np.array(said["t"], float).reshape(3)
+        scale = float(np.array(said["c"], float).reshape(()))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{file}: expected R, t and c of the way to the scan's world: {error!r}") from None
+    if rotation.shape != (3, 3) or np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3:
+        raise ValueError(f"{file}: R: expected a rotation (3, 3), got {rotation.tolist()}")
+    if not 0.5 < scale < 2:
+        hint = ": looks like millimetres" if scale > 100 or 0 < scale < 0.01 else ""
+        raise ValueError(f"{file}: c{hint}: expected a scale about 1, metres to metres, got {scale:g}")
+    return rotation, translation, scale
+
+
+def check(path: str | os.PathLike[str]) -> list[Finding]:
+    """Which sequences there are, what belongs to each, which files cannot be read, and whether units and axes fit."""
+    root = Path(path)
+    try:
+        folders = _folders(root, None)
+    except ValueError as error:
+        return [Finding("missing", str(error), "fetch the bodies of a split and unpack them")]
+    counts = {split: sum(folder.parent.name == split for folder in folders) for split in SPLITS}
+    found = [Finding("ok", f"{len(folders)} sequences ({', '.join(f'{n} in {split}' for split, n in counts.items())})")]
+    for split, names in IPMAN.items():
+        lacking = [name for name in names if name not in {folder.name for folder in folders}]
+        if lacking:
+            found.append(Finding("missing", f"{split}: {', '.join(lacking)}"))
+        else:
+            found.append(Finding("ok", f"{split}: all {len(names)} sequences"))
+    read, read_scene = [], lru_cache(maxsize=None)(_scene)
+    for folder in folders:
+        found += _around(root, folder)
+        try:
+            scene = read_scene(*_scene_files(root, folder))
+            for view in _views(root, folder, (0,)):
+                read.append((view.sequence, lambda v=view, s=scene: _frames(root, v, s, None, None)))
+        except ValueError as error:
+            found.append(Finding("wrong", str(error)))
+    return found + sequences.judged(read)
+
+
+def _around(root: Path, folder: Path) -> list[Finding]:
+    """What is missing beside the bodies of a sequence."""
+    needed = (
+        ("ground", _ground_mesh(root, folder), "scan_calibration/SCENE/ground_mesh.ply"),
+        ("way to the scan's world", _to_world(root, folder), "multicam2world"),
+        ("cameras", _calibration(root, folder), "scan_calibration"),
+        ("images", root / "images" / folder.parent.name / folder.name, "images"),
+    )
+    return [
+        Finding("missing", f"{folder.name}: no {what}", f"expected it in {place}")
+        for what, there, place in needed
+        if there is None or not there.exists()
+    ]

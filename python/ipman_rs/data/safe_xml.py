@@ -1,0 +1,68 @@
+"""Read untrusted XML: no document types, so no entities, neither bombs nor files and addresses from outside."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, NoReturn
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+MAX_BYTES = 1 << 29  # the longest recording of MoYo has a tenth of that
+MAX_DEPTH = 64
+
+
+def read(path: str | os.PathLike[str]) -> ElementTree.Element:
+    """The root of a document. ValueError, naming the file, if it is missing, damaged, too large, or has a DOCTYPE."""
+    try:
+        size = Path(path).stat().st_size
+        if size > MAX_BYTES:
+            raise ValueError(f"{path}: {size} bytes is more than any file of a data set has ({MAX_BYTES})")
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from None
+    builder, depth = ElementTree.TreeBuilder(), 0
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > MAX_DEPTH:
+            raise ValueError(f"elements nested more than {MAX_DEPTH} deep")
+        builder.start(tag, attributes)
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(tag)
+
+    def refuse(*_: Any) -> NoReturn:
+        raise ValueError("has a document type (DOCTYPE), which can hold entities; no file of a data set has one")
+
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = begin, end, builder.data
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
+    try:
+        parser.Parse(data, True)
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise ValueError(f"{path}: cannot be read as XML: {error}; is the download complete?") from None
+    return builder.close()
+
+
+def text(element: ElementTree.Element, path: str, source: str | os.PathLike[str]) -> str:
+    """The text of the first element at `path` ("clip/cell_size/x"). ValueError, naming the file, if there is none."""
+    found = element.find(path)
+    if found is None or not (found.text or "").strip():
+        raise ValueError(
+            f"{source}: expected <{path.removeprefix('.//').replace('/', '><')}> with text in it, got none"
+        )
+    return (found.text or "").strip()
+
+
+def number(element: ElementTree.Element, path: str, source: str | os.PathLike[str]) -> float:
+    """The number at `path`; raises as `text`."""
+    said = text(element, path, source)
+    try:
+        return float(said)
+    except ValueError:
+        raise ValueError(f"{source}: {path.removeprefix('.//')}: expected a number, got {said[:40]!r}") from None

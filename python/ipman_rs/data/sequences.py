@@ -1,0 +1,117 @@
+"""Data sets whose sequences lie in files of their own: read when they are asked for, judged by a sample."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import check
+from .frames import Frames, Rows
+from .joined import Joined, concatenated
+
+KEPT = 4  # sequences that stay in memory: rows are mostly asked for one after the other
+SAMPLED = 16  # sequences, and frames of each, that are looked at
+ENOUGH = 8  # sequences, of which not everybody lies: only then the way from feet to head tells where up is
+
+
+@dataclass(frozen=True)
+class OnDemand:
+    """A sequence of `length` frames that is read when some of them are asked for."""
+
+    length: int
+    read: Callable[[], Frames]
+
+    def __len__(self) -> int:
+        return self.length
+
+    def __getitem__(self, rows: Rows) -> Frames:
+        return self.read()[rows]
+
+
+def sequences(lengths: Sequence[int], read: Callable[[int], Frames], source: str | os.PathLike[str]) -> Joined:
+    """One after the other; `read(i)` gives all the `lengths[i]` frames of the i-th.
+
+    ValueError, naming `source`, if there is no frame at all.
+    """
+    if not sum(lengths):
+        raise ValueError(f"{source}: no frame at all: is the download complete?")
+    kept = lru_cache(KEPT)(read)
+    return Joined([OnDemand(length, partial(kept, index)) for index, length in enumerate(lengths)])
+
+
+def measured_alike(parts: Sequence[Frames]) -> list[Frames]:
+    """With NaN for what only others of the parts have measured, and as many force plates in each."""
+    plates = max((part.forces.shape[1] for part in parts if part.forces is not None), default=0)
+    return [_with_nothing(part, parts, plates) for part in parts]
+
+
+def _with_nothing(part: Frames, parts: Sequence[Frames], plates: int) -> Frames:
+    lacking: dict[str, NDArray[np.floating]] = {
+        name: np.full((len(part), 3), np.nan)
+        for name in ("center_of_mass", "center_of_pressure")
+        if getattr(part, name) is None and any(getattr(other, name) is not None for other in parts)
+    }
+    if plates:
+        forces = np.full((len(part), plates, 3), np.nan)
+        if part.forces is not None:
+            forces[:, : part.forces.shape[1]] = part.forces
+        lacking["forces"] = forces
+    return replace(part, **lacking)
+
+
+def demanded(path: str | os.PathLike[str], data: Joined) -> Joined:
+    """`data`, if a sample of it has plausible units and, where it has enough sequences to tell, axes and ground."""
+    chosen = [data.parts[index] for index in _spread(len(data.parts), SAMPLED) if len(data.parts[index])]
+    frames = concatenated([part[_spread(len(part), SAMPLED)] for part in chosen])
+    check.demand(Path(path), check.of_frames(frames if len(chosen) >= ENOUGH else replace(frames, ground=None)))
+    return data
+
+
+def plausible(file: Path, frames: Frames) -> Frames:
+    """The frames of one sequence, if their units can be right. Its axes do not tell: its person may lie throughout."""
+    check.demand(file, check.of_frames(replace(check.sample(frames), ground=None)))
+    return frames
+
+
+def judged(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Finding]:
+    """What can be told of sequences that are read one after the other: what is not right in each, and of all, by a
+    sample."""
+    found, some = [], []
+    for index, (name, read) in enumerate(parts):
+        try:
+            frames = read()
+        except (ValueError, ImportError) as error:
+            found.append(check.Finding("wrong", str(error)))
+            continue
+        few = frames[_spread(len(frames), check.SAMPLE)]
+        for each in check.of_frames(replace(few, ground=None)):
+            if each.level != "ok":
+                found.append(check.Finding(each.level, f"{name}: {each.what}", each.advice))
+        if index in _spread(len(parts), SAMPLED**2):
+            some.append(frames[_spread(len(frames), SAMPLED)])
+    try:
+        return found + (check.of_frames(concatenated(some)) if some else [])
+    except ValueError as error:  # they have other joints, or only some have a ground
+        return [*found, check.Finding("missing", str(error))]
+
+
+def told(name: str, frames: Frames) -> list[check.Finding]:
+    """What can be told of one recording, under its name."""
+    found = check.of_frames(check.sample(frames))
+    return [check.Finding(each.level, f"{name}: {each.what}", each.advice) for each in found]
+
+
+def numbered(name: str, count: int) -> NDArray[np.str_]:
+    """Names of the frames of a sequence: "name/00000", "name/00001", ..."""
+    return np.array([f"{name}/{number:05d}" for number in range(count)], np.str_)
+
+
+def _spread(count: int, most: int) -> NDArray[np.int64]:
+    """Up to `most` numbers from 0 to count - 1, evenly spaced."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))

@@ -1,0 +1,18 @@
+"""Error of the centre of mass."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from .alike import alike
+from .points import norm, vectors
+
+
+@alike
+def com_error(estimated: ArrayLike, true: ArrayLike) -> Any:
+    """Distance in space of two centres of mass, (..., 3) -> (...) m; NaN where one is not finite. ValueError where the
+    shapes differ."""
+    first, second = vectors("centres of mass", estimated, true)
+    return norm(first - second)

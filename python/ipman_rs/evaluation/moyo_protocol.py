@@ -1,0 +1,148 @@
+"""The biomechanics protocol of MoYo: pressure and centre of pressure of a body on a mat.
+
+The paper chooses α and γ of the pressure for every single frame, by a look at what was measured there: the best of a
+grid of 150. Such an oracle flatters; beside it stand the figures at one α and γ for all frames.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ipman_rs.checks import number
+
+from .alike import AnyGround, alike, as_array
+from .points import Array, norm, points, vector
+from .pressure_iou import PressureMode, as_measured, best_iou
+from .pressure_map import Mat, cells_of, normalised
+
+ALPHAS = np.linspace(10.0, 200.0, 10)  # 1/m
+GAMMAS = np.linspace(10.0, 5000.0, 15)  # 1/m
+
+
+class PressureFigures(NamedTuple):
+    """Figures of F frames, each (F,): pressure IoU, CoP error (m), mean difference of the maps, and at which α, γ."""
+
+    iou: Any
+    cop_error: Any
+    frame_difference: Any
+    alpha: Any
+    gamma: Any
+
+
+class MoyoFigures(NamedTuple):
+    """The three choices of the oracle, each by another figure, and the figures at fixed parameters."""
+
+    best_iou: PressureFigures
+    best_cop_error: PressureFigures
+    best_frame_difference: PressureFigures
+    fixed: PressureFigures
+
+
+@alike
+def moyo(
+    samples: ArrayLike,
+    ground: AnyGround,
+    mat: Mat,
+    center_of_pressure: ArrayLike,
+    alpha: float = 100.0,
+    gamma: float = 10.0,
+    pressure_mode: PressureMode = "paper",
+) -> Any:
+    """MoyoFigures of F bodies. samples (F, S, 3) m on their surfaces (`ipman_rs.sample_surface`).
+
+    The pressure of the samples on the mat is scaled to run from 0 to 1, summed in each cell, and scaled again. The
+    centre of pressure is that of all samples. NaN where the body is not finite, nothing was measured, or (CoP error)
+    the measured centre is NaN; IoU 0 where no sample lies over the mat.
+
+    Args:
+        mat: what was measured, `values` (F, H, W).
+        center_of_pressure: (F, 3) m, measured.
+        alpha, gamma: 1/m, those of the fixed figures.
+        pressure_mode: "released" leaves the measured maps in their own unit, as the authors' code does.
+
+    Raises:
+        ValueError: shapes do not fit.
+    """
+    bodies, centers = points("samples", samples), vector("center_of_pressure", center_of_pressure)
+    measured = np.asarray(as_array(mat.values), float)
+    if bodies.ndim != 3 or measured.ndim != 3 or centers.ndim != 2 or not len(bodies) == len(measured) == len(centers):
+        raise ValueError(
+            "samples, mat, center_of_pressure: expected (F, S, 3), values (F, H, W) and (F, 3), "
+            f"got {bodies.shape}, {measured.shape} and {centers.shape}"
+        )
+    own = number("alpha", alpha), number("gamma", gamma)
+    heights = ground.signed_height(bodies)
+    normals = np.broadcast_to(ground.normal, (len(bodies), 3))
+    found = np.full((len(bodies), 4, 5), np.nan)
+    for frame, truth in enumerate(as_measured(measured, pressure_mode)):
+        if np.isfinite(bodies[frame]).all():
+            cells = cells_of(bodies[frame], mat, frame)
+            frame_of = _Frame(bodies[frame], heights[frame], normals[frame], cells, truth, centers[frame])
+            grid = frame_of.figures(ALPHAS, GAMMAS)
+            fixed = frame_of.figures(np.array(own[:1]), np.array(own[1:]))
+            found[frame] = [*_choices(grid), fixed[0]]
+    return MoyoFigures(*(PressureFigures(*row.T) for row in found.transpose(1, 0, 2)))
+
+
+def _choices(grid: Array) -> list[Array]:
+    """Of figures (G, 5) those with the largest IoU, the least CoP error and the least difference of the maps; of equal
+    ones the last."""
+    costs = grid[:, :3] * [-1.0, 1.0, 1.0]
+    rows = [len(grid) - 1 - np.argmin(cost[::-1]) for cost in np.nan_to_num(costs, nan=np.inf).T]
+    return [np.where(np.isnan(grid[:, figure]).all(), np.nan, grid[row]) for figure, row in enumerate(rows)]
+
+
+class _Frame:
+    """One body over the mat. Pressure is 1 − αh below the ground and e^(−γh) above: sums of all samples are made of
+    sums that know α alone, or γ alone, so the grid of both costs their sum and not their product."""
+
+    def __init__(
+        self, body: Array, heights: Array, normal: Array, cells: NDArray[np.int64], truth: Array, center: Array
+    ) -> None:
+        self.body, self.normal, self.truth, self.center = body, normal, truth, center
+        self.heights, self.below = heights, heights < 0
+        self.cells = cells
+
+    def figures(self, alphas: Array, gammas: Array) -> Array:
+        """(A · G, 5), the fields of `PressureFigures`, α changing slowest."""
+        a, g = np.meshgrid(alphas, gammas, indexing="ij")
+        maps, centers = self._maps(alphas, gammas), self._centers(alphas, gammas)
+        apart = centers - self.center
+        along = apart - (apart @ self.normal)[..., None] * self.normal
+        figures = best_iou(maps, self.truth), norm(along), np.abs(maps - self.truth).mean(axis=(-2, -1)), a, g
+        return np.stack(figures, axis=-1).reshape(-1, 5)
+
+    def _centers(self, alphas: Array, gammas: Array) -> Array:
+        """Centres of pressure (A, G, 3)."""
+        heights = self.heights - max(self.heights.min(), 0.0)  # of a hovering body e^(−γh) would vanish; ratios stay
+        moments = np.column_stack([self.body, np.ones(len(self.body))])
+        low, high = moments[self.below], moments[~self.below]
+        deep = (1 - alphas[:, None] * heights[self.below]) @ low
+        above = np.exp(-gammas[:, None] * heights[~self.below]) @ high
+        total = deep[:, None] + above[None]
+        return total[..., :3] / total[..., 3:]
+
+    def _maps(self, alphas: Array, gammas: Array) -> Array:
+        """Maps (A, G, H, W), scaled to run from 0 to 1; 0 where no sample lies over the mat."""
+        size = self.truth.size
+        on = self.cells >= 0
+        if not on.any():
+            return np.zeros((len(alphas), len(gammas), *self.truth.shape))
+        low, high = on & self.below, on & ~self.below
+        deep = [1 - alpha * self.heights[low] for alpha in alphas]
+        above = [np.exp(-gamma * self.heights[high]) for gamma in gammas]
+        under = np.array([np.bincount(self.cells[low], each, size) for each in deep])
+        over = np.array([np.bincount(self.cells[high], each, size) for each in above])
+        least = np.minimum(_edge(np.min, deep)[:, None], _edge(np.min, above))
+        most = np.maximum(_edge(np.max, deep, -np.inf)[:, None], _edge(np.max, above, -np.inf))
+        number = np.bincount(self.cells[on], minlength=size)
+        sums = (under[:, None] + over - least[..., None] * number).clip(min=0)
+        sums[most <= least] = 0  # but for rounding
+        return normalised(sums.reshape(*most.shape, *self.truth.shape), (-2, -1))
+
+
+def _edge(kind: Any, rows: list[Array], empty: float = np.inf) -> Array:
+    return np.array([kind(row, initial=empty) for row in rows])

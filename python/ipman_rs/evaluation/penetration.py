@@ -1,0 +1,33 @@
+"""How deep a body goes into the ground, and how high it hovers above it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ipman_rs.ground import Ground
+
+from .alike import AnyGround, alike
+from .points import Array, points
+
+
+@alike
+def penetration(vertices: ArrayLike, ground: AnyGround) -> Any:
+    """Depth of the deepest vertex below the ground, 0 for a body above it: (..., V, 3) -> (...) m. NaN for a body that
+    is not finite."""
+    return (-lowest(vertices, ground)).clip(min=0)
+
+
+@alike
+def hover(vertices: ArrayLike, ground: AnyGround) -> Any:
+    """Height of the lowest vertex above the ground, 0 for a body that reaches it: (..., V, 3) -> (...) m. NaN for a
+    body that is not finite."""
+    return lowest(vertices, ground).clip(min=0)
+
+
+def lowest(vertices: ArrayLike, ground: Ground) -> Array:
+    """Signed height of the lowest vertex, (...) m; NaN for a body that is not finite."""
+    heights = ground.signed_height(points("vertices", vertices))
+    return np.where(np.isfinite(heights.max(axis=-1)), heights.min(axis=-1), np.nan)

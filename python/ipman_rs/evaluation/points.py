@@ -1,0 +1,59 @@
+"""Points of bodies as metrics take them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ipman_rs.arrays import plain
+
+Array = NDArray[np.float64]
+
+
+def points(name: str, value: ArrayLike) -> Array:
+    """(..., N, 3) in float64. ValueError for another shape, or no points; TypeError for what is no number."""
+    array = plain(name, value)
+    if array.ndim < 2 or array.shape[-1] != 3 or not array.shape[-2]:
+        raise ValueError(f"{name}: expected points (..., N, 3), got {array.shape}")
+    return array.astype(np.float64, copy=False)
+
+
+def pair(name: str, estimated: ArrayLike, true: ArrayLike) -> tuple[Array, Array]:
+    """Two arrays of corresponding points, of one shape (..., N, 3)."""
+    first, second = plain(name, estimated), plain(name, true)
+    _same(name, first, second, "(..., N, 3)")
+    return points(name, first), points(name, second)
+
+
+def vector(name: str, value: ArrayLike) -> Array:
+    """(..., 3) in float64."""
+    array = plain(name, value)
+    if not array.ndim or array.shape[-1] != 3:
+        raise ValueError(f"{name}: expected (..., 3), got {array.shape}")
+    return array.astype(np.float64, copy=False)
+
+
+def vectors(name: str, estimated: ArrayLike, true: ArrayLike) -> tuple[Array, Array]:
+    """Two arrays of one shape (..., 3)."""
+    first, second = plain(name, estimated), plain(name, true)
+    _same(name, first, second, "(..., 3)")
+    return vector(name, first), vector(name, second)
+
+
+def finite(bodies: Array) -> Array:
+    """Bodies (..., N, 3), NaN as a whole where one of their coordinates is not finite."""
+    return np.where(np.isfinite(bodies).all(axis=(-2, -1), keepdims=True), bodies, np.nan)
+
+
+def norm(difference: NDArray[Any]) -> Array:
+    """Lengths of (..., 3), NaN where one is not finite."""
+    x, y, z = (difference[..., axis] for axis in range(3))  # a sum along an axis of 3 takes several times as long
+    length = np.sqrt(x * x + y * y + z * z)
+    return np.where(np.isfinite(length), length, np.nan)
+
+
+def _same(name: str, first: NDArray[Any], second: NDArray[Any], expected: str) -> None:
+    if first.shape != second.shape:
+        raise ValueError(f"{name}: expected two arrays of one shape {expected}, got {first.shape} and {second.shape}")

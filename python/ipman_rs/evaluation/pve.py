@@ -1,0 +1,31 @@
+"""PVE: per-vertex error."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from .alike import alike
+from .points import norm, pair, vector
+
+
+@alike
+def pve(
+    estimated: ArrayLike, true: ArrayLike, root: ArrayLike | None = None, true_root: ArrayLike | None = None
+) -> Any:
+    """Mean distance of corresponding vertices, (..., V, 3) -> (...) m: in the world, or aligned at the roots.
+
+    Args:
+        root, true_root: (..., 3), such as the pelvis of each: both bodies are moved there first. Both or none.
+
+    Raises:
+        ValueError: shapes differ, or one root is missing.
+    """
+    first, second = pair("vertices", estimated, true)
+    if (root is None) != (true_root is None):
+        raise ValueError("root, true_root: expected both or none, got one")
+    if root is not None and true_root is not None:
+        first = first - vector("root", root)[..., None, :]
+        second = second - vector("true_root", true_root)[..., None, :]
+    return norm(first - second).mean(axis=-1)

@@ -1,0 +1,158 @@
+"""The figures of some frames: what can be said of them, given what the data set and the predictions have.
+
+A figure is a number a frame, NaN where it is undefined (no truth, no contact, a body that is not finite); one that no
+frame of the data set can have is not there at all.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import ipman_rs as ip
+from ipman_rs.body import BodyModel
+from ipman_rs.data.frames import Frames
+from ipman_rs.ground import Ground
+
+from .. import bose, com_error, cop_error, foot_skating, hover, moyo, mpjpe, pa_mpjpe, penetration, pve, reasons, tilt
+from .joints import joints_of, named
+from .models import Bodies
+
+if TYPE_CHECKING:
+    from .job import Job
+
+Columns = dict[str, NDArray[Any]]
+
+AT_ONCE = 256  # frames whose vertices lie in memory together
+SOLE = 0.02  # m: vertices of the feet that lie as near to the lowest in the rest pose
+_PELVIS = ("pelvis", "left_hip", "right_hip", "spine1")  # one rigid piece
+_METHODS = ("exact", "vertex_mean", "sample_mean", "face_area")  # beside pCoM
+
+
+def columns(job: Job, start: int, stop: int) -> Columns:
+    """`names`, `sequences` and the figures of the frames from `start` to `stop` of a job's data set, each (n,)."""
+    parts = []
+    for first in range(start, stop, AT_ONCE):
+        last = min(first + AT_ONCE, stop)
+        true, estimated, kept = job.pair(slice(max(first - 1, 0), last))  # skating: from the frame before
+        found = figures(true, estimated, job)
+        own = slice(int(len(kept) > 0 and kept[0] < first), None)
+        parts.append({name: value[own] for name, value in found.items()})
+    return joined(parts)
+
+
+def joined(parts: list[Columns]) -> Columns:
+    """One after the other; NaN where a part lacks a figure that another has."""
+    known = list(dict.fromkeys(name for part in parts for name in part))
+    lengths = [len(part["names"]) for part in parts]
+    return {
+        name: np.concatenate([part.get(name, np.full(n, np.nan)) for part, n in zip(parts, lengths, strict=True)])
+        for name in known
+    }
+
+
+def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
+    """Of frames that belong together row by row. ValueError where a body model is missing or shapes do not fit."""
+    truth, guess = job.bodies.posed(true), job.bodies.posed(estimated)
+    ground = true.ground if estimated.ground is None else estimated.ground
+    unknown = {"prediction not finite": ~_finite(guess, len(true)), "truth not finite": ~_finite(truth, len(true))}
+    found: Columns = {"names": true.names, "sequences": true.sequences, "why": reasons(unknown)}
+    found |= _points(truth, guess, job)
+    if ground is not None:
+        found |= _tilt(truth, guess, ground, true.ground or ground)
+        if guess.vertices is not None and guess.model is not None:
+            found |= _balance(guess.vertices, guess.model, ground, true)
+            found |= _mass(guess.vertices, guess.model, true)
+            found |= _pressure(guess.vertices, guess.model, ground, true, job.preset)
+            found["skating"] = foot_skating(guess.vertices[:, soles(guess.model)], ground, true.sequences)
+    return found
+
+
+def _finite(bodies: Bodies, count: int) -> NDArray[np.bool_]:
+    """Of vertices all; of joints some, for a data set may know a few of those that it names."""
+    if bodies.vertices is not None:
+        return np.asarray(np.isfinite(bodies.vertices).all(axis=(1, 2)))
+    if bodies.joints is None:
+        return np.ones(count, bool)
+    known: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(bodies.joints), axis=2)
+    return np.asarray(np.logical_or.reduce(known, axis=1))
+
+
+def _points(truth: Bodies, guess: Bodies, job: Job) -> Columns:
+    """Errors of joints and vertices."""
+    found: Columns = {}
+    compared = joints_of(truth, guess, job.known_joints, job.joint_regressor)
+    if compared is not None:
+        found["mpjpe"] = pve(compared.estimated, compared.true, compared.root, compared.true_root)
+        found["pa_mpjpe"] = pa_mpjpe(compared.estimated, compared.true)
+        found["mpjpe_world"] = mpjpe(compared.estimated, compared.true, root=None)
+    if truth.vertices is not None and guess.vertices is not None and truth.vertices.shape == guess.vertices.shape:
+        if compared is not None:
+            found["pve"] = pve(guess.vertices, truth.vertices, compared.root, compared.true_root)
+        found["pve_world"] = pve(guess.vertices, truth.vertices)
+    return found
+
+
+def _tilt(truth: Bodies, guess: Bodies, ground: Ground, true_ground: Ground) -> Columns:
+    if not {*_PELVIS} <= {*truth.joint_names} & {*guess.joint_names}:
+        return {}
+    return {"tilt": tilt(named(guess, _PELVIS), named(truth, _PELVIS), ground, true_ground)}
+
+
+def _balance(vertices: NDArray[Any], model: BodyModel, ground: Ground, true: Frames) -> Columns:
+    template = model.template
+    found: Columns = {
+        "bose": bose(vertices, template, ground),
+        "bose_3cm": bose(vertices, template, ground, threshold=0.03),
+        "bose_strict": bose(vertices, template, ground, bose_mode="strict"),
+        "penetration": penetration(vertices, ground),
+        "hover": hover(vertices, ground),
+    }
+    if true.standing is not None:
+        labels = np.asarray(true.standing, float)
+        if true.contact is not None:  # −1: in the air, as the authors label it
+            labels = np.where(true.contact, labels, -1.0)
+        found["bose_released"] = bose(vertices, template, ground, bose_mode="released", labels=labels)
+    return found
+
+
+def _mass(vertices: NDArray[Any], model: BodyModel, true: Frames) -> Columns:
+    """Errors of the centre of mass, by each formulation, where it was measured."""
+    if true.center_of_mass is None:
+        return {}
+    found = {"com_error": com_error(ip.center_of_mass(vertices, model.template), true.center_of_mass)}
+    for method in _METHODS:
+        center = ip.center_of_mass(vertices, model.template, method)
+        found[f"com_error_{method}"] = com_error(center, true.center_of_mass)
+    return found
+
+
+def _pressure(vertices: NDArray[Any], model: BodyModel, ground: Ground, true: Frames, preset: str) -> Columns:
+    """Where the ground carries the body, against what a mat or force plates measured."""
+    if true.center_of_pressure is None:
+        return {}
+    constants = ip.presets.get(preset)
+    if true.pressure is None:
+        curve = {"alpha": constants.alpha, "gamma": constants.gamma, "epsilon": constants.epsilon}
+        center = ip.center_of_pressure(vertices, model.template, ground, **curve)
+        return {"cop_error": cop_error(center, true.center_of_pressure, ground)}
+    samples = ip.sample_surface(vertices, model.template)
+    found = moyo(samples, ground, true.pressure, true.center_of_pressure, constants.alpha, constants.gamma)
+    return {
+        "pressure_iou": found.fixed.iou,
+        "cop_error": found.fixed.cop_error,
+        "pressure_iou_chosen": found.best_iou.iou,
+        "cop_error_chosen": found.best_cop_error.cop_error,
+    }
+
+
+@lru_cache(maxsize=4)
+def soles(model: BodyModel) -> NDArray[np.intp]:
+    """The vertices of a model's soles: those of the feet that are lowest in the zero pose."""
+    rest = model().vertices
+    feet = [k for k, name in enumerate(model.joint_names) if name.endswith(("_foot", "_ankle"))]
+    of_feet = np.isin(model.weights.argmax(axis=1), feet)
+    return np.flatnonzero(of_feet & (rest[:, 1] < rest[of_feet, 1].min() + SOLE))

@@ -1,0 +1,71 @@
+"""The figures of an evaluation: how each is called and shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+_JOINTS = "pelvis (or hips) and other joints of the same names in the data and in the predictions"
+_MESH = "bodies of one mesh in the data and in the predictions"
+_FLOOR = "a body model for the predictions, and a ground"
+_COM = "a measured centre of mass, and a body model for the predictions"
+_COP = "a measured centre of pressure, and what BoSE needs"
+_MAT = "a measured pressure map, and what BoSE needs"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number a frame, in the files in metres, radians or shares; shown times `factor` in `unit`.
+
+    better: −1 where less is better, 1 where more is. needs: without it no frame has the figure. undefined: why a frame
+    with a finite body may have none nevertheless.
+    """
+
+    title: str
+    unit: str
+    factor: float
+    digits: int
+    better: int
+    what: str
+    needs: str
+    undefined: str = "not measured"
+
+
+def _mm(title: str, what: str, needs: str, undefined: str = "not measured") -> Figure:
+    return Figure(title, "mm", 1e3, 1, -1, what, needs, undefined)
+
+
+def _percent(title: str, what: str, needs: str = _FLOOR) -> Figure:
+    return Figure(title, "%", 100.0, 1, 1, what, needs, "not labelled")
+
+
+def _share(title: str, what: str) -> Figure:
+    return Figure(title, "", 1.0, 3, 1, what, _MAT)
+
+
+FIGURES = {
+    "mpjpe": _mm("MPJPE", "mean distance of the joints, aligned at the pelvis", _JOINTS),
+    "pa_mpjpe": _mm("PA-MPJPE", "after the best rotation, scale and translation", _JOINTS),
+    "mpjpe_world": _mm("MPJPE world", "mean distance of the joints where they stand", _JOINTS),
+    "pve": _mm("PVE", "mean distance of the vertices, aligned at the pelvis", _MESH),
+    "pve_world": _mm("PVE world", "mean distance of the vertices where they stand", _MESH),
+    "bose": _percent("BoSE", "share with the centre of mass over the base of support, contacts within 10 cm"),
+    "bose_3cm": _percent("BoSE 3 cm", "contacts within 3 cm"),
+    "bose_strict": _percent("BoSE strict", "snapped to the floor, contacts within 2.5 cm"),
+    "bose_released": _percent("BoSE released", "what the authors' code prints: agreement with the label", "labels"),
+    "tilt": Figure("tilt", "°", 57.29577951308232, 2, -1, "of the pelvis, against gravity", f"{_JOINTS}, and a ground"),
+    "penetration": _mm("penetration", "of the lowest vertex into the ground", _FLOOR),
+    "hover": _mm("hover", "of the lowest vertex above the ground", _FLOOR),
+    "skating": _mm(
+        "skating", "way of the soles along the ground from the frame before, while they touch it", _FLOOR,
+        "soles not on the ground in both frames",
+    ),
+    "com_error": _mm("CoM error", "centre of mass (pCoM) against the measured one, in space", _COM),
+    "com_error_exact": _mm("CoM exact", "the same, centre of mass of the uniform solid", _COM),
+    "com_error_vertex_mean": _mm("CoM vertices", "the same, mean of the vertices", _COM),
+    "com_error_sample_mean": _mm("CoM samples", "the same, mean of uniform samples of the surface", _COM),
+    "com_error_face_area": _mm("CoM face area", "the same, faces weighed by their area", _COM),
+    "cop_error": _mm("CoP error", "centre of pressure against the measured one, along the ground", _COP),
+    "pressure_iou": _share("mIoU", "pressure against the mat's, fixed parameters"),
+    "cop_error_chosen": _mm("CoP chosen", "parameters chosen a frame for the best CoP, as MoYo's protocol does", _MAT),
+    "pressure_iou_chosen": _share("mIoU chosen", "parameters chosen a frame for the best IoU"),
+}  # fmt: skip

@@ -1,0 +1,273 @@
+"""One evaluation: predictions against a data set, in pieces that are done once and kept.
+
+A piece is a file of the figures of some thousand frames. It is named by its number, appears when it is whole, and says
+what it was made of. So an evaluation that is killed goes on where it was, any part of the pieces can be done elsewhere,
+and what comes out is the same: the final figures are made of all pieces, however they came about.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ipman_rs import __version__, data
+from ipman_rs.body import safe_npz
+from ipman_rs.data import check
+from ipman_rs.data.frames import DataSet, Frames
+from ipman_rs.ground import Ground
+
+from . import joints
+from . import predictions as predicted
+from .columns import Columns, columns
+from .models import Models
+from .rows import being_written
+
+PIECE = 4096  # frames: some seconds of work, and small in memory
+OWN = "own"  # the data set of the user's own files, in the form of predictions
+TRUTH = "truth"  # instead of a file of predictions: the data set's own bodies
+
+
+@dataclass(frozen=True)
+class Source:
+    """Which data set: plain words, so that another process, or another machine, can open the same."""
+
+    name: str
+    path: str
+    split: str | None = None
+    options: tuple[tuple[str, str | float], ...] = ()
+
+    def open(self, unpacked: Path) -> DataSet:
+        """ValueError naming the file where there is none or something is wrong."""
+        if self.name == OWN:
+            return predicted.read(self.path, unpacked)
+        if self.name not in data.DATASETS:
+            raise ValueError(f"data: expected {OWN}, or one of {', '.join(data.DATASETS)}, got {self.name!r}")
+        options = dict(self.options) if self.split is None else {"split": self.split, **dict(self.options)}
+        if not Path(self.path).exists():
+            raise ValueError(f"{self.path}: there is no such file or folder; it should hold the data set {self.name}")
+        return data.open(self.name, self.path, **options)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Number `index` of `count`, from 1: every count-th piece."""
+
+    index: int = 1
+    count: int = 1
+
+    def of(self, pieces: int) -> range:
+        return range(self.index - 1, pieces, self.count)
+
+
+@dataclass(frozen=True)
+class Job:
+    """The figures of one file of predictions, or of the data set's own bodies (`TRUTH`).
+
+    All words are plain: it travels to other processes.
+
+    folder: of the pieces. models: folder of model files. partial: frames without prediction are left out instead of
+    being an error.
+    """
+
+    name: str
+    predictions: str
+    source: Source
+    folder: str
+    models: str | None = None
+    regressor: str | None = None
+    preset: str = "paper-r"
+    partial: bool = False
+    piece: int = PIECE
+
+    @cached_property
+    def place(self) -> Path:
+        return Path(self.folder) / "methods" / self.name
+
+    @cached_property
+    def unpacked(self) -> Path:
+        return Path(self.folder) / "unpacked"
+
+    @cached_property
+    def data(self) -> DataSet:
+        return self.source.open(self.unpacked)
+
+    @cached_property
+    def estimates(self) -> predicted.Predictions:
+        return predicted.read(self.predictions, self.unpacked)
+
+    @cached_property
+    def bodies(self) -> Models:
+        return Models(None if self.models is None else Path(self.models))
+
+    @cached_property
+    def joint_regressor(self) -> NDArray[np.floating] | None:
+        return None if self.regressor is None else joints.read_regressor(Path(self.regressor))
+
+    @cached_property
+    def known_joints(self) -> frozenset[str]:
+        """Names of the true joints that have numbers in some frame of a sample."""
+        bodies = self.bodies.posed(check.sample(self.data))
+        if bodies.joints is None:
+            return frozenset()
+        named = enumerate(bodies.joint_names)
+        return frozenset(name for k, name in named if np.isfinite(bodies.joints[:, k]).all(axis=1).any())
+
+    @property
+    def pieces(self) -> int:
+        return -(-len(self.data) // self.piece)
+
+    def frames(self, number: int) -> int:
+        """How many frames a piece has."""
+        return min(self.piece, len(self.data) - number * self.piece)
+
+    def begin(self) -> None:
+        """Makes the folder; ValueError where it holds the figures of something else, or lengths cannot fit."""
+        _ = self.joint_regressor  # fails early
+        self.place.mkdir(parents=True, exist_ok=True)
+        file = self.place / "made_of.json"
+        if file.exists():
+            self._compare(json.loads(file.read_text()))
+        if self.predictions != TRUTH and len(self.estimates) < len(self.data) and not self.partial:
+            raise ValueError(
+                f"{self.predictions}: has {len(self.estimates):,} frames, but the data set {self.source.name} has "
+                f"{len(self.data):,}; --partial leaves out those without prediction"
+            )
+        if self.predictions != TRUTH:
+            self._check_axes()
+        with being_written(file) as out:
+            out.write((json.dumps(self.made_of, indent=1) + "\n").encode())
+
+    def _check_axes(self) -> None:
+        """ValueError where the estimated people lie or hang along another axis than the data set's up."""
+        some = check.sample(self.estimates)
+        ground = some.ground or self.data[slice(0, 1)].ground
+        bodies = self.bodies.posed(some)
+        if ground is None or bodies.joints is None:
+            return
+        normal = ground.normal if ground.normal.ndim == 1 else ground.normal[0]
+        standing = replace(some, joints=bodies.joints, joint_names=bodies.joint_names, ground=Ground(normal))
+        found = [each for each in check.of_frames(standing) if each.what.startswith("joints: looks like")]
+        check.demand(self.predictions, found)
+
+    @cached_property
+    def made_of(self) -> dict[str, Any]:
+        """All that decides the figures; no paths, for other machines have other ones."""
+        kinds = {self.data[slice(0, 1)].body}
+        if self.predictions != TRUTH:
+            kinds.add(self.estimates[slice(0, 1)].body)
+        files = [path for kind in kinds - {None} for path in self.bodies.files(str(kind))]
+        true = self.data
+        return {
+            "predictions": TRUTH if self.predictions == TRUTH else self.estimates.fingerprint,
+            "data": self.source.name,
+            "content": true.fingerprint
+            if isinstance(true, predicted.Predictions)
+            else _content(check.sample(true, 16)),
+            "split": self.source.split,
+            "options": [list(each) for each in self.source.options],
+            "frames": len(self.data),
+            "models": {path.name: predicted.fingerprint(path) for path in sorted(files)},
+            "regressor": None if self.regressor is None else predicted.fingerprint(Path(self.regressor)),
+            "preset": self.preset,
+            "partial": self.partial,
+            "piece": self.piece,
+            "version": __version__,
+        }
+
+    @cached_property
+    def key(self) -> str:
+        return hashlib.sha256(json.dumps(self.made_of, sort_keys=True).encode()).hexdigest()
+
+    def _compare(self, stored: dict[str, Any]) -> None:
+        other = [name for name, value in self.made_of.items() if stored.get(name) != value]
+        if other:
+            raise ValueError(
+                f"{self.place}: holds figures of another evaluation ({', '.join(other)} differ); choose another folder "
+                "with -o, or delete this one"
+            )
+
+    def run(self, shard: Shard, progress: Callable[[int], None] = lambda frames: None) -> None:
+        """Does the pieces of a shard that are not there yet; `progress` is told how many frames were done more."""
+        for number in shard.of(self.pieces):
+            if not self.done(number):
+                self.measure(number)
+                progress(self.frames(number))
+
+    def measure(self, number: int) -> None:
+        """Does a piece. ValueError where frames have no prediction or something does not fit."""
+        start = number * self.piece
+        found: dict[str, Any] = columns(self, start, start + self.frames(number))
+        with being_written(self.file(number)) as file:
+            np.savez(file, key=np.str_(self.key), **found)
+
+    def file(self, number: int) -> Path:
+        return self.place / f"{number:06d}.npz"
+
+    def done(self, number: int) -> bool:
+        """Whether a piece is there, whole, and of this evaluation."""
+        try:
+            return self.file(number).exists() and str(safe_npz.read(self.file(number), "key")) == self.key
+        except ValueError:
+            return False
+
+    def damaged(self) -> list[int]:
+        """Pieces that are there, but not whole or not of this evaluation: `run` does them again."""
+        return [number for number in range(self.pieces) if self.file(number).exists() and not self.done(number)]
+
+    def missing(self) -> list[int]:
+        return [number for number in range(self.pieces) if not self.done(number)]
+
+    def results(self) -> Iterator[Columns]:
+        """The figures of all pieces, in the order of the frames. ValueError where one is missing."""
+        for number in range(self.pieces):
+            yield self.result(number)
+
+    def result(self, number: int) -> Columns:
+        names = safe_npz.names(self.file(number)) - {"key"}
+        return {name: safe_npz.read(self.file(number), name) for name in sorted(names)}
+
+    def pair(self, rows: slice) -> tuple[Frames, Frames, NDArray[np.int64]]:
+        """True and estimated frames of the same names, and their numbers. ValueError where some have no estimate."""
+        true = self.data[rows]
+        if self.predictions == TRUTH:
+            return true, true, rows.start + np.arange(len(true))
+        where = self.estimates.index.find(true.names)
+        if (where < 0).any() and not self.partial:
+            lacking = true.names[where < 0]
+            raise ValueError(
+                f"{self.predictions}: no prediction for {len(lacking)} of the frames {true.names[0]} to "
+                f"{true.names[-1]} of {self.source.name}, such as {str(lacking[0])!r}; the file's names are like "
+                f"{str(self.estimates.columns['names'][:1][0])!r}; --partial leaves them out"
+            )
+        there = np.flatnonzero(where >= 0)
+        return true[there], self.estimates[where[there]], rows.start + there
+
+
+def _content(frames: Frames) -> str:
+    """Of the numbers of some frames: whether a data set is the same as before."""
+    digest = hashlib.sha256()
+    for field in fields(frames):
+        value = getattr(frames, field.name)
+        if isinstance(value, np.ndarray) and field.name != "images":  # which are paths
+            digest.update(f"{field.name} {value.shape} {value.dtype}".encode())
+            digest.update(np.ascontiguousarray(value).tobytes())
+    return digest.hexdigest()
+
+
+def methods(files: Sequence[Path]) -> list[str]:
+    """A name for each file of predictions, its own where no other has it."""
+    found: list[str] = []
+    for path in files:
+        name, number = path.stem, 2
+        while name in found:
+            name, number = f"{path.stem}-{number}", number + 1
+        found.append(name)
+    return found

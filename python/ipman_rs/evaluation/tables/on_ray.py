@@ -1,0 +1,87 @@
+"""The shards of an evaluation as tasks of Ray (the extra `ray`), on this machine or a cluster.
+
+The tasks write their pieces into the evaluation's folder, so on a cluster it must lie on a disk that all machines see,
+as must the predictions, the data and the models. What comes out is the same to the bit, for it is made of the pieces.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from .job import TRUTH, Job, Shard
+
+STORE = 80_000_000  # bytes, about the least that Ray takes
+
+
+def run(jobs: list[Job], progress: Callable[[int], None], address: str | None = None) -> None:
+    """Does what is missing. `progress` is told how many frames were done more. ValueError without ray, and for what the
+    tasks raise; their pieces are kept."""
+    try:
+        import ray  # pyright: ignore[reportMissingImports]
+    except ImportError as error:
+        raise ValueError("--ray needs ray: pip install 'ipman_rs[ray]'") from error
+    begun_here = not ray.is_initialized()
+    if begun_here:
+        quiet = {"include_dashboard": False, "log_to_driver": False, "configure_logging": False}
+        # Tasks send words only; where a cluster is joined, its store is as it is.
+        store = {} if address or os.environ.get("RAY_ADDRESS") else {"object_store_memory": STORE}
+        ray.init(address=address, **quiet, **store)
+    try:
+        _run(ray, jobs, progress)
+    finally:
+        if begun_here:
+            ray.shutdown()
+
+
+def _run(ray: Any, jobs: list[Job], progress: Callable[[int], None]) -> None:
+    tasks = ray.remote(num_cpus=1, max_retries=2)(_shard)
+    workers = max(1, int(ray.cluster_resources().get("CPU", 1)))
+    waiting = []
+    for job in map(_anywhere, jobs):
+        # Several a worker: they end at about the same time although pieces differ.
+        count = max(1, min(4 * workers, job.pieces))
+        waiting += [tasks.remote(job, Shard(index + 1, count)) for index in range(count)]
+    before = _there(jobs)
+    while waiting:
+        done, _ = ray.wait(list(waiting), num_returns=1, timeout=1.0)
+        for each in done:
+            waiting.remove(each)
+            try:
+                ray.get(each)
+            except ray.exceptions.RayTaskError as error:
+                raise ValueError(str(error.cause)) from None
+        now = _there(jobs)
+        progress(now - before)
+        before = now
+
+
+def _anywhere(job: Job) -> Job:
+    """The same job in words that another process understands: nothing opened, and whole paths."""
+
+    def whole(path: str | None) -> str | None:
+        return None if path is None else str(Path(path).resolve())
+
+    return replace(
+        job,
+        predictions=job.predictions if job.predictions == TRUTH else str(whole(job.predictions)),
+        source=replace(job.source, path=str(whole(job.source.path))),
+        folder=str(whole(job.folder)),
+        models=whole(job.models),
+        regressor=whole(job.regressor),
+    )
+
+
+def _there(jobs: list[Job]) -> int:
+    """Frames whose piece is there, whichever task wrote it."""
+    return sum(job.frames(number) for job in jobs for number in range(job.pieces) if job.file(number).exists())
+
+
+def _shard(job: Job, shard: Shard) -> None:
+    import ipman_rs
+
+    ipman_rs.set_num_threads(1)  # each task has one core
+    job.run(shard)

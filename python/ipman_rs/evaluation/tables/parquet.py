@@ -1,0 +1,116 @@
+"""Parquet files, by pyarrow (the extra `evaluate`): columns unpacked row by row, and a table written piece by piece."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from .rows import RowsOnDisk, being_written
+
+_BATCH = 4096  # rows
+
+
+def needed() -> tuple[Any, Any]:
+    """pyarrow and its Parquet module; ValueError where it is missing."""
+    try:
+        import pyarrow
+        import pyarrow.compute
+        import pyarrow.parquet
+    except ImportError as error:
+        raise ValueError("Parquet needs pyarrow: pip install 'ipman_rs[evaluate]'") from error
+    return pyarrow, pyarrow.parquet
+
+
+def read(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any]]:
+    """The columns of predictions, unpacked into a folder, and what is one for all frames. ValueError if damaged."""
+    from .predictions import FOR_ALL, NUMBERS, TEXT
+
+    pyarrow, _ = needed()
+    try:
+        with _opened(path) as file:
+            known = set(file.schema_arrow.names)
+            columns = {name: _unpacked(path, file, name, unpacked) for name in (*TEXT, *NUMBERS) if name in known}
+            common = {name: _one(path, file, name) for name in FOR_ALL if name in known and file.metadata.num_rows}
+    except (pyarrow.ArrowInvalid, pyarrow.ArrowNotImplementedError, OSError) as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            raise
+        raise ValueError(f"{path}: not a Parquet file that can be read ({error}); is it complete?") from error
+    return columns, common
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    _, parquet = needed()
+    # Buffered: otherwise a whole row group, often the whole file, comes into memory.
+    with parquet.ParquetFile(path, buffer_size=1 << 20, pre_buffer=False) as file:
+        yield file
+
+
+def _unpacked(path: Path, file: Any, name: str, folder: Path) -> RowsOnDisk:
+    place = folder / f"{name}.npy"
+    if not place.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        shape, dtype = _shape(path, file, name)
+        with being_written(place) as out:
+            npy.write_array_header_1_0(out, {"descr": dtype.str, "fortran_order": False, "shape": shape})
+            for rows in _batches(path, file, name):
+                if rows.shape[1:] != shape[1:]:
+                    raise ValueError(f"{path}: {name}: rows of {rows.shape[1:]} and of {shape[1:]} numbers")
+                out.write(np.ascontiguousarray(rows, dtype).tobytes())
+    with place.open("rb") as stored:
+        npy.read_magic(stored)
+        shape, _, dtype = npy.read_array_header_1_0(stored)
+        return RowsOnDisk(place, stored.tell(), dtype, tuple(shape))
+
+
+def _shape(path: Path, file: Any, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Of the whole column; text is as wide as its longest."""
+    row: tuple[int, ...] = ()
+    dtype = np.dtype("U1")
+    for number, rows in enumerate(_batches(path, file, name)):
+        dtype = np.promote_types(dtype, rows.dtype) if number and rows.dtype.kind == "U" else rows.dtype
+        row = row if number else rows.shape[1:]
+        if rows.dtype.kind != "U":
+            break
+    return (file.metadata.num_rows, *row), dtype
+
+
+def _batches(path: Path, file: Any, name: str) -> Iterator[NDArray[Any]]:
+    """The rows of a column, (n,) or (n, width), a batch after the other."""
+    pyarrow, _ = needed()
+    for batch in file.iter_batches(batch_size=_BATCH, columns=[name]):
+        column = batch.column(0)
+        count = len(column)
+        nested = False
+        while hasattr(column.type, "value_type") and not pyarrow.types.is_dictionary(column.type):
+            if column.null_count:
+                raise ValueError(f"{path}: {name}: a row is missing (null)")
+            lengths = pyarrow.compute.list_value_length(column).unique()
+            if len(lengths) > 1:
+                raise ValueError(f"{path}: {name}: rows of different lengths: {lengths.to_pylist()[:4]}")
+            column, nested = column.flatten(), True
+        if column.null_count:
+            raise ValueError(f"{path}: {name}: a value is missing (null)")
+        values = np.asarray(column.to_pylist(), str) if _is_text(column.type) else column.to_numpy(zero_copy_only=False)
+        yield values.reshape(count, -1) if nested and count else values
+
+
+def _is_text(kind: Any) -> bool:
+    types = needed()[0].types
+    return types.is_string(kind) or types.is_large_string(kind) or types.is_dictionary(kind)
+
+
+def _one(path: Path, file: Any, name: str) -> NDArray[Any]:
+    """What every row says. ValueError where they differ."""
+    first = None
+    for rows in _batches(path, file, name):
+        first = rows[0] if first is None else first
+        if (rows != first).any():
+            raise ValueError(f"{path}: {name}: expected one for all frames, got {first!r} and others")
+    return np.asarray(first)

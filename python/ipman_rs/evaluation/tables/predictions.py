@@ -1,0 +1,204 @@
+"""Estimated bodies in a file, .npz or .parquet, in the same form as those of a data set.
+
+| array | | |
+|---|---|---|
+| `names` | (F,) | of the frames, as the data set calls them; in any order |
+| `pose`, `betas`, `transl` | (F, J, 3) or (F, 3 J), (F, n), (F, 3) | rotation vectors, shape, metres |
+| `body` | one word | "smpl", "smplh", "smplx", "anny", "anny-lite": what `pose` is of |
+| `vertices`, `joints`, `joint_names` | (F, V, 3) m, (F, K, 3) m, (K,) | instead of parameters, or beside them |
+| `ground` | (4,) or (F, 4) | the normal and the height, if not the data set's |
+| `sequences`, `frame_rate`, `genders` | (F,), Hz, (F,) | |
+| `center_of_mass`, `center_of_pressure` | (F, 3) m | measured, in a data set of your own |
+| `standing`, `contact` | (F,) | labelled, in a data set of your own |
+
+`betas` and `ground` may be one row for all frames. In Parquet each is a column of that name, one list a frame; what is
+one for all frames is repeated. The data set "own" has the same form: `ipman evaluate estimated.npz --data own --path
+true.npz`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ipman_rs.body import safe_npz
+from ipman_rs.data import check
+from ipman_rs.data.frames import Frames, Rows
+from ipman_rs.ground import Ground
+
+from . import parquet
+from .rows import RowsOnDisk, of_npz
+
+TEXT = ("names", "sequences", "genders")
+LABELS = ("standing", "contact")
+NUMBERS = (
+    "pose", "betas", "transl", "vertices", "joints", "ground", "center_of_mass", "center_of_pressure", *LABELS,
+)  # fmt: skip
+POINTS = ("pose", "vertices", "joints")  # (F, n, 3)
+FOR_ALL = ("body", "joint_names", "frame_rate")
+
+
+@dataclass(frozen=True, eq=False)
+class Predictions:
+    """Reads like a data set: its length, and any of its frames."""
+
+    path: Path
+    columns: dict[str, RowsOnDisk]
+    common: dict[str, Any]  # what is one for all frames
+    fingerprint: str  # of the file's bytes
+
+    def __len__(self) -> int:
+        return len(self.columns["names"])
+
+    def __getitem__(self, rows: Rows) -> Frames:
+        found: dict[str, Any] = {name: column[rows] for name, column in self.columns.items()}
+        for name in POINTS:
+            if name in found:
+                found[name] = found[name].reshape(len(found[name]), int(np.prod(found[name].shape[1:])) // 3, 3)
+        for name in found.keys() & set(NUMBERS):
+            kind = found[name].dtype
+            found[name] = found[name].astype(bool if name in LABELS else np.promote_types(kind, "f4"))
+        if "betas" in self.common:
+            found["betas"] = np.repeat(self.common["betas"], len(found["names"]), axis=0)
+        if "ground" in found:
+            found["ground"] = _ground(found["ground"])
+        found.setdefault("sequences", found["names"])
+        return Frames(**{**self.common, **found})
+
+    @cached_property
+    def index(self) -> Names:
+        return Names.of(self)
+
+
+def read(path: str | Path, unpacked: Path) -> Predictions:
+    """The frames of an .npz or .parquet file (see above).
+
+    `unpacked`: folder for what cannot be read row by row where it is (compressed, or Parquet). ValueError naming the
+    file where it is missing or damaged, where arrays differ in length, or where units cannot be right.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ValueError(f"{path}: {'is a folder; name the file' if path.is_dir() else 'there is no such file'}")
+    if path.suffix.lower() not in (".npz", ".parquet"):
+        raise ValueError(f"{path}: expected predictions in .npz or .parquet, got {path.suffix or 'no ending'}")
+    content = fingerprint(path)
+    unpacked = unpacked / content[:16]
+    if path.suffix.lower() == ".parquet":
+        columns, common = parquet.read(path, unpacked)
+    else:
+        columns, common = _npz(path, unpacked)
+    found = Predictions(path, *_checked(path, columns, common), content)
+    check.demand(path, [each for each in check.of_frames(check.sample(found)) if not each.what.startswith("lowest of")])
+    return found
+
+
+def fingerprint(path: Path) -> str:
+    """Of a file's bytes: which predictions a result belongs to."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while chunk := file.read(1 << 20):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+def _npz(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any]]:
+    known = safe_npz.names(path) & {*TEXT, *NUMBERS, *FOR_ALL}
+    columns = {name: of_npz(path, name, unpacked) for name in sorted(known - {*FOR_ALL})}
+    common = {name: safe_npz.read(path, name) for name in sorted(known & {*FOR_ALL})}
+    return columns, common
+
+
+def _checked(
+    path: Path, columns: dict[str, RowsOnDisk], common: dict[str, Any]
+) -> tuple[dict[str, RowsOnDisk], dict[str, Any]]:
+    """Arrays whose lengths and shapes fit together, and what is one for all frames in its own type."""
+    if "names" not in columns:
+        raise ValueError(f"{path}: expected names, the name of each frame in the data set; {_has(columns)}")
+    if not columns.keys() & {*POINTS}:
+        raise ValueError(f"{path}: expected pose (with betas, transl and body), vertices or joints; {_has(columns)}")
+    if "pose" in columns and "body" not in common and "vertices" not in columns:
+        raise ValueError(f"{path}: pose without body: add body, one of smpl, smplh, smplx, anny, anny-lite")
+    frames = len(columns["names"])
+    common = {name: _word(name, value) for name, value in common.items()}
+    for name in ("betas", "ground"):
+        if name in columns and (len(columns[name].shape) == 1 or columns[name].shape[0] == 1 != frames):
+            row = columns.pop(name)[:].reshape(1, -1)
+            common[name] = row if name == "betas" else _ground(row[0])
+    for name, column in columns.items():
+        _check(f"{path}: {name}", name, column, frames)
+    return columns, common
+
+
+def _check(where: str, name: str, column: RowsOnDisk, frames: int) -> None:
+    kinds, what = ("US", "text") if name in TEXT else ("fiub", "numbers")
+    if column.dtype.kind not in kinds:
+        raise ValueError(f"{where}: expected {what}, got {column.dtype}")
+    if not column.shape or column.shape[0] != frames:
+        raise ValueError(f"{where}: expected {frames} rows, one for each of names, got shape {column.shape}")
+    row = column.shape[1:]
+    if name in POINTS and not (
+        len(row) in (1, 2) and row[-1] and (row[-1] == 3 or (len(row) == 1 and row[0] % 3 == 0))
+    ):
+        raise ValueError(f"{where}: expected ({frames}, n, 3) or ({frames}, 3 n), got {column.shape}")
+    expected = {"betas": row[:1], "ground": (4,), "transl": (3,), "center_of_mass": (3,), "center_of_pressure": (3,)}
+    if name not in POINTS and row != expected.get(name, ()):
+        raise ValueError(f"{where}: expected {(frames, *(expected.get(name) or ('n',)))}, got {column.shape}")
+
+
+def _word(name: str, value: NDArray[Any]) -> Any:
+    if name == "frame_rate":
+        return float(value)
+    return tuple(np.asarray(value).astype(str).tolist()) if name == "joint_names" else str(value)
+
+
+def _ground(rows: NDArray[Any]) -> Ground:
+    return Ground(rows[..., :3], rows[..., 3])
+
+
+def _has(columns: dict[str, RowsOnDisk]) -> str:
+    return f"it has {', '.join(sorted(columns)) or 'nothing of that'}"
+
+
+@dataclass(frozen=True, eq=False)
+class Names:
+    """Where each name stands in a file, in 16 bytes a name."""
+
+    column: RowsOnDisk
+    hashes: NDArray[np.uint64]  # sorted
+    rows: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, predictions: Predictions) -> Names:
+        """ValueError where a name stands twice."""
+        column = predictions.columns["names"]
+        hashes = np.concatenate([_hashes(block) for block in column.blocks()] or [np.zeros(0, np.uint64)])
+        rows = np.argsort(hashes, kind="stable")
+        hashes = hashes[rows]
+        twice = np.flatnonzero(hashes[1:] == hashes[:-1])
+        if len(twice):
+            name = column[rows[twice[:1]]][0]
+            raise ValueError(
+                f"{predictions.path}: names: {len(twice)} frames stand there more than once, such as {str(name)!r}"
+            )
+        return cls(column, hashes, rows)
+
+    def find(self, names: NDArray[np.str_]) -> NDArray[np.int64]:
+        """The row of each name, −1 where it does not stand there."""
+        if not len(self.rows):
+            return np.full(len(names), -1)
+        wanted = _hashes(names)
+        place = np.searchsorted(self.hashes, wanted).clip(max=len(self.hashes) - 1)
+        return np.where(self.hashes[place] == wanted, self.rows[place], -1)
+
+
+def _hashes(names: NDArray[Any]) -> NDArray[np.uint64]:
+    """64 bits of each name: of a million names two agree by chance in one file of 40 million."""
+    texts = np.char.encode(names, "utf-8") if names.dtype.kind == "U" else names
+    digests = b"".join(hashlib.blake2b(text, digest_size=8).digest() for text in texts.tolist())
+    return np.frombuffer(digests, np.uint64)

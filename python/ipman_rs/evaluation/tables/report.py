@@ -1,0 +1,310 @@
+"""What an evaluation writes: evaluation.md, .json, .csv, .svg, .png, sequences.csv and frames.parquet."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from ipman_rs import __version__
+
+from ..bootstrap import Interval
+from . import parquet
+from .figures import FIGURES, Figure
+from .job import Job
+from .paper import Table
+from .rows import being_written
+from .summary import EDGES, Difference, Measured, frames_of
+
+NAME = "evaluation"
+
+
+@dataclass(frozen=True)
+class Report:
+    """All that is known at the end."""
+
+    title: str
+    data: str
+    measured: Sequence[Measured]
+    differences: Sequence[Difference]
+    table: Table | None = None
+    notes: Sequence[str] = ()
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """Those of the table, or all that some method has."""
+        known = {name for each in self.measured for name in each.summary}
+        wanted = [name for name in FIGURES if name in known] if self.table is None else self.table.figures
+        return {name: FIGURES[name] for name in wanted}
+
+
+def write(report: Report, folder: Path, jobs: list[Job], progress: Callable[[int], None]) -> list[Path]:
+    """The files; `progress` is told how many frames more are in frames.parquet."""
+    files = {**{name: text.encode() for name, text in texts(report).items()}, **_plot(report)}
+    for name, content in files.items():
+        with being_written(folder / name) as file:
+            file.write(content)
+    written = [folder / name for name in files]
+    return [*written, *write_frames(folder / "frames.parquet", report, jobs, progress)]
+
+
+def texts(report: Report) -> dict[str, str]:
+    """The files by name, without pictures and frames."""
+    return {
+        f"{NAME}.md": markdown(report),
+        f"{NAME}.json": json.dumps(record(report), indent=1, allow_nan=False) + "\n",
+        f"{NAME}.csv": _csv(report),
+        "sequences.csv": _sequences(report),
+    }
+
+
+def markdown(report: Report) -> str:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent), trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )  # fmt: skip
+    return environment.get_template(f"{NAME}.md.j2").render(
+        report=report, figures=report.figures, table=rows(report), missing=_missing(report), version=__version__,
+        shown=shown, interval=_interval, verdict=_verdict,
+    )  # fmt: skip
+
+
+def shown(figure: Figure, value: float | None) -> str:
+    """A number in the figure's unit; a dash where there is none."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    return f"{value * figure.factor:.{figure.digits}f}".replace("-", "−")
+
+
+def rows(report: Report) -> tuple[list[str], list[list[str]]]:
+    """The table, printed figures above the measured ones: its head and its lines."""
+    figures = report.figures
+    columns: list[tuple[str, dict[str, str]]] = []
+    for method, printed in (report.table.published if report.table else {}).items():
+        told = {name: f"{value:.{FIGURES[name].digits}f}" for name, value in printed.items()}
+        columns.append((f"{method} (printed)", told))
+    for each in report.measured:
+        said = {}
+        for name, figure in figures.items():
+            found = each.intervals.get(name)
+            said[name] = "–" if found is None else _with_interval(figure, found)
+        columns.append((each.name, said))
+    titles = {name: f"{figure.title}{f', {figure.unit}' if figure.unit else ''}" for name, figure in figures.items()}
+    if report.table is None or report.table.across:
+        head = ["", *(name for name, _ in columns)]
+        return head, [[titles[key], *(said.get(key, "–") for _, said in columns)] for key in figures]
+    return ["", *titles.values()], [[name, *(said.get(key, "–") for key in figures)] for name, said in columns]
+
+
+def _with_interval(figure: Figure, found: Interval) -> str:
+    if not np.isfinite(found.low):
+        return shown(figure, found.mean)
+    return f"{shown(figure, found.mean)} [{shown(figure, found.low)}, {shown(figure, found.high)}]"
+
+
+def _interval(figure: Figure, found: Interval) -> str:
+    mean, low, high = (
+        f"{value * figure.factor:+.{figure.digits}f}".replace("-", "−") if np.isfinite(value) else "–"
+        for value in found
+    )
+    return f"{mean} [{low}, {high}]"
+
+
+def _verdict(figure: Figure, found: Interval) -> str:
+    if not found.excludes_zero or not figure.better:
+        return "no difference shown" if not found.excludes_zero else "differs"
+    return "better" if found.mean * figure.better > 0 else "worse"
+
+
+def _missing(report: Report) -> list[str]:
+    """What was left out, and why: a line for all figures of a method that lack the same frames."""
+    told: dict[tuple[str, str], list[str]] = {}
+    for each in report.measured:
+        for name, summary in each.summary.items():
+            why = ", ".join(f"{count:,} {reason}" for reason, count in sorted(summary.missing.items()))
+            if why and name in report.figures:
+                told.setdefault((f"{each.name}: {sum(summary.missing.values()):,} of {each.frames:,}", why), []).append(
+                    name
+                )
+    lacking: dict[str, list[str]] = {}
+    for name, figure in report.figures.items():
+        if not any(name in each.summary for each in report.measured):
+            lacking.setdefault(figure.needs, []).append(figure.title)
+    return [f"{', '.join(titles)}: not to be had without {needs}" for needs, titles in lacking.items()] + [
+        f"{frames} frames have no {', '.join(FIGURES[name].title for name in names)}: {why}"
+        for (frames, why), names in told.items()
+    ]
+
+
+def record(report: Report) -> dict[str, Any]:
+    """Everything as plain values, in the units of the files (metres, radians, shares); None for what is not finite."""
+
+    def plain(value: float) -> float | None:
+        return float(value) if np.isfinite(value) else None
+
+    return {
+        "version": __version__,
+        "title": report.title,
+        "data": report.data,
+        "notes": list(report.notes),
+        "units": {name: "shown in " + (f.unit or "1") + f", times {f.factor:g}" for name, f in FIGURES.items()},
+        "printed": {} if report.table is None else {k: dict(v) for k, v in report.table.published.items()},
+        "edges": EDGES.tolist(),
+        "methods": {
+            each.name: {
+                "frames": each.frames,
+                "figures": {
+                    name: {
+                        **{key: plain(getattr(each.summary[name], key)) for key in ("mean", "std", "least", "largest")},
+                        "interval": [plain(each.intervals[name].low), plain(each.intervals[name].high)],
+                        "frames": each.summary[name].frames,
+                        "sequences": len(each.clusters[name].names),
+                        "missing": dict(each.summary[name].missing),
+                    }
+                    for name in each.summary
+                },
+                "frames below": {name: counts.tolist() for name, counts in each.below.items()},
+            }
+            for each in report.measured
+        },
+        "differences": [
+            {
+                "method": each.name,
+                "baseline": each.baseline,
+                "figures": {
+                    name: {
+                        "mean": plain(found.mean),
+                        "interval": [plain(found.low), plain(found.high)],
+                        "p": each.p.get(name),
+                        "frames": each.frames[name],
+                    }
+                    for name, found in each.intervals.items()
+                },
+            }
+            for each in report.differences
+        ],
+    }
+
+
+def _csv(report: Report) -> str:
+    """A line a method and figure, in the units of the table."""
+    text = io.StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerow(["method", "figure", "unit", "mean", "low", "high", "std", "frames", "sequences", "without"])
+    for method, printed in (report.table.published if report.table else {}).items():
+        for name, value in printed.items():
+            lines.writerow([f"{method} (printed)", FIGURES[name].title, FIGURES[name].unit, value, *[""] * 6])
+    for each in report.measured:
+        for name, summary in each.summary.items():
+            figure, found = FIGURES[name], each.intervals[name]
+            numbers = [value * figure.factor for value in (summary.mean, found.low, found.high, summary.std)]
+            told = [repr(float(value)) if np.isfinite(value) else "" for value in numbers]
+            counts = [summary.frames, len(each.clusters[name].names), sum(summary.missing.values())]
+            lines.writerow([each.name, figure.title, figure.unit, *told, *counts])
+    for each in report.differences:
+        for name, found in each.intervals.items():
+            figure = FIGURES[name]
+            told = [
+                repr(float(v * figure.factor)) if np.isfinite(v) else "" for v in (found.mean, found.low, found.high)
+            ]
+            label = f"{each.name} − {each.baseline}"
+            lines.writerow([label, figure.title, figure.unit, *told, "", each.frames[name], "", ""])
+    return text.getvalue()
+
+
+def _sequences(report: Report) -> str:
+    """A line a method, sequence and figure; single images that are more than can be told apart are not listed."""
+    text = io.StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerow(["method", "sequence", "figure", "unit", "mean", "frames"])
+    for each in report.measured:
+        for name, found in each.clusters.items() if not each.pooled else ():
+            figure = FIGURES[name]
+            for sequence, total, count in zip(found.names, found.sums, found.counts, strict=True):
+                mean = repr(float(total / count * figure.factor))
+                lines.writerow([each.name, sequence, figure.title, figure.unit, mean, int(count)])
+    return text.getvalue()
+
+
+def _plot(report: Report) -> dict[str, bytes]:
+    """Shares of frames below an error, a picture a figure, and the differences with their intervals."""
+    import matplotlib
+    from matplotlib.figure import Figure as Picture
+
+    known = [name for name in report.figures if any(name in each.below for each in report.measured)]
+    panels = max(1, len(known) + len(report.differences))
+    wide = min(3, panels)
+    high = -(-panels // wide)
+    picture = Picture(figsize=(4.2 * wide, 3.2 * high), layout="constrained")
+    axes = picture.subplots(high, wide, squeeze=False).ravel()
+    for axis, name in zip(axes, known, strict=False):
+        _shares(axis, name, [each for each in report.measured if name in each.below and each.summary[name].frames])
+    if known and len(report.measured) > 1:
+        axes[0].legend(fontsize=8)
+    for axis, each in zip(axes[len(known) :], report.differences, strict=False):
+        means = {name: found.mean for name, found in report.measured[0].intervals.items()}
+        _differences(axis, each, {name: means[name] for name in report.figures if name in each.intervals})
+    for axis in axes[len(known) + len(report.differences) :]:
+        axis.set_axis_off()
+    svg, png = io.BytesIO(), io.BytesIO()
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}):
+        picture.savefig(svg, format="svg", metadata={"Date": None})
+        picture.savefig(png, format="png", dpi=130)
+    return {f"{NAME}.svg": svg.getvalue(), f"{NAME}.png": png.getvalue()}
+
+
+def _shares(axis: Any, name: str, methods: Sequence[Measured]) -> None:
+    """Of frames whose figure is under x, up to where all methods have almost all."""
+    figure, end = FIGURES[name], 1
+    for each in methods:
+        share = 100 * each.below[name] / each.summary[name].frames
+        axis.plot(EDGES * figure.factor, share, label=each.name)
+        end = max(end, int(np.searchsorted(share, 99.0)))
+    axis.set_xlim(0, EDGES[min(end, len(EDGES) - 1)] * figure.factor)
+    axis.set_xlabel(f"{figure.title}, {figure.unit}", fontsize=9)
+    axis.set_ylabel("% of frames below", fontsize=9)
+    axis.tick_params(labelsize=8)
+    axis.grid(alpha=0.3)
+
+
+def _differences(axis: Any, difference: Difference, means: Mapping[str, float]) -> None:
+    """In % of the baseline's means, so that figures of several units stand in one picture."""
+    drawn = [name for name, mean in means.items() if mean and np.isfinite(difference.intervals[name].low)]
+    for place, name in enumerate(drawn):
+        found = difference.intervals[name]
+        color = {"better": "#2e7d32", "worse": "#c62828"}.get(_verdict(FIGURES[name], found), "#777777")
+        mean, low, high = (100 * value / means[name] for value in found)
+        axis.errorbar(mean, -place, xerr=[[mean - low], [high - mean]], fmt="o", markersize=4, capsize=3, color=color)
+    axis.axvline(0, color="#999999", linewidth=0.8)
+    axis.set_yticks([-place for place in range(len(drawn))], [FIGURES[name].title for name in drawn])
+    axis.set_title(f"{difference.name} − {difference.baseline} (green: better)", fontsize=9)
+    axis.set_xlabel(f"% of {difference.baseline}'s mean", fontsize=9)
+    axis.tick_params(labelsize=8)
+
+
+def write_frames(path: Path, report: Report, jobs: list[Job], progress: Callable[[int], None]) -> list[Path]:
+    """Every frame's figures, method by method; nothing where pyarrow is missing."""
+    try:
+        pyarrow, writer = parquet.needed()
+    except ValueError:
+        return []
+    names = [name for name in FIGURES if any(name in each.summary for each in report.measured)]
+    text = ["method", "name", "sequence"]
+    schema = pyarrow.schema([(name, pyarrow.string()) for name in text] + [(name, pyarrow.float64()) for name in names])
+    with being_written(path) as file, writer.ParquetWriter(file, schema, compression="zstd") as table:
+        for method, piece in frames_of(jobs):
+            count = len(piece["names"])
+            columns = {"method": [method] * count, "name": piece["names"], "sequence": piece["sequences"]}
+            # Null where there is none: queries leave it out of means, which they do not with NaN.
+            numbers = {name: piece.get(name, np.full(count, np.nan)) for name in names}
+            columns |= {name: pyarrow.array(value, from_pandas=True) for name, value in numbers.items()}
+            table.write_table(pyarrow.table(columns, schema=schema))
+            progress(count)
+    return [path]

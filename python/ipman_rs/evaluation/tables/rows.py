@@ -1,0 +1,147 @@
+"""Arrays whose rows stay on disk until they are asked for: memory does not grow with their number."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from ipman_rs.data.frames import Rows
+
+BLOCK = 1 << 16  # rows that are gone through at a time
+_CHUNK = 1 << 22  # bytes that are unpacked at a time
+
+
+@dataclass(frozen=True)
+class RowsOnDisk:
+    """An array (n, ...) that lies in a file from a byte on, row after row."""
+
+    path: Path
+    offset: int
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, rows: Rows) -> NDArray[Any]:
+        """Those rows, in this order. OSError where the file has become shorter."""
+        numbers = np.arange(len(self))[rows] if isinstance(rows, slice) else np.asarray(rows)
+        found = np.empty((len(numbers), *self.shape[1:]), self.dtype)
+        width = self.dtype.itemsize * int(np.prod(self.shape[1:], dtype=int))
+        with self.path.open("rb", buffering=0) as file:
+            for start, stop in _runs(numbers):
+                file.seek(self.offset + int(numbers[start]) * width)
+                part = file.read((stop - start) * width)
+                if len(part) != (stop - start) * width:
+                    raise OSError(f"{self.path}: ends early; was it changed meanwhile?")
+                found[start:stop] = np.frombuffer(part, self.dtype).reshape(stop - start, *self.shape[1:])
+        return found
+
+    def blocks(self, size: int = BLOCK) -> Iterator[NDArray[Any]]:
+        """All rows, `size` after the other."""
+        for start in range(0, len(self), size):
+            yield self[start : start + size]
+
+
+def _runs(numbers: NDArray[np.integer]) -> Iterator[tuple[int, int]]:
+    """Stretches of numbers that follow each other, which are read at once."""
+    if not len(numbers):
+        return
+    ends = [*(np.flatnonzero(np.diff(numbers) != 1) + 1).tolist(), len(numbers)]
+    yield from zip([0, *ends[:-1]], ends, strict=True)
+
+
+def of_npz(path: Path, name: str, unpacked: Path) -> RowsOnDisk:
+    """Array `name` of an .npz file: where it lies in there, or, if it is compressed, unpacked once into a folder.
+
+    Nothing is executed. ValueError if it is damaged, holds Python objects, or lacks some of the bytes that it claims.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            member = archive.getinfo(f"{name}.npy")
+            if member.compress_type == zipfile.ZIP_STORED:
+                return _header(path, _start(path, member), member.file_size)
+            place = unpacked / f"{name}.npy"
+            if not place.exists():
+                unpacked.mkdir(parents=True, exist_ok=True)
+                with archive.open(member) as stream:
+                    _copy(stream, place, member.file_size)
+        return _header(place, 0, member.file_size)
+    except Exception as error:  # damaged bytes can fail in any way (zlib, struct, header syntax)
+        if isinstance(error, OSError) and error.errno is not None:
+            raise  # the disk is full, say, which is no fault of the file
+        raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
+
+
+def _start(path: Path, member: zipfile.ZipInfo) -> int:
+    """The first byte of a member's content, behind the header that stands before it."""
+    with path.open("rb") as file:
+        file.seek(member.header_offset)
+        header = file.read(30)
+    if header[:4] != b"PK\x03\x04":
+        raise ValueError("its place in the archive is wrong")
+    return member.header_offset + 30 + int.from_bytes(header[26:28], "little") + int.from_bytes(header[28:30], "little")
+
+
+def _header(path: Path, start: int, size: int) -> RowsOnDisk:
+    """What the header of an array says that starts at a byte and has `size` bytes with it."""
+    with path.open("rb") as file:
+        file.seek(start)
+        reader = npy.read_array_header_1_0 if npy.read_magic(file)[0] == 1 else npy.read_array_header_2_0
+        shape, fortran, dtype = reader(file)
+        offset = file.tell()
+    if dtype.hasobject:
+        raise ValueError(
+            "holds Python objects, which are not loaded; save plain numbers, and names by np.array(x, str)"
+        )
+    if fortran and len(shape) > 1:
+        raise ValueError("is stored column by column; save np.ascontiguousarray of it")
+    count = int(np.prod([int(number) for number in shape], dtype=object))
+    if count * dtype.itemsize != size - (offset - start) or start + size > path.stat().st_size:
+        raise ValueError(f"claims shape {shape} of {dtype}, but carries {size - (offset - start)} bytes")
+    return RowsOnDisk(path, offset, dtype, tuple(shape))
+
+
+def _copy(stream: Any, place: Path, size: int) -> None:
+    """The bytes of a stream into a file that appears once it is whole."""
+    with being_written(place) as file:
+        copied = 0
+        while chunk := stream.read(_CHUNK):
+            copied += len(chunk)
+            if copied > size:
+                raise ValueError(f"unpacks to more than the {size} bytes that it claims")
+            file.write(chunk)
+
+
+class being_written:
+    """A file that appears under its name when it is whole: a process that dies leaves the old one, or none.
+
+    with being_written(path) as file: file.write(...)
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.part = path.with_name(f".{path.name}.{os.getpid()}.part")
+
+    def __enter__(self) -> BinaryIO:
+        self.file = self.part.open("wb")
+        return self.file
+
+    def __exit__(self, kind: Any, *_: Any) -> None:
+        try:
+            with self.file:
+                if kind is None:
+                    self.file.flush()
+                    os.fsync(self.file.fileno())
+            if kind is None:
+                os.replace(self.part, self.path)
+        finally:
+            self.part.unlink(missing_ok=True)

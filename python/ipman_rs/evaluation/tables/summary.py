@@ -1,0 +1,108 @@
+"""The figures of all pieces, added up: means with intervals, distributions, and differences of two methods."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..accumulator import Accumulator, Clusters
+from ..bootstrap import Interval
+from ..column import Summary
+from ..sign_flip import sign_flip
+from .columns import Columns
+from .figures import FIGURES
+from .job import Job
+
+# The frames below each of these are counted, of figures that are lengths or angles: a tenth of a millimetre to 10 m.
+EDGES = np.logspace(-4, 1, 251)
+
+
+@dataclass
+class Measured:
+    """One method over all frames."""
+
+    name: str
+    summary: dict[str, Summary]
+    intervals: dict[str, Interval]
+    below: dict[str, NDArray[np.int64]]  # frames whose figure is under each of EDGES
+    frames: int
+    clusters: dict[str, Clusters]  # the figures of each sequence
+    pooled: bool  # there were too many sequences to keep each
+
+
+@dataclass
+class Difference:
+    """One method less another, on the frames where both have the figure."""
+
+    name: str
+    baseline: str
+    intervals: dict[str, Interval]
+    p: dict[str, float]  # of the sign-flip test over sequences
+    frames: dict[str, int]
+
+
+@dataclass
+class _Sums:
+    sums: Accumulator = field(default_factory=Accumulator)
+    below: dict[str, NDArray[np.int64]] = field(default_factory=dict)
+    frames: int = 0
+
+    def add(self, piece: Columns) -> None:
+        figures = {name: value for name, value in piece.items() if name in FIGURES}
+        why = {name: np.where(piece["why"] == "", FIGURES[name].undefined, piece["why"]) for name in figures}
+        self.sums.add(figures, piece["names"], piece["sequences"], why)
+        self.frames += len(piece["names"])
+        for name, value in figures.items():
+            if FIGURES[name].unit in ("mm", "°"):
+                counts = np.searchsorted(np.sort(value[np.isfinite(value)]), EDGES)
+                self.below[name] = self.below.get(name, 0) + counts
+
+
+def measured(job: Job, progress: Callable[[int], None] = lambda frames: None) -> Measured:
+    """Of all pieces of a job. ValueError where one is missing or damaged."""
+    sums = _Sums()
+    for piece in job.results():
+        sums.add(piece)
+        progress(len(piece["names"]))
+    total = sums.sums
+    summary = _ordered(total.summary())
+    clusters = {name: total.clusters(name) for name in summary}
+    return Measured(job.name, summary, total.intervals(), sums.below, sums.frames, clusters, total.is_pooled)
+
+
+def difference(job: Job, baseline: Job, progress: Callable[[int], None] = lambda frames: None) -> Difference:
+    """Of two jobs on the same data. ValueError where a piece is missing or damaged."""
+    sums = Accumulator()
+    for own, other in zip(job.results(), baseline.results(), strict=True):
+        both, mine, theirs = _common(own, other)
+        shared = [name for name in FIGURES if name in own and name in other]
+        figures = {name: own[name][mine] - other[name][theirs] for name in shared}
+        sums.add(figures, both, own["sequences"][mine])
+        progress(len(own["names"]))
+    summary = sums.summary()
+    p = {name: sign_flip(sums.clusters(name).sums) for name, each in summary.items() if each.frames}
+    frames = {name: each.frames for name, each in summary.items()}
+    return Difference(job.name, baseline.name, _ordered(sums.intervals()), p, frames)
+
+
+def _common(own: Columns, other: Columns) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """The names that two pieces share, and their rows in each: --partial may have left out others in each."""
+    if np.array_equal(own["names"], other["names"]):
+        rows = np.arange(len(own["names"]))
+        return own["names"], rows, rows
+    return np.intersect1d(own["names"], other["names"], return_indices=True)
+
+
+def _ordered(found: dict[str, Any]) -> dict[str, Any]:
+    return {name: found[name] for name in FIGURES if name in found}
+
+
+def frames_of(jobs: list[Job]) -> Iterator[tuple[str, Columns]]:
+    """Method and figures, piece by piece."""
+    for job in jobs:
+        for piece in job.results():
+            yield job.name, piece

@@ -1,0 +1,184 @@
+"""A recording's bodies beside what was measured of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ipman_rs.ground import Ground
+
+from ..data.force_plates import ForcePlates
+from .acceleration import CUTOFF, accelerations
+from .computed import Computed, carried
+from .zero_moment_point import GRAVITY, along_force, zero_moment_point, zero_moment_point_of_parts
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+STILL = 0.015  # m: rms of the centre of mass about its mean, of somebody who stands
+LOW, SLOW = 0.03, 0.5  # m, m/s: what is on the floor is lower and slower
+ANYWHERE = 0.5  # m: a reference farther from the body is in other units or axes
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """T frames at `times`; `plates`, y up, and `reference`, a centre of mass (T, 3) m, at these times.
+
+    NaN where nothing was measured. `seen` (T,): where enough markers were seen to say where the body is. ValueError
+    where what was measured is nowhere near the body: in other units or axes.
+    """
+
+    name: str
+    times: Array  # (T,) s
+    computed: Computed
+    plates: ForcePlates | None = None
+    reference: Array | None = None
+    seen: Mask | None = None
+
+    def __post_init__(self) -> None:
+        for what, points in (("centre of mass", self.reference), ("centre of pressure", self.measured)):
+            if points is None:
+                continue
+            away = distances(points, self.com)
+            away = away[np.isfinite(away) if self.seen is None else np.isfinite(away) & self.seen]
+            if len(away) and np.median(away) > ANYWHERE:
+                raise ValueError(
+                    f"{self.name}: the measured {what} is {np.median(away):.2f} m beside the body fitted to the "
+                    "markers; expected both in the same axes, y up, and in metres (or a file that says its units)"
+                )
+
+    @property
+    def rate(self) -> float:
+        """Frames a second."""
+        return (len(self.times) - 1) / float(self.times[-1] - self.times[0]) if len(self.times) > 1 else 0.0
+
+    @property
+    def com(self) -> Array:
+        """(T, 3) m, of the whole volume."""
+        return self.computed.com["exact"]
+
+    @cached_property
+    def measured(self) -> Array | None:
+        """The measured centre of pressure (T, 3) m."""
+        return None if self.plates is None else self.plates.center()
+
+    @property
+    def force(self) -> Array:
+        """Of all plates (T, 3) N, less what they read with nobody on them; NaN without plates."""
+        if self.plates is None:
+            return np.full_like(self.com, np.nan)
+        return self.plates.forces.sum(axis=1) - self.unloaded
+
+    @cached_property
+    def unloaded(self) -> Array:
+        """(3,) N: the median of all plates' force in the frames in which none carries a load; 0 if there are none."""
+        if self.plates is None:
+            return np.zeros(3)
+        empty = (carried(self.plates) == 0).all(axis=1) & np.isfinite(self.plates.forces).all(axis=(1, 2))
+        return np.median(self.plates.forces.sum(axis=1)[empty], axis=0) if empty.any() else np.zeros(3)
+
+    @cached_property
+    def floor(self) -> Ground:
+        """At the mean height of the measured centres of pressure, or of the lowest vertex of all frames."""
+        if self.measured is not None and np.isfinite(self.measured).any():
+            return Ground.y_up(float(np.nanmean(self.measured[:, 1])))
+        return Ground.y_up(float(np.nanmin(self.computed.lowest)))
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """Of the centre of mass (T, 3) m/s²; NaN at both ends, and throughout if the frames are too far apart."""
+        return self._accelerations(self.com)
+
+    def _accelerations(self, points: Array) -> Array:
+        return np.full_like(points, np.nan) if self.rate < 4 * CUTOFF else accelerations(points, self.rate)
+
+    @cached_property
+    def zmp(self) -> Array:
+        """The zero-moment point (T, 3) m of the body's parts, each as heavy as its mean volume × 985 kg/m³."""
+        centers = self.computed.part_centers
+        masses = self.computed.part_masses.mean(axis=0)
+        return zero_moment_point_of_parts(masses, centers, self._accelerations(centers), self.floor)
+
+    @cached_property
+    def complete(self) -> Mask:
+        """(T,): the body was seen, something is loaded, and no foot is on the floor beside the plates, as far as their
+        outlines are known."""
+        if self.plates is None or self.measured is None:
+            return np.zeros(len(self.times), bool)
+        loaded = np.isfinite(self.measured[:, 0])
+        loaded = loaded if self.seen is None else loaded & self.seen
+        return loaded & ~beside_plates(self.computed.soles, self.rate, self.floor, self.plates.corners)
+
+    @cached_property
+    def kind(self) -> str:
+        """ "walking", where plates carry all the load by turns; "quiet standing", or "movement in place"."""
+        if self.plates is not None:
+            loaded = carried(self.plates)[self.complete] > 0
+            if loaded[loaded.sum(axis=1) == 1].any(axis=0).sum() > 1:
+                return "walking"
+        com = self.com if self.seen is None else self.com[self.seen]
+        return "quiet standing" if np.sqrt(np.nanvar(com, axis=0).sum()) < STILL else "movement in place"
+
+    @cached_property
+    def phases(self) -> Mapping[str, Mask]:
+        """The complete frames; of walking, those on one plate and those on two apart."""
+        if self.kind != "walking":
+            return {"all": self.complete}
+        assert self.plates is not None
+        count = (carried(self.plates) > 0).sum(axis=1)
+        return {"single support": self.complete & (count == 1), "double support": self.complete & (count == 2)}
+
+    @cached_property
+    def weights(self) -> Array:
+        """Kilograms by the plates (T,): upward force / (g + acceleration), of the complete frames."""
+        if self.plates is None:
+            return np.full(len(self.times), np.nan)
+        upward = np.nan_to_num(self.acceleration[:, 1]) if self.kind == "quiet standing" else self.acceleration[:, 1]
+        return np.where(self.complete, self.force[:, 1] / (GRAVITY + upward), np.nan)
+
+    @cached_property
+    def weight(self) -> float:
+        """Kilograms by the plates: mean upward force / mean of g + acceleration, over the complete frames."""
+        used = np.isfinite(self.weights)
+        if self.plates is None or not used.any():
+            return np.nan
+        upward = np.nan_to_num(self.acceleration[used, 1])
+        return float(self.force[used, 1].mean() / (GRAVITY + upward.mean()))
+
+    @cached_property
+    def centers(self) -> Mapping[str, Array]:
+        """Where the centre of pressure should be (T, 3) m, by name: of a body at rest, of a moving one, and by the
+        paper's formula for each γ."""
+        found = {"at rest: g(CoM)": self.floor.project(self.com)}
+        if self.plates is not None:
+            found["moving: ZMP of the CoM"] = zero_moment_point(self.com, self.acceleration, self.floor)
+            found["moving: ZMP of the parts"] = self.zmp
+            found["CoM along the force"] = along_force(self.com, self.force, self.floor)
+        return {**found, **{f"γ = {gamma}": points for gamma, points in self.computed.cop.items()}}
+
+
+def beside_plates(soles: Array, rate: float, floor: Ground, outlines: Array | None) -> Mask:
+    """(T,): whether any point of the soles (T, n, 3) m is on the floor and within no plate's outline (P, 4, 3) m."""
+    if outlines is None or len(soles) < 2:
+        return np.zeros(len(soles), bool)
+    speed = np.linalg.norm(np.gradient(soles, 1 / rate, axis=0), axis=-1)
+    down = (floor.signed_height(soles) < LOW) & (speed < SLOW)
+    on_plate = np.stack([_within(soles[..., [0, 2]], outline[:, [0, 2]]) for outline in outlines]).any(axis=0)
+    return (down & ~on_plate).any(axis=1)
+
+
+def _within(points: Array, outline: Array) -> Mask:
+    """Whether points (..., 2) are in a convex polygon (n, 2), whichever way round."""
+    edges = np.roll(outline, -1, axis=0) - outline
+    away = points[..., None, :] - outline
+    side = edges[:, 0] * away[..., 1] - edges[:, 1] * away[..., 0]
+    return np.asarray((side >= 0).all(axis=-1) | (side <= 0).all(axis=-1))
+
+
+def distances(points: Array, others: Array) -> Array:
+    """On the floor (T,) m."""
+    return np.linalg.norm((points - others)[:, [0, 2]], axis=1)

@@ -1,0 +1,121 @@
+"""What the engine says of bodies over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import ipman_rs as ip
+
+from ..analysis import PIECE
+from ..body.sequence import PosedSequence, pieces
+from ..data.force_plates import LOADED, ForcePlates
+
+Array = NDArray[np.float64]
+
+METHODS = ("exact", "pcom", "sample_mean", "face_area", "vertex_mean")
+GAMMAS = (5, 10, 20, 50, 100, 200)  # 1/m; the paper's is 10
+ALPHA, GAMMA = 100.0, 10.0
+SOLE = 0.03  # m
+
+
+@dataclass(frozen=True, eq=False)
+class Computed:
+    """Of T bodies: volume × 985 kg/m³, centres of mass by method and centres of pressure by γ.
+
+    `soles`: the vertices of both soles. `shares`: how much of the pressure, at γ = 10, is on the first plate's side
+    where two carry a load; NaN elsewhere.
+    """
+
+    mass: Array  # (T,) kg
+    part_masses: Array  # (T, P) kg
+    part_centers: Array  # (T, P, 3) m
+    lowest: Array  # (T,) m, of the lowest vertex
+    com: Mapping[str, Array]  # (T, 3) m
+    cop: Mapping[int, Array]  # (T, 3) m
+    soles: Array  # (T, n, 3) m
+    shares: Array  # (T,)
+
+
+def computed(
+    bodies: PosedSequence | NDArray[np.floating],
+    template: ip.BodyTemplate,
+    plates: ForcePlates | None = None,
+    progress: Callable[[int], None] = lambda _done: None,
+) -> Computed:
+    """The engine's figures of bodies, y up, vertices (T, V, 3) m; `plates` at the same times.
+
+    Each body's ground for the pressure lies under its lowest vertex: people wear shoes, fitted bodies do not, and the
+    formula knows heights only. `progress` hears how many bodies are done.
+    """
+    rows: list[Computed] = []
+    done = 0
+    for vertices in pieces(bodies, PIECE):
+        part = slice(done, done + len(vertices))
+        rows.append(
+            _piece(vertices, template, None if plates is None else (carried(plates)[part], plates.points[part]))
+        )
+        done += len(vertices)
+        progress(done)
+    return Computed(
+        np.concatenate([row.mass for row in rows]),
+        np.concatenate([row.part_masses for row in rows]),
+        np.concatenate([row.part_centers for row in rows]),
+        np.concatenate([row.lowest for row in rows]),
+        {method: np.concatenate([row.com[method] for row in rows]) for method in METHODS},
+        {gamma: np.concatenate([row.cop[gamma] for row in rows]) for gamma in GAMMAS},
+        np.concatenate([row.soles for row in rows]),
+        np.concatenate([row.shares for row in rows]),
+    )
+
+
+def _piece(vertices: NDArray[np.floating], template: ip.BodyTemplate, plates: tuple[Array, Array] | None) -> Computed:
+    ground = under(vertices)
+    com = {method: np.asarray(ip.center_of_mass(vertices, template, method), float) for method in METHODS}
+    cop = {
+        gamma: np.asarray(ip.center_of_pressure(vertices, template, ground, ALPHA, gamma), float) for gamma in GAMMAS
+    }
+    solid = ip.mass_properties(vertices, template)
+    assert solid.parts is not None
+    mass, masses, centers = (np.asarray(v, float) for v in (solid.mass, solid.parts.mass, solid.parts.center))
+    shares = np.full(len(vertices), np.nan)
+    if plates is not None:
+        rho = np.asarray(ip.pressure(vertices, template, ground, ALPHA, GAMMA), float)
+        shares = first_shares(np.asarray(ip.sample_surface(vertices, template), float), rho, *plates)
+    soles = np.asarray(vertices[:, sole_vertices(template)], float)
+    return Computed(mass, masses, centers, ground.height, com, cop, soles, shares)
+
+
+def sole_vertices(template: ip.BodyTemplate) -> NDArray[np.int64]:
+    """The vertices of both lower legs that are less than 3 cm above the lowest in the resting pose."""
+    parts = [template.part_names.index(f"{side}_lower_leg") for side in ("left", "right")]
+    rows = np.unique(template.faces[np.isin(template.face_parts, parts)])
+    height = template.vertices[rows, 1]
+    return rows[height < height.min() + SOLE]
+
+
+def carried(plates: ForcePlates) -> Array:
+    """(T, P) N upwards; 0 for plates that carry no more than `LOADED`, of whose centres nothing is known."""
+    return np.where(plates.loads > LOADED, plates.loads, 0.0)
+
+
+def under(vertices: NDArray[np.floating]) -> ip.Ground:
+    """The level ground under the lowest vertex of each body (..., V, 3)."""
+    lowest = np.nan_to_num(np.asarray(vertices[..., 1].min(axis=-1), float))  # a ground is finite
+    return ip.Ground(np.broadcast_to([0.0, 1.0, 0.0], (*lowest.shape, 3)), lowest)
+
+
+def first_shares(points: Array, pressure: Array, loads: Array, centers: Array) -> Array:
+    """The part (T,) of the pressure (T, S) at points (T, S, 3) nearer to the first of two loaded plates' centres.
+
+    loads (T, P) and centers (T, P, 3) m of the plates; NaN where not exactly two carry a load.
+    """
+    found = np.full(len(points), np.nan)
+    for row in np.flatnonzero((loads > 0).sum(axis=1) == 2):
+        first, second = (centers[row, plate, [0, 2]] for plate in np.flatnonzero(loads[row] > 0))
+        across = (points[row][:, [0, 2]] - (first + second) / 2) @ (second - first)
+        found[row] = pressure[row, across < 0].sum() / pressure[row].sum()
+    return found

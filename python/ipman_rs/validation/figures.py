@@ -1,0 +1,156 @@
+"""The figures of a comparison, as plain values in metres, kilograms and newtons; None where there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ipman_rs.plain import plain
+
+from .comparison import Comparison, distances
+from .computed import METHODS, carried
+from .zero_moment_point import GRAVITY, along_force
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def figures(one: Comparison) -> dict[str, Any]:
+    """All that `report` prints of a recording."""
+    mass = one.computed.mass if one.seen is None else one.computed.mass[one.seen]
+    return plain(
+        {
+            "name": one.name,
+            "kind": one.kind,
+            "frames": len(one.times),
+            "rate_hz": one.rate,
+            "complete_frames": int(one.complete.sum()),
+            "mass": {
+                "volume_mean": mass.mean(),
+                "volume_least": mass.min(),
+                "volume_most": mass.max(),
+                "plates": one.weight,
+                "plates_std": _std(one.weights),
+            },
+            "unloaded_force": one.unloaded,
+            "force": _force(one),
+            "com": _against_reference(one),
+            "standing": _standing(one),
+            "cop": {phase: _centers(one, mask) for phase, mask in one.phases.items()} if one.plates else {},
+            "shares": _shares(one),
+        }
+    )
+
+
+def _std(values: Array) -> float | None:
+    return float(np.nanstd(values)) if np.isfinite(values).any() else None
+
+
+def _force(one: Comparison) -> dict[str, Any] | None:
+    """The upward force that the fitted body's acceleration asks for, m (g + a), against the plates', N and as a share
+    of the weight; `at_rest`: the weight itself against the plates'."""
+    if one.plates is None:
+        return None
+    used = one.complete & np.isfinite(one.acceleration[:, 1])
+    if not used.any():
+        return None
+    weight, upward = one.weight * GRAVITY, one.force[used, 1]
+    off = one.weight * (GRAVITY + one.acceleration[used, 1]) - upward
+    return {
+        "rms": _rms(off),
+        "share": _rms(off) / weight,
+        "at_rest": _rms(weight - upward) / weight,
+        "frames": int(used.sum()),
+    }
+
+
+def _against_reference(one: Comparison) -> dict[str, Any] | None:
+    """Of each formulation: mean and rms difference along x, y (up), z, and the mean distance, m."""
+    if one.reference is None:
+        return None
+    used = np.isfinite(one.reference).all(axis=1)
+    used = used if one.seen is None else used & one.seen
+    if not used.any():
+        return None
+    found = {}
+    for method in METHODS:
+        off = (one.computed.com[method] - one.reference)[used]
+        found[method] = {
+            "mean": off.mean(axis=0),
+            "rms": np.sqrt((off**2).mean(axis=0)),
+            "worst": np.abs(off).max(axis=0),
+            "distance": np.linalg.norm(off, axis=1).mean(),
+        }
+    return {"frames": int(used.sum()), "seconds": [one.times[used][0], one.times[used][-1]], "methods": found}
+
+
+def _standing(one: Comparison) -> dict[str, Any] | None:
+    """Quiet standing: the mean of CoM − CoP along x and z, its length, their distance over time, and sways, rms."""
+    if one.kind != "quiet standing" or one.measured is None:
+        return None
+    com, cop = (points[one.complete][:, [0, 2]] for points in (one.com, one.measured))
+    mean = (com - cop).mean(axis=0)
+    return {
+        "offset": mean,
+        "offset_length": np.linalg.norm(mean),
+        "distance": np.linalg.norm(com - cop, axis=1).mean(),
+        "sway_com": _sway(com),
+        "sway_cop": _sway(cop),
+    }
+
+
+def _centers(one: Comparison, mask: Mask) -> dict[str, Any]:
+    """Mean distance on the floor, m, from the measured centre of pressure to each computed one, on the same frames."""
+    assert one.plates is not None
+    assert one.measured is not None
+    mask = mask & np.isfinite(one.measured[:, 0])
+    moving = np.isfinite(one.acceleration[:, 0])
+    if moving.any():
+        mask = mask & moving
+    found: dict[str, Any] = {"frames": int(mask.sum())}
+    found["distance"] = {name: _mean(distances(points, one.measured)[mask]) for name, points in one.centers.items()}
+    if one.reference is not None:
+        known = mask & np.isfinite(one.reference).all(axis=1)
+        there: Mapping[str, Array] = {
+            "at rest: g(CoM)": one.floor.project(one.reference),
+            "CoM along the force": along_force(one.reference, one.force, one.floor),
+        }
+        found["reference_frames"] = int(known.sum())
+        found["reference"] = {name: _mean(distances(points, one.measured)[known]) for name, points in there.items()}
+        found["on_reference_frames"] = {
+            name: _mean(distances(one.centers[name], one.measured)[known]) for name in there
+        }
+    return found
+
+
+def _shares(one: Comparison) -> dict[str, Any] | None:
+    """The first of two loaded plates' part of the load: measured, by the paper's pressure, and how far they differ."""
+    if one.plates is None:
+        return None
+    loads = carried(one.plates)
+    used = one.complete & np.isfinite(one.computed.shares)
+    if not used.any():
+        return None
+    first = np.array([row[row > 0][0] / row.sum() for row in loads[used]])
+    computed = one.computed.shares[used]
+    return {
+        "frames": int(used.sum()),
+        "measured": first.mean(),
+        "computed": computed.mean(),
+        "difference": np.abs(computed - first).mean(),
+    }
+
+
+def _sway(points: Array) -> float:
+    return float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.square(values).mean()))
+
+
+def _mean(values: Array) -> float | None:
+    return float(values.mean()) if len(values) else None

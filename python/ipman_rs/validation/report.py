@@ -1,0 +1,236 @@
+"""What `ipman validate` says, as tables in Markdown and as files of numbers.
+
+Records are what `figures.figures` gives of a recording, with `body` (its model's name) and `fit` (how it was fitted:
+`markers`, mean distance from them in m, `shape_from`, `converged`).
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .comparison import Comparison
+from .computed import GAMMAS, METHODS, carried
+
+Record = dict[str, Any]
+
+# mm, of the paper's supplement: on MoYo, against the centre of mass of Vicon's Plug-in Gait.
+PAPER = {"vertex_mean": 264.1, "sample_mean": 68.5, "face_area": 70.0, "pcom": 53.3}
+WORDS = {
+    "exact": "exact: whole volume",
+    "pcom": "pCoM, the paper's",
+    "sample_mean": "mean of the samples",
+    "face_area": "faces by their area",
+    "vertex_mean": "mean of the vertices",
+}
+MODELS = ("at rest: g(CoM)", "moving: ZMP of the CoM", "moving: ZMP of the parts", "CoM along the force")
+
+
+def markdown(records: Sequence[Record], source: str, notes: Sequence[str], pictures: Sequence[str]) -> str:
+    """The page: every table that has rows, what was assumed, and the pictures."""
+    lines = [f"# Bodies fitted to markers, against measurements: {source}", ""]
+    for title, said, table in TABLES:
+        rows = list(table(records))
+        if len(rows) > 2:
+            lines += [f"## {title}", "", said, "", *rows, ""]
+    if notes:
+        lines += ["## Notes", "", *(f"- {note}" for note in notes), ""]
+    if pictures:
+        lines += ["## Pictures", "", *(f"![{path}]({path})\n" for path in pictures)]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def recordings(records: Iterable[Record]) -> Iterator[str]:
+    yield (
+        "| recording | kind | body | shape from | frames | a second | markers, mm | volume × 985, kg "
+        "| by the plates, kg | off | upward force, rms |"
+    )
+    yield "|---|---|---|---|---|---|---|---|---|---|---|"
+    for one in records:
+        mass, force = one["mass"], one["force"]
+        spread = f"{_number(mass['volume_mean'])} ({_number(mass['volume_least'])} to {_number(mass['volume_most'])})"
+        plates = off = ""
+        if mass["plates"] is not None:
+            plates = f"{_number(mass['plates'])} ± {_number(mass['plates_std'])}"
+            off = f"{mass['volume_mean'] / mass['plates'] - 1:+.1%}"
+        pushed = f"{force['rms']:.0f} N, {force['share']:.1%} (at rest {force['at_rest']:.1%})" if force else ""
+        yield (
+            f"| {one['name']} | {one['kind']} | {one['body']} | {one['fit']['shape_from']} | {one['frames']} "
+            f"| {one['rate_hz']:.0f} | {1e3 * one['fit']['markers']:.1f} | {spread} | {plates} | {off} | {pushed} |"
+        )
+
+
+def centers_of_mass(records: Iterable[Record]) -> Iterator[str]:
+    yield "| recording | body | shape from | frames | x, rms (mean) | y, up | z | distance, mean |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for one in _with(records, "com"):
+        exact = one["com"]["methods"]["exact"]
+        axes = [f"{1e3 * rms:.1f} ({1e3 * mean:+.1f})" for rms, mean in zip(exact["rms"], exact["mean"], strict=True)]
+        yield (
+            f"| {one['name']} | {one['body']} | {one['fit']['shape_from']} | {one['com']['frames']} "
+            f"| {' | '.join(axes)} | {1e3 * exact['distance']:.1f} |"
+        )
+
+
+def formulations(records: Iterable[Record]) -> Iterator[str]:
+    """A row a formulation, a column a recording, and the paper's figures."""
+    compared = list(_with(records, "com"))
+    if not compared:
+        return
+    titles = [f"{one['name']}, {one['body']}, shape from {one['fit']['shape_from']}" for one in compared]
+    yield f"| formulation | {' | '.join(titles)} | the paper, on MoYo |"
+    yield f"|---|{'---|' * len(titles)}---|"
+    for method in reversed(METHODS):
+        cells = [one["com"]["methods"][method] for one in compared]
+        told = [f"{1e3 * cell['distance']:.1f} (up {1e3 * cell['mean'][1]:+.0f})" for cell in cells]
+        yield f"| {WORDS[method]} | {' | '.join(told)} | {PAPER.get(method, '')} |"
+
+
+def standing(records: Iterable[Record]) -> Iterator[str]:
+    yield (
+        "| recording | body | shape from | CoM − CoP along x, z | means apart | distance, mean | sway of CoM "
+        "| sway of CoP |"
+    )
+    yield "|---|---|---|---|---|---|---|---|"
+    for one in _with(records, "standing"):
+        found = one["standing"]
+        x, z = (1e3 * value for value in found["offset"])
+        rest = (found[name] for name in ("offset_length", "distance", "sway_com", "sway_cop"))
+        yield (
+            f"| {one['name']} | {one['body']} | {one['fit']['shape_from']} | {x:+.1f}, {z:+.1f} "
+            f"| {' | '.join(f'{1e3 * value:.1f}' for value in rest)} |"
+        )
+
+
+def centers_of_pressure(records: Iterable[Record]) -> Iterator[str]:
+    yield (
+        f"| recording | phase | body | shape from | frames | {' | '.join(MODELS)} "
+        f"| {' | '.join(f'γ = {gamma}' for gamma in GAMMAS)} |"
+    )
+    yield f"|---|---|---|---|---|{'---|' * (len(MODELS) + len(GAMMAS))}"
+    for one in records:
+        for phase, found in one["cop"].items():
+            names = [*MODELS, *(f"γ = {gamma}" for gamma in GAMMAS)]
+            cells = [_millimetres(found["distance"].get(name)) for name in names]
+            yield (
+                f"| {one['name']} | {phase} | {one['body']} | {one['fit']['shape_from']} | {found['frames']} "
+                f"| {' | '.join(cells)} |"
+            )
+
+
+def references(records: Iterable[Record]) -> Iterator[str]:
+    yield (
+        "| recording | phase | body | shape from | frames | ours at rest | reference at rest | ours along the force "
+        "| reference along the force |"
+    )
+    yield "|---|---|---|---|---|---|---|---|---|"
+    for one in records:
+        for phase, found in one["cop"].items():
+            if not found.get("reference_frames"):
+                continue
+            cells = [
+                _millimetres(found[whose][name])
+                for name in (MODELS[0], MODELS[3])
+                for whose in ("on_reference_frames", "reference")
+            ]
+            yield (
+                f"| {one['name']} | {phase} | {one['body']} | {one['fit']['shape_from']} | {found['reference_frames']} "
+                f"| {' | '.join(cells)} |"
+            )
+
+
+def shares(records: Iterable[Record]) -> Iterator[str]:
+    yield "| recording | body | shape from | frames | measured | computed | apart, mean |"
+    yield "|---|---|---|---|---|---|---|"
+    for one in _with(records, "shares"):
+        found = one["shares"]
+        told = (f"{found[name]:.1%}" for name in ("measured", "computed", "difference"))
+        yield f"| {one['name']} | {one['body']} | {one['fit']['shape_from']} | {found['frames']} | {' | '.join(told)} |"
+
+
+TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...] = (
+    (
+        "Weight",
+        "Volume × 985 kg/m³ is the posed mesh's, mean over the frames and range. The plates' mass is the upward force "
+        "over g + the CoM's acceleration, ± over the frames; the last column: m (g + acceleration) against the "
+        "force, and the weight m g alone (at rest).",
+        recordings,
+    ),
+    ("Centre of mass", "Of the whole volume against the reference, mm.", centers_of_mass),
+    (
+        "Formulations of the centre of mass",
+        "Mean distance in space from the reference, mm; in brackets how much too high on average. The paper's figures "
+        "are of another data set.",
+        formulations,
+    ),
+    ("Quiet standing", "Centre of mass and measured centre of pressure on the floor, mm.", standing),
+    (
+        "Centre of pressure",
+        "Mean distance on the floor from the measured centre of pressure, mm: to where it is of a body at rest; to the "
+        "zero-moment point (ZMP), where dynamics puts it, by the acceleration of the fitted centre of mass, and by "
+        "those of the ten parts, so that swinging limbs count; to where the measured force's line through the centre "
+        "of mass meets the floor; and to the paper's for each γ (1/m). In walking, one plate and two plates apart.",
+        centers_of_pressure,
+    ),
+    ("The same of the reference's centre of mass", "On the frames that have one, mm.", references),
+    (
+        "Load of the first plate",
+        "Its part of the load where two plates carry one, and of the paper's pressure (γ = 10) on its side.",
+        shares,
+    ),
+)
+
+
+def series(one: Comparison) -> dict[str, NDArray[Any]]:
+    """Everything over time, by name: columns (T,), and vectors (T, 3), metres, newtons, seconds."""
+    found: dict[str, NDArray[Any]] = {"time_s": one.times, "volume_mass_kg": one.computed.mass}
+    found |= {f"com_{method}_m": points for method, points in one.computed.com.items()}
+    found["com_acceleration_mps2"] = one.acceleration
+    found |= {f"cop_gamma_{gamma}_m": points for gamma, points in one.computed.cop.items()}
+    if one.reference is not None:
+        found["com_reference_m"] = one.reference
+    if one.plates is not None:
+        assert one.measured is not None
+        found |= {"force_N": one.force, "cop_measured_m": one.measured, "complete": one.complete}
+        found |= {"loads_N": carried(one.plates), "first_share_computed": one.computed.shares}
+        names = ("zmp_com_m", "zmp_parts_m", "com_along_force_m")
+        found |= {name: one.centers[model] for name, model in zip(names, MODELS[1:], strict=True)}
+    return found
+
+
+def table(columns: dict[str, NDArray[Any]]) -> str:
+    """A series as CSV, a vector's axes in columns of their own; what is not finite stays empty."""
+    heads: list[str] = []
+    values: list[NDArray[Any]] = []
+    for name, column in columns.items():
+        stem, _, unit = name.rpartition("_")
+        names = [name] if column.ndim == 1 else [f"{stem}_{axis}_{unit}" for axis in _axes(name, column.shape[1])]
+        heads += names
+        values += [column] if column.ndim == 1 else [*column.T]
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(heads)
+    for row in zip(*values, strict=True):
+        writer.writerow([f"{value:.6g}" if np.isfinite(value) else "" for value in row])
+    return stream.getvalue()
+
+
+def _axes(name: str, count: int) -> Sequence[str]:
+    return [f"plate{number}" for number in range(1, count + 1)] if name == "loads_N" else "xyz"
+
+
+def _with(records: Iterable[Record], key: str) -> Iterator[Record]:
+    return (one for one in records if one[key])
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.1f}"
+
+
+def _millimetres(metres: float | None) -> str:
+    return "" if metres is None else f"{1e3 * metres:.1f}"

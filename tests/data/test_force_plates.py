@@ -1,0 +1,250 @@
+"""Force plates: the centre of pressure from raw channels, against OpenSim's and ezc3d's, and of known loads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+ezc3d = pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+
+from miniatures import c3d_file  # noqa: E402
+
+import ipman_rs.data as data  # noqa: E402
+from ipman_rs.data import c3d, force_plates, opensim  # noqa: E402
+from ipman_rs.data.tracks import TO_Y_UP  # noqa: E402
+
+T, RATE = 25, 100.0
+N = T * c3d_file.SAMPLES
+
+
+@pytest.fixture
+def load(rng):
+    """A step: force on the body (N, 3), where (N, 2) relative to a plate, free moment (N,)."""
+    phase = np.linspace(0, 1, N)
+    up = 700 * np.sin(np.pi * phase) ** 0.5
+    force = np.stack([0.1 * up * np.cos(3 * phase), -0.05 * up, up], axis=1)
+    return force, np.stack([0.2 * phase - 0.1, 0.05 * np.sin(5 * phase)], axis=1), 4 * np.sin(phase)
+
+
+def markers():
+    time = np.arange(T) / RATE
+    walk = np.stack([time, np.zeros(T), np.zeros(T)], axis=1)
+    return {name: walk + [0, 0, height] for name, height in (("head", 1.7), ("hip", 0.9), ("left_heel", 0.05))}
+
+
+def where(middle, offset):
+    return np.concatenate([np.asarray(middle)[:2] + offset, np.full((len(offset), 1), middle[2])], axis=1)
+
+
+def test_walking_against_the_reference_of_opensim(shared):
+    """The reference was made by OpenSim's own reader, every 100th sample, in mm and z up."""
+    folder = shared("c3d")
+    found = force_plates.read(folder / "walking2.c3d")
+    told = opensim.plates(opensim.storage(folder / "std_cop_walking2_grfs.sto"), unit="mm", up="z")
+    rows = np.round(told.times * 2000).astype(int)
+    rows = rows[rows < len(found)]
+    ours, theirs = found.points[rows], told.points[: len(rows)]
+    loaded = told.loads[: len(rows)] > 50
+    assert loaded.sum(axis=0).tolist() == [11, 9]
+    off = np.linalg.norm(ours - theirs, axis=-1)[loaded]
+    assert off.max() < 1e-9  # m; 2 mm are asked for, the file has eight digits of a millimetre
+    np.testing.assert_allclose(found.forces[rows], told.forces[: len(rows)], atol=1e-7)
+    np.testing.assert_allclose(found.moments[rows][loaded], told.moments[: len(rows)][loaded], atol=1e-8)
+    center = np.linalg.norm(found.center(50)[rows] - told.center(50)[: len(rows)], axis=1)
+    assert np.nanmax(center) < 1e-9
+    assert np.isfinite(center).sum() == loaded.any(axis=1).sum()
+
+
+def test_walking_against_ezc3d(shared):
+    path = shared("c3d") / "walking2.c3d"
+    found = force_plates.read(path)
+    platforms = ezc3d.c3d(str(path), extract_forceplat_data=True)["data"]["platform"]
+    for plate, judge in enumerate(platforms):
+        loaded = found.loads[:, plate] > 20
+        assert loaded.sum() > 900
+        np.testing.assert_allclose(found.forces[:, plate], judge["force"].T, atol=1e-9)
+        points = judge["center_of_pressure"].T / 1000
+        np.testing.assert_allclose(found.points[loaded, plate], points[loaded], atol=1e-12)
+        np.testing.assert_allclose(found.corners[plate], judge["corners"].T / 1000, atol=1e-12)
+
+
+def test_walking_in_the_common_form(shared):
+    frames = data.open("force-plates", shared("c3d") / "walking2.c3d")[:]
+    assert frames.frame_rate == 250
+    assert frames.joints.shape == (1249, 44, 3)
+    assert frames.forces.shape == (1249, 2, 3)
+    np.testing.assert_array_equal(frames.ground.normal, [0, 0, 1])
+    assert frames.ground.height == 0
+    assert frames.names[423] == "walking2/00423"
+    c7 = frames.joints[423, frames.joint_names.index("C7")]
+    np.testing.assert_allclose(c7, [-1.276, 0.506, 1.495], atol=6e-4)
+    loaded = np.isfinite(frames.center_of_pressure).all(axis=1)
+    assert loaded.sum() == 249
+    assert 1400 / 9.81 > frames.forces[..., 2].sum(axis=1).max() / 9.81 > 80
+    # While somebody stands on the plates their centre of pressure lies under them.
+    under = np.nanmean(frames.joints[loaded], axis=1) - frames.center_of_pressure[loaded]
+    assert np.abs(under[:, :2]).max() < 0.5
+    findings = force_plates.check(shared("c3d") / "walking2.c3d")
+    assert [each.what for each in findings if each.level == "wrong"] == []
+    assert any("2 force plates" in each.what for each in findings)
+
+
+@pytest.mark.parametrize("reaction", [True, False])
+@pytest.mark.parametrize(
+    ("kind", "unit", "moments"),
+    [(2, "mm", "Nmm"), (2, "m", "Nm"), (2, "mm", "Nm"), (2, "mm", ""), (3, "mm", ""), (3, "m", ""),
+     (4, "mm", "Nmm"), (4, "m", "Nm")],
+)  # fmt: skip
+def test_a_load_whose_place_is_known(tmp_path, load, kind, unit, moments, reaction):
+    force, offset, free = load
+    middle = np.array([0.8, -0.3, 0.05])
+    corners = c3d_file.plate(middle, turn=0.7)
+    point = where(middle, offset)
+    if kind == 3:
+        free = np.zeros(N)
+        channels = c3d_file.eight(corners, force, point) * (1 if reaction else -1)
+    else:
+        channels = c3d_file.six(corners, force, point, free, reaction)
+    if kind == 4:
+        scale = [1, 1, 1, *[{"mm": 1000.0, "m": 1.0}[unit]] * 3]  # the matrix gives moments in the points' unit
+        channels = np.linalg.solve(c3d_file.MATRIX, (channels * scale).T).T / scale
+    c3d_file.write(tmp_path / "a.c3d", markers(), RATE, unit, plates=[(kind, corners, channels)], moment_unit=moments)
+    found = force_plates.read(tmp_path / "a.c3d")
+    assert len(found) == N
+    np.testing.assert_allclose(found.times[:2], [0, 1 / RATE / c3d_file.SAMPLES], atol=1e-9)
+    # ezc3d writes numbers of 32 bits.
+    np.testing.assert_allclose(found.forces[:, 0], force, atol=2e-4)
+    loaded = force[:, 2] > 50
+    np.testing.assert_allclose(found.points[loaded, 0], point[loaded], atol=2e-6)
+    np.testing.assert_allclose(found.moments[loaded, 0], free[loaded, None] * [0, 0, 1], atol=2e-3)
+    np.testing.assert_allclose(found.corners[0], corners, atol=1e-6)
+
+
+def test_two_plates_together_and_between_samples(tmp_path, load):
+    force, offset, free = load
+    middles = np.array([[0.0, 0.0, 0.0], [0.7, 0.1, 0.0]])
+    shares = np.stack([np.linspace(1, 0, N), np.linspace(0, 1, N)], axis=1)
+    plates = []
+    for middle, share in zip(middles, shares.T, strict=True):
+        corners = c3d_file.plate(middle)
+        values = c3d_file.six(corners, share[:, None] * force, where(middle, offset), share * free)
+        plates.append((2, corners, values))
+    c3d_file.write(tmp_path / "a.c3d", markers(), RATE, plates=plates)
+    found = force_plates.read(tmp_path / "a.c3d")
+    loads = shares * force[:, 2:]
+    both = (loads > 20).all(axis=1)
+    weighted = loads[:, :1] * where(middles[0], offset) + loads[:, 1:] * where(middles[1], offset)
+    expected = weighted[both] / loads[both].sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(found.center()[both], expected, atol=5e-6)
+    assert np.isnan(found.center()[[0, -1]]).all()  # nobody is on them
+    only = (loads[:, 0] < 20) & (loads[:, 1] > 20)
+    np.testing.assert_allclose(found.center()[only], where(middles[1], offset)[only], atol=5e-6)
+    at = found.at(found.times[10:30:2])
+    np.testing.assert_array_equal(at.forces, found.forces[10:30:2])
+    np.testing.assert_allclose(at.center(), found.center()[10:30:2], atol=1e-12)
+    between = found.at([(found.times[40] + found.times[41]) / 2])
+    weights = found.loads[40:42, 0]
+    np.testing.assert_allclose(between.points[0, 0], weights @ found.points[40:42, 0] / weights.sum(), atol=1e-12)
+    assert np.isnan(found.at([-1.0, 99.0]).forces).all()
+    turned = found.turned(TO_Y_UP["z"])
+    np.testing.assert_allclose(turned.up, [0, 1, 0])
+    np.testing.assert_allclose(turned.loads, found.loads)
+    np.testing.assert_allclose(turned.points[both, 0, 1], found.points[both, 0, 2], atol=1e-12)
+    frames = data.open("force-plates", tmp_path)[3:9]
+    assert frames.forces.shape == (6, 2, 3)
+    np.testing.assert_allclose(frames.forces, found.forces[12:36:4], atol=1e-9)
+    np.testing.assert_allclose(frames.center_of_pressure, found.center()[12:36:4], atol=1e-9)
+
+
+def test_recordings_with_and_without_plates(tmp_path, load):
+    force, offset, free = load
+    corners = c3d_file.plate((0, 0, 0))
+    values = c3d_file.six(corners, force, where((0, 0, 0), offset), free)
+    c3d_file.write(tmp_path / "a.c3d", markers(), RATE, plates=[(2, corners, values)])
+    c3d_file.write(tmp_path / "b.c3d", {"hip": markers()["hip"], "head": markers()["head"]}, RATE)
+    found = data.open("force-plates", tmp_path)
+    assert len(found) == 2 * T
+    frames = found[np.array([T + 1, 3])]
+    assert frames.names.tolist() == ["b/00001", "a/00003"]
+    assert np.isnan(frames.forces[0]).all()
+    assert np.isfinite(frames.forces[1]).all()
+    assert frames.joint_names == ("head", "hip", "left_heel")
+    np.testing.assert_allclose(frames.joints[0, :2, 2], [1.7, 0.9], atol=1e-6)
+    assert np.isnan(frames.joints[0, 2]).all()
+    with pytest.raises(ValueError, match="b.c3d: expected force plates"):
+        force_plates.read(tmp_path / "b.c3d")
+
+
+def broken(tmp_path, load, **changes):
+    force, offset, free = load
+    corners = c3d_file.plate((0, 0, 0)) * changes.pop("size", 1)
+    values = c3d_file.six(c3d_file.plate((0, 0, 0)), force, where((0, 0, 0), offset), free)
+    c3d_file.write(tmp_path / "a.c3d", markers(), RATE, plates=[(changes.pop("kind", 2), corners, values)], **changes)
+    return tmp_path / "a.c3d"
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"kind": 7}, "force plate 1: TYPE: expected one of 2, 3, 4, got type 7"),
+        ({"kind": 3}, "force plate 1: CHANNEL: expected 8 of the 6 channels, got 1, 2, 3, 4, 5, 6"),
+        ({"force_unit": "V"}, "ANALOG:UNITS: expected N, got 'v': is the plate calibrated"),
+        ({"size": 1000}, "CORNERS: expected a plate of a decimetre to two metres, got 600 × 400 m; looks like milli"),
+        ({"size": 0}, "CORNERS: expected a plate of a decimetre to two metres, got 0 × 0 m"),
+    ],
+)
+def test_plates_that_cannot_be(tmp_path, load, changes, message):
+    with pytest.raises(ValueError, match=message):
+        force_plates.read(broken(tmp_path, load, **changes))
+
+
+def test_millimetres_that_are_said_to_be_metres(tmp_path, load):
+    path = broken(tmp_path, load)
+    content = ezc3d.c3d(str(path))
+    content["parameters"]["POINT"]["UNITS"]["value"] = ["m"]
+    content.write(str(path))
+    with pytest.raises(ValueError, match="CORNERS: .*looks like millimetres"):
+        force_plates.read(path)
+    c3d_file.write(path, {name: 1000 * points for name, points in markers().items()}, RATE, "m")
+    with pytest.raises(ValueError, match=r"a.c3d: joints: looks like millimetres: a body spans 1650, .*divide by 1000"):
+        data.open("force-plates", path)
+
+
+def test_z_up_that_is_said_to_be_y_up(tmp_path, load):
+    path = broken(tmp_path, load, up="+Y")
+    wrong = [each.what for each in force_plates.check(path) if each.level == "wrong"]
+    assert any("a.c3d: looks like z up: markers reach from 0.05 m along z over 1.65 m" in what for what in wrong)
+    with pytest.raises(ValueError, match=r"a.c3d: looks like z up: that is where its force plates face, .* say up='z'"):
+        data.open("force-plates", path)
+    assert len(data.open("force-plates", path, up="z")) == T
+
+
+def test_damaged_and_missing_files(tmp_path, load):
+    path = broken(tmp_path, load)
+    whole = path.read_bytes()
+    for size in (0, 100, 700, len(whole) // 2, len(whole) - 600):
+        path.write_bytes(whole[:size])
+        with pytest.raises(ValueError, match=r"a\.c3d: expected"):
+            c3d.read(path)
+        with pytest.raises(ValueError, match=r"a\.c3d: expected"):
+            data.open("force-plates", path)
+        assert any(each.level == "wrong" and "a.c3d" in each.what for each in force_plates.check(path))
+    path.write_bytes(b"no markers in here" * 100)
+    with pytest.raises(ValueError, match="a.c3d: expected a C3D file"):
+        c3d.read(path)
+    with pytest.raises(ValueError, match="b.c3d: expected a .c3d file or a folder of them, not there"):
+        data.open("force-plates", tmp_path / "b.c3d")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ValueError, match="none in it"):
+        data.open("force-plates", tmp_path / "empty")
+    assert force_plates.check(tmp_path / "empty")[0].level == "missing"
+
+
+def test_a_frame_of_nan(tmp_path, load):
+    path = broken(tmp_path, load)
+    points = markers()
+    points["hip"][7] = np.nan
+    c3d_file.write(path, points, RATE)
+    frames = data.open("force-plates", path)[:]
+    assert np.isnan(frames.joints[7, 1]).all()
+    assert np.isfinite(np.delete(frames.joints, 7, axis=0)).all()

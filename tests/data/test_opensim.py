@@ -1,0 +1,219 @@
+"""OpenSim's files: storages, markers, ground forces and centres of mass, real and miniature."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from miniatures import opensim as miniature
+
+import ipman_rs.data as data
+from ipman_rs.data import opensim
+
+Z_UP = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # turns y up into z up
+
+
+@pytest.fixture
+def folder(tmp_path):
+    miniature.trc(tmp_path / "sway.trc")
+    miniature.forces(tmp_path / "sway_grf.mot")
+    miniature.center_of_mass(tmp_path / "sway_com.sto")
+    return tmp_path
+
+
+def test_the_miniature_in_the_common_form(folder):
+    points = miniature.trc(folder / "sway.trc", missing=[(3, 1)])
+    loads, centers = miniature.forces(folder / "sway_grf.mot")
+    times, com = miniature.center_of_mass(folder / "sway_com.sto")
+    found = data.open("opensim", folder)
+    frames = found[:]
+    assert len(found) == len(frames) == 30
+    assert frames.frame_rate == 60
+    assert frames.joint_names == miniature.HEAD
+    assert frames.names[7] == "sway/00007"
+    assert set(frames.sequences) == {"sway"}
+    np.testing.assert_array_equal(frames.ground.normal, [0, 1, 0])
+    assert np.isnan(frames.joints[3, 1]).all()
+    points[3, 1] = np.nan
+    np.testing.assert_allclose(frames.joints, points, atol=1e-9)  # written with a thousandth of a micrometre
+    inside = np.arange(30) / 60 <= 0.499
+    at = np.round(np.arange(30)[inside] * 1000 / 60)  # the forces' samples, 1000 Hz, next to the markers' times
+    near = at.astype(int)
+    np.testing.assert_allclose(frames.forces[inside, :, 1], loads[near], atol=2)  # 0.5 ms apart at up to 1400 N/s
+    both = (loads[near, :, None] * centers[near]).sum(axis=1) / loads[near].sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(frames.center_of_pressure[inside], both, atol=5e-4)
+    begin = round(times[0] * 60)
+    np.testing.assert_allclose(frames.center_of_mass[begin : begin + 20], com, atol=1e-6)
+    assert np.isnan(frames.center_of_mass[: begin - 1]).all()
+    some = found[np.array([9, 2, 9])]
+    assert some.names.tolist() == ["sway/00009", "sway/00002", "sway/00009"]
+    assert [each for each in opensim.check(folder) if each.level != "ok"] == []
+
+
+def test_forces_on_the_markers_times_exactly(folder):
+    miniature.trc(folder / "sway.trc", rate=100.0)
+    loads, centers = miniature.forces(folder / "sway_grf.mot")
+    frames = data.open("opensim", folder)[:]
+    np.testing.assert_allclose(frames.forces[:, :, 1], loads[:300:10], atol=1e-6)
+    both = (loads[:300:10, :, None] * centers[:300:10]).sum(axis=1) / 700
+    np.testing.assert_allclose(frames.center_of_pressure, both, atol=1e-7)
+
+
+def test_recordings_that_measured_different_things(folder):
+    miniature.trc(folder / "still.trc", names=miniature.HEAD[:4], unit="m")
+    found = data.open("opensim", folder)
+    frames = found[28:32]
+    assert frames.names.tolist() == ["still/00028", "still/00029", "sway/00000", "sway/00001"]
+    assert np.isnan(frames.forces[:2]).all()
+    assert np.isfinite(frames.forces[2:]).all()
+    assert np.isnan(frames.joints[0, 4]).all()
+    missing = [each.what for each in opensim.check(folder) if each.level == "missing"]
+    assert missing == ["still.trc: no forces", "still.trc: no centre of mass"]
+
+
+def test_a_centre_of_mass_under_another_name_is_that_of_the_only_one_with_forces(folder):
+    miniature.trc(folder / "still.trc")
+    (folder / "sway_com.sto").rename(folder / "kinematics.sto")
+    assert np.isfinite(data.open("opensim", folder)[30:].center_of_mass).any()
+
+
+def test_real_squats(shared):
+    frames = data.open("opensim", shared("squat_forceplates"))[:]
+    assert frames.joints.shape == (1346 + 517, 55, 3)
+    assert frames.forces.shape == (1863, 3, 3)
+    standing = frames.sequences == "static1"
+    weight = frames.forces[standing, :, 1].sum(axis=1).mean() / 9.80665
+    assert weight == pytest.approx(60.05, abs=0.01)  # kg; the whole file's mean without the resampling is the same
+    table = opensim.storage(shared("squat_forceplates") / "static1_grf.mot")
+    assert weight == pytest.approx(sum(table.columns[f"ground_force_{n}_vy"] for n in (1, 2, 3)).mean() / 9.80665)
+    np.testing.assert_allclose(np.nanmean(frames.center_of_pressure[standing], 0), [-0.2213, 0.006, -0.6044], atol=1e-4)
+    assert np.isfinite(frames.center_of_pressure).all()
+    assert [each.what for each in opensim.check(shared("squat_forceplates")) if each.level == "wrong"] == []
+
+
+def test_real_walking(shared):
+    folder = shared("gait2354")
+    frames = data.open("opensim", folder)[:]
+    assert frames.joints.shape == (300 + 151, 49, 3)
+    assert frames.frame_rate == 60
+    walking = frames[frames.sequences == "subject01_walk1"]  # OpenSim's CoM of the file g2354_bodykin
+    com = walking.center_of_mass
+    assert np.isfinite(com).all(axis=1).sum() == 16  # t 0.83 to 1.08 s
+    assert 0.95 < np.nanmin(com[:, 1]) < np.nanmax(com[:, 1]) < 1.06
+    table = opensim.storage(folder / "g2354_bodykin.sto")
+    assert len(table) == 29
+    assert table.in_degrees is False
+    np.testing.assert_array_equal(
+        opensim.center_of_mass(table)[0], [table.columns[f"center_of_mass_{x}"][0] for x in "XYZ"]
+    )
+    among = np.nanmean(walking.joints[np.isfinite(com).all(axis=1)], axis=1) - com[np.isfinite(com).all(axis=1)]
+    assert np.abs(among[:, [0, 2]]).max() < 0.06  # most markers are on the legs
+    plates = opensim.plates(opensim.storage(folder / "subject01_walk1_grf.mot"))
+    assert plates.forces.shape == (1501, 2, 3)
+    np.testing.assert_array_equal(plates.forces[0, 0], [101.5119767, 745.4661142, -47.44870554])
+    np.testing.assert_array_equal(plates.points[0, 1], [0.81009656, -0.0075, -0.05354309])
+    np.testing.assert_array_equal(plates.moments[0, 0], [0, 13.53783445, 0])
+
+
+def test_the_old_header_of_simm(shared):
+    table = opensim.storage(shared("c3d") / "std_cop_walking2_grfs.sto")
+    assert len(table) == 101
+    assert table.columns["f1_3"][0] == -14.20642757
+    with pytest.raises(ValueError, match=r"looks like millimetres: centres of pressure 718.9 .* say unit='mm'"):
+        opensim.plates(table)
+    with pytest.raises(ValueError, match=r"looks like z up: loaded plates push along z .* say up='z'"):
+        opensim.plates(table, unit="mm")
+    assert opensim.plates(table, "mm", "z").loads.max() == pytest.approx(948.3, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "expected a storage of OpenSim, whose header ends with 'endheader', got another text"),
+        ("hello\nendheader\n", "expected a line of column names after the header, the file ends there"),
+        ("nRows=2\nendheader\ntime\ta\n0\t1\n", "expected 2 rows by its header, got 1: is the file complete"),
+        ("datarows 2\nendheader\ntime\ta\n0\t1\n", "expected 2 rows by its header, got 1: is the file complete"),
+        ("nColumns=3\nendheader\ntime\ta\n0\t1\n", "expected 3 columns by its header, got 2"),
+        ("endheader\ntime\ta\n0\t1\n1\t\n", "line 4: expected 2 columns, got 1: is the file complete"),
+        ("endheader\ntime\ta\n0\tx\n", "expected numbers: .*'x'"),
+        ("endheader\ntime\ta\n", "expected rows of numbers, got none"),
+        ("endheader\na\ttime\n0\t1\n", "line 2: expected the time first and different names, got 'a' first"),
+        ("endheader\ntime\ta\ta\n0\t1\t2\n", "line 2: .*got the column 'a' twice"),
+        ("endheader\ntime\ta\n1\t1\n1\t2\n", "line 4: expected times that increase, got 1 s"),
+        ("endheader\ntime\ta\n1\t1\nnan\t2\n", "line 4: expected times that increase, got nan s"),
+    ],
+)
+def test_storages_that_cannot_be(tmp_path, text, message):
+    path = tmp_path / "a.mot"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=f"a.mot: {message}"):
+        opensim.storage(path)
+
+
+def test_half_a_file_and_no_file(folder):
+    path = folder / "sway_grf.mot"
+    path.write_text(path.read_text()[: path.stat().st_size // 2])
+    with pytest.raises(ValueError, match=r"sway_grf.mot: .*is the file complete"):
+        data.open("opensim", folder)
+    assert any("sway_grf.mot" in each.what for each in opensim.check(folder) if each.level == "wrong")
+    path.unlink()
+    assert data.open("opensim", folder)[:].forces is None
+    miniature.trc(folder / "sway.trc", cut=3)
+    with pytest.raises(ValueError, match="sway.trc: expected a header of 5 lines"):
+        data.open("opensim", folder)
+    miniature.trc(folder / "sway.trc", frames=0)
+    with pytest.raises(ValueError, match="sway.trc: expected markers and samples, got 5 and 0"):
+        data.open("opensim", folder)
+    with pytest.raises(ValueError, match="expected a .trc file or a folder of them, not there"):
+        data.open("opensim", folder / "other.trc")
+    (folder / "sway.trc").unlink()
+    with pytest.raises(ValueError, match="none in it"):
+        data.open("opensim", folder)
+    assert opensim.check(folder)[0].level == "missing"
+    with pytest.raises(ValueError, match="split: recordings have none, got 'train'"):
+        data.open("opensim", folder, split="train")
+
+
+def test_markers_in_millimetres_that_are_said_to_be_metres(folder):
+    text = (folder / "sway.trc").read_text().replace("\tmm\t", "\tm\t")
+    (folder / "sway.trc").write_text(text)
+    with pytest.raises(ValueError, match="looks like millimetres: a body spans 1[67][0-9]*, .*; divide by 1000"):
+        data.open("opensim", folder / "sway.trc")
+    assert any("looks like millimetres" in each.what for each in opensim.check(folder) if each.level == "wrong")
+
+
+def test_forces_and_centres_of_mass_in_other_units(folder):
+    miniature.forces(folder / "sway_grf.mot", scale=1000.0)
+    with pytest.raises(ValueError, match=r"sway_grf.mot: looks like millimetres: centres of pressure"):
+        data.open("opensim", folder)
+    miniature.forces(folder / "sway_grf.mot")
+    miniature.center_of_mass(folder / "sway_com.sto", scale=1000.0)
+    with pytest.raises(ValueError, match=r"sway_com.sto: looks like millimetres: a centre of mass 9[0-9]+ from"):
+        data.open("opensim", folder)
+    miniature.center_of_mass(folder / "sway_com.sto", scale=3.0)
+    with pytest.raises(ValueError, match=r"sway_com.sto: the centre of mass is 1.15 m outside the markers of"):
+        data.open("opensim", folder)
+
+
+def test_z_up_instead_of_y_up(folder):
+    miniature.forces(folder / "sway_grf.mot", turn=Z_UP)
+    with pytest.raises(ValueError, match=r"sway_grf.mot: looks like z up: loaded plates push along z"):
+        data.open("opensim", folder)
+    miniature.trc(folder / "sway.trc", turn=Z_UP)
+    wrong = [each.what for each in opensim.check(folder) if each.level == "wrong"]
+    assert any("sway.trc: looks like z up: markers reach from 0.03 m along z over 1.67 m" in what for what in wrong)
+
+
+def test_two_files_of_forces(folder):
+    miniature.forces(folder / "sway_grf_filtered.mot")
+    with pytest.raises(ValueError, match="expected one of its kind for sway.trc, got another beside it"):
+        data.open("opensim", folder)
+
+
+def test_columns_that_are_missing(folder):
+    table = opensim.storage(folder / "sway_com.sto")
+    with pytest.raises(ValueError, match=r"sway_com.sto: expected ground forces, .* it has pelvis_X"):
+        opensim.plates(table)
+    with pytest.raises(ValueError, match=r"sway_grf.mot: no column 'center_of_mass_X'"):
+        opensim.center_of_mass(opensim.storage(folder / "sway_grf.mot"))
+    with pytest.raises(ValueError, match="unit, up: expected"):
+        opensim.plates(table, unit="furlong")

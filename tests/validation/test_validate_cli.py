@@ -1,0 +1,228 @@
+"""`ipman validate` on recordings that were made up from a body, so that what it must say is known; and on real ones."""
+
+from __future__ import annotations
+
+import json
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="torch is an extra")
+
+from click.testing import CliRunner  # noqa: E402
+
+import ipman_rs as ip  # noqa: E402
+import ipman_rs.torch as ipt  # noqa: E402
+from ipman_rs.cli import main  # noqa: E402
+from ipman_rs.fitting import markers  # noqa: E402
+from ipman_rs.fitting.landmarks import Landmarks  # noqa: E402
+from ipman_rs.fitting.markers.sets import OPENCAP  # noqa: E402
+
+RATE, FRAMES = 50, 40
+MASS = 64.0  # kg
+OFF = np.array([0.012, 0.0, -0.005])  # m, from g(CoM) to the made-up CoP
+G = 9.80665
+
+
+@pytest.fixture
+def run():
+    def call(*arguments):
+        result = CliRunner().invoke(main, ["validate", *map(str, arguments)])
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        return SimpleNamespace(code=result.exit_code, out=result.stdout, err=result.stderr)
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def person():
+    """A body that stands on y = 0, its markers (M, 3) and its centre of mass."""
+    body = ipt.BodyModel("anny-lite")
+    sites = markers.sites(body.body, OPENCAP)
+    pose = torch.zeros(1, body.body.num_joints, 3, dtype=torch.float64)
+    for side, joint in ((-1, "left_shoulder"), (1, "right_shoulder")):  # arms down
+        pose[0, body.body.joint_names.index(joint), 2] = side * 1.2
+    betas = torch.zeros(1, body.body.num_betas, dtype=torch.float64)
+    vertices = body.body(pose.numpy(), betas.numpy()).vertices
+    up = torch.tensor([[0.3, -float(vertices[..., 1].min()), 0.2]], dtype=torch.float64)
+    with torch.no_grad():
+        points = Landmarks(body, sites, sites)(pose, betas, up)[0].double().numpy()
+    com = np.asarray(ip.mass_properties(vertices[0] + up.numpy()[0], body.body.template).center, float)
+    return SimpleNamespace(names=list(sites), points=points, com=com)
+
+
+def moved(height=0.0):
+    """The way (T, 3) of somebody who is lifted up and down once a second."""
+    times = np.arange(FRAMES) / RATE
+    return times, np.stack([0 * times, height * np.sin(2 * np.pi * times), 0 * times], axis=1)
+
+
+def trc(path, person, shift, scale=1.0, unit="m"):
+    columns = "Frame#\tTime\t" + "\t\t\t".join(person.names)
+    lines = ["PathFileType\t4\t(X/Y/Z)\tx.trc", "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits"]
+    lines += [f"{RATE}\t{RATE}\t{FRAMES}\t{len(person.names)}\t{unit}", columns, ""]
+    for frame, off in enumerate(shift):
+        values = "\t".join(f"{value * scale:.6f}" for value in (person.points + off).ravel())
+        lines.append(f"{frame + 1}\t{frame / RATE:.4f}\t{values}")
+    path.write_text("\n".join(lines) + "\n")
+
+
+def mot(path, cop, upward, rate=10 * RATE, scale=1.0):
+    """Two plates: all load is on the first, the second's centre is garbage; ten times the markers' rate."""
+    heads = ["time", *(f"ground_force_{plate}_{kind}{axis}" for plate in (1, 2) for kind in "vpm" for axis in "xyz")]
+    times = np.arange(FRAMES * rate // RATE) / rate
+    rows = [[t, 0, upward(t), 0, *(scale * cop), 0, 0, 0, 0, 1.5, 0, 99.0, 99.0, 99.0, 0, 0, 0] for t in times]
+    header = ["grf", "version=1", f"nRows={len(rows)}", f"nColumns={len(heads)}", "inDegrees=yes", "endheader"]
+    lines = [*header, "\t".join(heads), *("\t".join(f"{value:.6f}" for value in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, person):
+    """Quiet standing, and being lifted up and down by 4 cm, with the forces of a person of 64 kg."""
+    root = tmp_path_factory.mktemp("lab")
+    omega = 2 * np.pi
+    for name, height, scale, unit in (("static", 0.0, 1000.0, "mm"), ("lift", 0.04, 1.0, "m")):
+        times, shift = moved(height)
+        trc(root / f"{name}.trc", person, shift, scale, unit)
+        cop = (person.com + OFF) * [1, 0, 1]
+        mot(root / f"{name}_grf.mot", cop, lambda t, h=height: MASS * (G - h * omega**2 * np.sin(omega * t)))
+    com = person.com + shift + [0, 0.03, 0]
+    rows = "\n".join(f"{t},{x},{y},{z}" for t, (x, y, z) in zip(times, com, strict=True))
+    (root / "lift_reference.csv").write_text(f"# time_s,com_x_m,com_y_m,com_z_m (y up)\n{rows}\n")
+    return root
+
+
+@pytest.fixture(scope="module")
+def first(folder, tmp_path_factory):
+    """The output of one command, and what it said."""
+    output = tmp_path_factory.mktemp("out")
+    result = CliRunner().invoke(main, ["validate", str(folder), "-o", str(output)])
+    assert result.exit_code == 0, result.output
+    return SimpleNamespace(folder=output, out=result.stdout, err=result.stderr)
+
+
+def records(output):
+    return {one["name"]: one for one in json.loads((output / "validation.json").read_text())["recordings"]}
+
+
+def test_the_figures_are_those_that_were_made_up(first):
+    told = records(first.folder)
+    still, lift = told["static"], told["lift"]
+    assert (still["kind"], lift["kind"]) == ("quiet standing", "movement in place")
+    assert (still["fit"]["shape_from"], lift["fit"]["shape_from"]) == ("itself", "static")
+    assert max(one["fit"]["markers"] for one in told.values()) < 1e-3
+    assert still["mass"]["plates"] == pytest.approx(MASS, abs=0.2)  # the second plate's 1.5 N
+    assert lift["mass"]["plates"] == pytest.approx(MASS, abs=0.3)
+    assert lift["force"]["share"] < 0.01
+    np.testing.assert_allclose(still["standing"]["offset"], -OFF[[0, 2]], atol=3e-3)  # of the fit
+    np.testing.assert_allclose(lift["com"]["methods"]["exact"]["mean"], [0, -0.03, 0], atol=3e-3)
+    assert still["com"] is None
+
+
+def test_what_is_written(first):
+    assert "report:" in first.out
+    page = (first.folder / "validation.md").read_text()
+    for title in ("Weight", "Formulations of the centre of mass", "Quiet standing", "Centre of pressure"):
+        assert f"## {title}\n" in page
+    assert "| mean of the vertices |" in page
+    assert "264.1" in page
+    for name in ("static", "lift"):
+        inside = first.folder / name
+        for picture in ("pressure.png", "over_time.png", "bodies.png"):
+            assert (inside / picture).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+            assert f"]({name}/{picture})" in page
+        with np.load(inside / "series.npz", allow_pickle=False) as series:
+            assert series["cop_measured_m"].shape == (FRAMES, 3)
+            rows = np.genfromtxt(inside / "series.csv", delimiter=",", names=True)
+            np.testing.assert_allclose(rows["com_exact_y_m"], series["com_exact_m"][:, 1], rtol=1e-5)
+            np.testing.assert_allclose(rows["loads_plate1_N"], series["loads_N"][:, 0], rtol=1e-5)
+
+
+def test_fits_are_kept(run, folder, first):
+    """The second command fits nothing; after a kill in the middle, only what is missing; --fresh everything."""
+    kept = {name: (first.folder / name / "fit.json").stat().st_mtime_ns for name in ("static", "lift")}
+    before = (first.folder / "validation.json").read_bytes()
+    (first.folder / "validation.json").unlink()
+    (first.folder / "lift" / "lift.npz").unlink()
+    assert run(folder, "-o", first.folder).code == 0
+    again = {name: (first.folder / name / "fit.json").stat().st_mtime_ns for name in kept}
+    assert again["static"] == kept["static"]
+    assert again["lift"] > kept["lift"]
+    assert (first.folder / "validation.json").read_bytes() == before  # to the last digit
+
+
+def test_everybody_their_own_shape(run, folder, tmp_path):
+    assert run(folder, "-o", tmp_path, "--person", "none", "--rate", "10").code == 0
+    told = records(tmp_path)
+    assert {one["fit"]["shape_from"] for one in told.values()} == {"itself"}
+    assert {one["frames"] for one in told.values()} == {FRAMES // 5}
+    assert told["lift"]["cop"]["all"]["distance"]["moving: ZMP of the CoM"] is None  # 10 Hz are too few
+
+
+def copied(folder, to, *names):
+    for name in names or [path.name for path in folder.iterdir()]:
+        (to / name).write_bytes((folder / name).read_bytes())
+    return to
+
+
+def test_a_bad_file_is_told_and_the_rest_goes_on(run, folder, tmp_path):
+    (tmp_path / "lab").mkdir()
+    lab = copied(folder, tmp_path / "lab")
+    (lab / "static.trc").write_text("hello")
+    cut(lab / "lift_reference.csv")
+    said = run(lab, "-o", tmp_path / "out", "--rate", "10")
+    assert said.code == 1
+    assert "static.trc: line 1: expected PathFileType" in said.err
+    assert re.search(r"lift_reference.csv: line \d+: expected 4 columns, got \d: is the file complete", said.err)
+    assert "static could not be compared: the others found their shapes themselves" in said.out
+    assert records(tmp_path / "out").keys() == {"lift"}
+    assert (tmp_path / "out" / "validation.md").read_text().count("not compared: ") == 2
+
+
+def cut(path):
+    text = path.read_text()
+    path.write_text(text[: text.rindex(",")])
+
+
+def test_forces_in_millimetres(run, person, folder, tmp_path):
+    (tmp_path / "lab").mkdir()
+    lab = copied(folder, tmp_path / "lab", "static.trc")
+    mot(lab / "static_grf.mot", (person.com + OFF) * [1, 0, 1], lambda _t: MASS * G, scale=1000.0)
+    said = run(lab, "-o", tmp_path / "out", "--rate", "10")
+    assert said.code == 1
+    assert "static_grf.mot: looks like millimetres" in said.err
+
+
+def test_wrong_usage(run, folder, tmp_path):
+    for arguments, told in (
+        ((tmp_path / "nowhere",), "expected a folder of recordings, not there"),
+        ((tmp_path,), "expected files of markers (.trc, .c3d), got an empty folder"),
+        ((folder, "--person", "stat"), "--person: expected auto, none or one of static, lift, got 'stat'"),
+        ((folder, "--body", "nobody"), "nobody"),
+        ((folder, "--rate", "0"), "--rate"),
+    ):
+        said = run(*arguments, "-o", tmp_path / "out")
+        assert said.code == 2, said
+        assert told in said.err.replace("\n", " ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_somebody_walks(run, shared, tmp_path):
+    """OpenSim's example on a treadmill, markers in mm at 60 Hz, plates in m at 600 Hz; its model weighs 72.6 kg."""
+    said = run(shared("gait2354"), "-o", tmp_path, "--rate", "30")
+    assert said.code == 0, said.err
+    assert "g2354_bodykin.sto: taken as the centre of mass of subject01_walk1" in said.out
+    walk = records(tmp_path)["subject01_walk1"]
+    assert walk["kind"] == "walking"
+    assert walk["mass"]["plates"] == pytest.approx(72.6, rel=0.01)
+    assert walk["mass"]["volume_mean"] == pytest.approx(72.6, rel=0.10)
+    assert walk["force"]["share"] < 0.03  # m (g + the fitted body's acceleration) is the force
+    assert walk["com"]["methods"]["exact"]["distance"] < 0.05
+    for phase in ("single support", "double support"):
+        away = walk["cop"][phase]["distance"]
+        assert away["at rest: g(CoM)"] > 0.1
+        assert away["moving: ZMP of the parts"] < 0.035  # walking is no statics
