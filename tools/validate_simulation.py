@@ -31,6 +31,7 @@ from ipman_rs.cli import console
 from ipman_rs.fitting.benchmark import scenes
 from ipman_rs.fitting.benchmark.people import person as new_person
 from ipman_rs.simulation import FALLEN, Simulation, TipTest, simulate, tip_test
+from ipman_rs.simulation.fall import Engine, Shape
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "simulation.md"
@@ -109,7 +110,7 @@ def near_limit(body, template, draw) -> Array:
         if falls.size == 0 or falls[0] == 0 or bodies[: falls[0] + 1, :, 1].min() < -1e-6:
             continue
         k = falls[0]
-        low, high = bends[k - 1], bends[k]
+        low, high = bends[[k - 1, k]].tolist()
         for _ in range(8):
             middle = (low + high) / 2
             stands = tip_test(bent(scene, heading, middle), template, FLOOR).stands()
@@ -130,8 +131,14 @@ def bent(scene: scenes.Scene, heading: float, degrees: float) -> Array:
 
 def report(found: People) -> str:
     runs, seconds = {}, {}
+    compared: list[tuple[Engine, Shape]] = [
+        ("rapier", "hull"),
+        ("bullet", "hull"),
+        ("mujoco", "hull"),
+        ("rapier", "vhacd"),
+    ]
     with console.progress("simulating", 4 * len(found.vertices)) as step:
-        for engine, shape in (("rapier", "hull"), ("bullet", "hull"), ("mujoco", "hull"), ("rapier", "vhacd")):
+        for engine, shape in compared:
             done = len(runs) * len(found.vertices)
             name = engine if shape == "hull" else "rapier, V-HACD"
             start = time.process_time()

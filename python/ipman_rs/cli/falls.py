@@ -146,8 +146,8 @@ def fall(
             for vertices in pieces(recording.vertices, PIECE):
                 tips.append(tip_test(vertices, template, ground))
                 if not tip_only:
-                    told = {"progress": lambda here, done=done: bar.to(done + here)}
-                    runs.append(simulate(vertices, template, ground, times, **options, **told))
+                    told: dict[str, Any] = {**options, "progress": lambda here, done=done: bar.to(done + here)}
+                    runs.append(simulate(vertices, template, ground, times, **told))
                 done += len(vertices)
                 bar.to(done)
         result = Fall(path, _joined(tips), None if tip_only else _joined(runs), notes, ())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .fall import ENGINES, FALLEN, Simulation, simulate
-from .tipping import TipTest, tip_test
+from .fall import ENGINES, Simulation, simulate
+from .tipping import FALLEN, TipTest, tip_test
 
 __all__ = ["ENGINES", "FALLEN", "Simulation", "TipTest", "simulate", "tip_test"]

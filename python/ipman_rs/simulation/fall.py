@@ -191,7 +191,7 @@ def _cross_check(
             height=float(height[body]),
             snap=options.snap,
         )
-        for body in np.flatnonzero(starts & (status & Status.NOT_SIMULATED == 0))
+        for body in np.flatnonzero(starts & (status & Status.NOT_SIMULATED == 0)).tolist()
     }
     for body, found in each_drop(engine, drops, options.looks, options.step, options.friction):
         if np.isfinite(found).all():
