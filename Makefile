@@ -63,8 +63,9 @@ test: test-rust test-python test-levels
 	@echo 'All tests passed: Rust (cargo) and Python (pytest).'
 
 test-rust:
-	if cargo nextest --version >/dev/null 2>&1; then cargo nextest run --locked && cargo test --locked --doc; \
-	else cargo test --locked; fi
+	if cargo nextest --version >/dev/null 2>&1; then \
+		cargo nextest run --locked --features simulation && cargo test --locked --features simulation --doc; \
+	else cargo test --locked --features simulation; fi
 
 # One process a core, one thread each: torch would otherwise start its threads in every process.
 test-python: $(VENV)/test-tools $(VENV)/browser | test-rust

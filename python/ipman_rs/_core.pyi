@@ -284,3 +284,51 @@ def simd_levels() -> list[str]:
 
 def simd_level() -> str:
     """The CPU level that batches run on: avx512, avx2, neon or scalar. IPMAN_SIMD forces one."""
+
+def solids(
+    template: Template,
+    densities: Sequence[float],
+    contact: float,
+    vertices: NDArray[Any],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Each body as one solid, (B, 15): status, mass, centre, inertia row by row, height of the lowest vertex."""
+
+def tip_test(
+    template: Template,
+    densities: Sequence[float],
+    options: Sequence[float],
+    vertices: NDArray[Any],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The tip test, (B, 26): the solid's 15; height, margin, barrier, push, rate; tilt, drop, nudged tilt; at rest the
+    margin, barrier and push. options: contact, tolerance, nudge, fallen.
+    """
+
+def touching(
+    template: Template,
+    shape_name: str,
+    resolution: int,
+    vertices: NDArray[Any],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+) -> list[NDArray[np.float64]]:
+    """For each body the points (K, 3) that can touch a plane; none for a body that is no solid, or has no hull."""
+
+def simulate(
+    template: Template,
+    shape_name: str,
+    resolution: int,
+    densities: Sequence[float],
+    contact: float,
+    snap: bool,
+    step: float,
+    friction: float,
+    looks: Sequence[int],
+    vertices: NDArray[Any],
+    normal: NDArray[np.float64],
+    height: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """status (B,), and places (B, 1 + T, 12) at the start and at each look: centre of mass, rotation row by row."""

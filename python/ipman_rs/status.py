@@ -29,6 +29,8 @@ class Status(IntFlag):
     """The body encloses no volume, so it has no centre of mass."""
     ODD_SIZE = 16
     """Under 20 cm or over 10 m across: probably not in metres."""
+    NOT_SIMULATED = 32
+    """The physics engine found no hull of it, or lost it on the way."""
 
 
 class UnitsWarning(UserWarning):

@@ -180,11 +180,12 @@ def test_threads_do_not_change_a_bit(evaluated, again):
 
 
 def test_memory_does_not_grow_with_the_frames(tmp_path):
-    """What numpy and Python hold at the most while pieces are measured."""
+    """What numpy and Python hold at the most while pieces are measured: six times the frames would be six times as much
+    if it grew with them. A block of 256 bodies may wait for the collection of garbage, hence the factor of two."""
     import tracemalloc
 
     peaks = []
-    for frames in (400, 1200):
+    for frames in (400, 2400):
         true = files.truth(frames)
         guess = files.save(tmp_path / f"{frames}.npz", files.predictions(true))
         job = files.job(tmp_path / f"out{frames}", guess, files.save(tmp_path / f"true{frames}.npz", true))
@@ -193,4 +194,4 @@ def test_memory_does_not_grow_with_the_frames(tmp_path):
         job.run(Shard())
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-    assert peaks[1] < 1.1 * peaks[0]
+    assert peaks[1] < 2 * peaks[0]

@@ -1,4 +1,4 @@
-"""The command line: `ipman demo`, `ipman analyze` and `ipman fit`. Heavy imports wait until a command runs."""
+"""The command line: `ipman demo`, `analyze`, `fit` and `simulate`. Heavy imports wait until a command runs."""
 
 from __future__ import annotations
 

@@ -15,6 +15,7 @@ from .evaluate import evaluate
 from .fit import fit
 from .options import GROUND, PRESETS, UP
 from .predict import predict
+from .simulate import simulate
 from .train import train
 from .validate import validate
 
@@ -47,10 +48,12 @@ def main() -> None:
     ipman fit photo.jpg -o out      a body for the person in a photo
     ipman evaluate pred.npz --data own --path true.npz -o out   predictions against the truth
     ipman validate folder/ -o out   the engine against force plates and OpenSim
+    ipman simulate body.obj         how firmly it stands, and what becomes of it when it is let go
     """
 
 
 main.add_command(fit)
+main.add_command(simulate)
 main.add_command(benchmark)
 main.add_command(train)
 main.add_command(predict)

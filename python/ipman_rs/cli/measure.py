@@ -50,6 +50,20 @@ def measure(path: Path, request: Request) -> view.Study:
 
 
 def _measure(path: Path, request: Request) -> view.Study:
+    recording, template, ground, notes = on_ground(path, request)
+    if template.num_parts == 1:
+        notes.append("one part: the centre of mass is the exact one of the volume, not the paper's part-wise pCoM")
+    if not template.watertight:
+        notes.append("open mesh: its holes are closed by fans before volumes are measured")
+    with console.progress(f"analysing {path.name}", len(recording.vertices)) as step:
+        return view.study(
+            path.stem, recording.vertices, template, ground, request.preset,
+            seconds=recording.seconds, source=str(path), notes=notes, progress=step.to,
+        )  # fmt: skip
+
+
+def on_ground(path: Path, request: Request) -> tuple[Recording, Any, ip.Ground, list[str]]:
+    """The bodies of a file, their template and ground, and what was assumed. Raises FileError."""
     recording = read(path, request.model)
     template, notes = _template(recording, request)
     normal = request.up or recording.up
@@ -64,15 +78,7 @@ def _measure(path: Path, request: Request) -> view.Study:
         whole = "of all frames " if len(recording.vertices) > 1 else ""
         where = f"{round(height, 4) + 0.0:+.4f} m"
         notes.append(f"ground: through the lowest vertex {whole}({where}; --ground HEIGHT says otherwise)")
-    if template.num_parts == 1:
-        notes.append("one part: the centre of mass is the exact one of the volume, not the paper's part-wise pCoM")
-    if not template.watertight:
-        notes.append("open mesh: its holes are closed by fans before volumes are measured")
-    with console.progress(f"analysing {path.name}", len(recording.vertices)) as step:
-        return view.study(
-            path.stem, recording.vertices, template, ip.Ground(normal, height), request.preset,
-            seconds=recording.seconds, source=str(path), notes=notes, progress=step.to,
-        )  # fmt: skip
+    return recording, template, ip.Ground(normal, height), notes
 
 
 def read(path: Path, model: str | None) -> Recording:

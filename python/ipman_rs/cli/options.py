@@ -69,4 +69,21 @@ class ImageSize(click.ParamType):
         return width, height
 
 
+class Times(click.ParamType):
+    name = "seconds"
+
+    def convert(self, value, param, ctx):
+        """Ascending seconds."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            times = tuple(float(word) for word in value.split(","))
+        except ValueError:
+            times = ()
+        if not times or not all(0 <= time < math.inf for time in times) or list(times) != sorted(times):
+            self.fail(f"{value!r} is no ascending list of seconds such as 0.41667,2", param, ctx)
+        return times
+
+
+TIMES = Times()
 UP, GROUND, FLOOR, SIZE = UpAxis(), GroundHeight("auto"), GroundHeight("found"), ImageSize()

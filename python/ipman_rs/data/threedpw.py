@@ -71,10 +71,10 @@ def open(path: str | os.PathLike[str], split: str | None = None) -> Frames | spi
     """
     place = Path(path)
     if place.is_file() and place.suffix == ".npz":
-        return spin.open(FORM, place)
+        return FORM.open(place)
     files = [place] if place.is_file() else _sequence_files(place, split or "test")
     if not files and (place / FORM.files["test"]).is_file():
-        return spin.open(FORM, place, split)
+        return FORM.open(place, split)
     if not files:
         raise ValueError(f"{place}: no sequenceFiles/{split or 'test'}/*.pkl and no 3dpw_test.npz in it")
     return demanded(place, concatenated([person for file in files for person in _people(file)]))
@@ -84,13 +84,13 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
     """What is there, missing and wrong."""
     place = Path(path)
     if place.suffix == ".npz":
-        return spin.check(FORM, place)
+        return FORM.check(place)
     if place.is_file():
         return _check_files([place])
     if not place.is_dir():
         return [Finding("wrong", f"{place}: no such file or folder")]
     if not (place / "sequenceFiles").is_dir() and (place / FORM.files["test"]).is_file():
-        return spin.check(FORM, place)
+        return FORM.check(place)
     found: list[Finding] = []
     for split, expected in FILES.items():
         files = _sequence_files(place, split)

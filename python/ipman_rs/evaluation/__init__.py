@@ -4,9 +4,10 @@ Metrics take numpy arrays or torch tensors and give one number a body, (...), in
 there is none (`alike`). `Accumulator` adds them up over shards, exactly.
 """
 
-from .accumulator import Accumulator, Summary
+from .accumulator import Accumulator
 from .bootstrap import Interval, bootstrap, paired
 from .bose import BoseMode, bose
+from .column import Summary
 from .com_error import com_error
 from .comparison import Comparison, compare
 from .cop_error import cop_error

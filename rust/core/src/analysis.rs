@@ -90,7 +90,7 @@ impl Analysis {
     }
 
     pub fn has_densities_for(&self, num_parts: usize) -> bool {
-        [1, num_parts].contains(&self.mass.densities.len())
+        self.mass.has_densities_for(num_parts)
     }
 
     /// Writes the numbers and gives the polygon of each lane.

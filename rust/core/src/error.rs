@@ -59,6 +59,8 @@ pub mod status {
     pub const NO_VOLUME: u32 = 8;
     /// The body is under 20 cm or over 10 m across: probably not in metres.
     pub const ODD_SIZE: u32 = 16;
+    /// The physics engine found no hull of it, or lost it on the way.
+    pub const NOT_SIMULATED: u32 = 32;
 
     /// Those of a finite body with these signed part volumes and sides of its bounding box.
     pub fn bits(volumes: &[f64], sides: [f64; 3], has_contact: bool) -> u32 {

@@ -43,6 +43,14 @@ pub mod weighted;
 /// How many threads, and the pool.
 pub mod threads;
 
+/// A posed body as one stiff solid.
+pub mod solid;
+/// How firmly a stiff body stands, in closed form; where it rolls to.
+pub mod tipping;
+/// The stiff body let go on its ground, in the engine rapier.
+#[cfg(feature = "simulation")]
+pub mod simulation;
+
 /// A body that touches or penetrates itself.
 pub mod collision;
 

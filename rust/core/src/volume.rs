@@ -285,6 +285,11 @@ pub struct MassProperties {
 impl MassProperties {
     pub const ROW: usize = 14;
 
+    /// One number, or one for each part.
+    pub fn has_densities_for(&self, num_parts: usize) -> bool {
+        self.densities.len() == 1 || self.densities.len() == num_parts
+    }
+
     #[inline(always)]
     fn density(&self, part: usize) -> f64 {
         self.densities[if self.densities.len() == 1 { 0 } else { part }]
@@ -378,6 +383,14 @@ impl MassProperties {
                 *out = R::narrow(wide);
             }
         }
+    }
+
+    /// The whole body's row, in the scene's own coordinates.
+    pub fn whole<W: Real>(&self, parts: &[Moments<W>]) -> [W; Self::ROW] {
+        let (volumes, weighted) = self.weigh(parts);
+        let mut out = [W::zero(); Self::ROW];
+        row(volumes[0], &weighted[0], [W::zero(); 3], &mut out);
+        out
     }
 
     /// Volume and density-weighted moments: the whole body's first, then each part's.

@@ -22,17 +22,10 @@ fn solid(template: &Template, vertices: &[[f64; 3]], densities: &[f64]) -> Vec<f
     Batch::new(template, &common::flat(vertices), &UP, &[0.0], &|| false).unwrap().value(&quantity).unwrap()
 }
 
-/// A box with corners 0 and `size`.
-fn cuboid(size: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[i64; 3]>) {
-    let vertices = (0..8).map(|i| std::array::from_fn(|k| if i >> k & 1 == 1 { size[k] } else { 0.0 })).collect();
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    (vertices, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
-}
-
 #[test]
 fn a_box_has_the_mass_properties_of_the_textbook() {
     let [x, y, z] = [0.3, 1.7, 0.2];
-    let (vertices, faces) = cuboid([x, y, z]);
+    let (vertices, faces) = common::cuboid([x, y, z]);
     let template = Template::new(&vertices, &faces, &[], 100, 0).unwrap();
     let row = solid(&template, &vertices, &[1000.0]);
     let mass = 1000.0 * x * y * z;
@@ -79,7 +72,7 @@ fn an_open_body_closes_and_says_so() {
 
 #[test]
 fn surfaces_that_enclose_nothing_or_face_inwards_are_refused() {
-    let (vertices, faces) = cuboid([1.0, 1.0, 1.0]);
+    let (vertices, faces) = common::cuboid([1.0, 1.0, 1.0]);
     let inwards: Vec<_> = faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
     assert!(matches!(Template::new(&vertices, &inwards, &[], 10, 0), Err(Error::InsideOut { .. })));
     let sheet = Template::new(&vertices, &faces[..2], &[], 10, 0);

@@ -6,6 +6,7 @@ mod bodies;
 mod collision;
 mod error;
 mod evaluate;
+mod simulation;
 mod skinning;
 mod support;
 mod template;
@@ -22,6 +23,8 @@ mod _core {
     use crate::collision::Collision;
     #[pymodule_export]
     use crate::evaluate::{jvp, output_size, value, value_and_vjp, vjp, vjp_jvp};
+    #[pymodule_export]
+    use crate::simulation::{simulate, solids, tip_test, touching};
     #[pymodule_export]
     use crate::skinning::Skin;
     #[pymodule_export]

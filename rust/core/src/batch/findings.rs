@@ -6,8 +6,10 @@ use crate::mass::Method;
 use crate::number::vector::{Vec3, sub};
 use crate::number::{Data, Real, Scalar};
 use crate::scene::Scene;
+use crate::solid::{Extent, Solid};
 use crate::support::{BaseOfSupport, Contact};
-use crate::volume::SignedVolumes;
+use crate::tipping::{Footing, TipTest};
+use crate::volume::{MassProperties, SignedVolumes};
 
 /// What is found of a body besides quantities.
 pub(super) trait Finding: Sync {
@@ -62,6 +64,27 @@ impl Finding for Status<'_> {
     fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<u32> {
         let contacts = self.contact.find(scene);
         (0..R::LANES).map(|lane| status_of(scene, lane, contacts.count(lane))).collect()
+    }
+}
+
+pub(super) struct Solids<'a> {
+    pub densities: &'a MassProperties,
+    pub contact: f64,
+}
+
+impl Finding for Solids<'_> {
+    type Of = Solid;
+    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<Solid> {
+        let origin = |lane: usize| scene.origin.map(|x| x.lane(lane).value());
+        let solids = Solid::of_lanes(scene, &Extent::of(scene), self.densities, self.contact);
+        solids.into_iter().enumerate().map(|(lane, solid)| solid.moved(origin(lane)).or_nowhere()).collect()
+    }
+}
+
+impl Finding for TipTest {
+    type Of = Footing;
+    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<Footing> {
+        self.footings(scene)
     }
 }
 

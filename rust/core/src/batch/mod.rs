@@ -16,12 +16,15 @@ use crate::number::vector::Vec3;
 use crate::number::{Data, Dual, Real, Scalar, all_finite};
 use crate::quantity::Quantity;
 use crate::scene::{self, Scene};
+use crate::solid::Solid;
 use crate::support::{BaseOfSupport, Contact};
 use crate::template::Template;
 use crate::threads::{self, num_threads};
+use crate::tipping::{Footing, TipTest, Tipping};
+use crate::volume::MassProperties;
 #[cfg(feature = "lp")]
 use findings::SupportedLp;
-use findings::{Find, Finding, Status, Support};
+use findings::{Find, Finding, Solids, Status, Support};
 use lanes::{Figures, Forward, ForwardAndBackward, ForwardAndJacobian, OnLanes, ReadBodies, zero_if_undefined};
 
 /// `num_bodies` poses of one template, each over its ground.
@@ -207,10 +210,7 @@ impl<'a, T: Data> Batch<'a, T> {
     /// All figures of each body ([`Analysis`]): B·K numbers, and the corners of the base of support.
     pub fn analysis_into(&self, analysis: &Analysis, out: &mut [T]) -> Result<Vec<Polygon>> {
         let size = analysis.size(self.template);
-        if !analysis.has_densities_for(self.template.mesh.num_parts) {
-            let expected = format!("1 or {} numbers", self.template.mesh.num_parts);
-            return Err(Error::Argument { name: "densities", expected, got: "another number".into() });
-        }
+        self.check_densities(analysis.has_densities_for(self.template.mesh.num_parts))?;
         let mut polygons = vec![Polygon::new(); self.len()];
         let mut bodies = Vec::new();
         for (body, (row, polygon)) in out.chunks_exact_mut(size).zip(&mut polygons).enumerate() {
@@ -235,6 +235,34 @@ impl<'a, T: Data> Batch<'a, T> {
     /// The bits of [`status`].
     pub fn status(&self, contact: &Contact) -> Result<Vec<u32>> {
         self.find(status::NON_FINITE, &Status { contact })
+    }
+
+    /// Each body as one solid. One with its lowest vertex higher than `contact` metres is in the air.
+    pub fn solids(&self, densities: &MassProperties, contact: f64) -> Result<Vec<Solid>> {
+        self.check_densities(densities.has_densities_for(self.template.mesh.num_parts))?;
+        self.find(Solid::nowhere(), &Solids { densities, contact })
+    }
+
+    /// The tip test of each body.
+    pub fn tip_test(&self, test: &TipTest) -> Result<Vec<Tipping>> {
+        self.check_densities(test.densities.has_densities_for(self.template.mesh.num_parts))?;
+        let mut out = vec![Tipping::nowhere(); self.len()];
+        let bodies =
+            out.iter_mut().enumerate().filter_map(|(body, row)| Some((body, self.origin(body)?, row))).collect();
+        self.each_group(bodies, |group, out| {
+            let mut footings = vec![Footing::nowhere(); out.len()];
+            self.on_lanes(group, Find { finding: test, out: footings.iter_mut().collect() });
+            for ((out, footing), &body) in out.into_iter().zip(footings).zip(&group.bodies) {
+                *out = test.of_body(footing, self.vertices_of(body));
+            }
+        })?;
+        Ok(out)
+    }
+
+    fn check_densities(&self, fit: bool) -> Result<()> {
+        let expected = format!("1 or {} numbers", self.template.mesh.num_parts);
+        let wrong = Error::Argument { name: "densities", expected, got: "another number".into() };
+        if fit { Ok(()) } else { Err(wrong) }
     }
 
     /// What is found of each body; `bad` for a body that is not finite.
@@ -262,9 +290,19 @@ impl<'a, T: Data> Batch<'a, T> {
         all_finite(vertices).then(|| scene::origin(std::array::from_fn(|k| vertices[k].value())))
     }
 
-    fn vertices_of(&self, body: usize) -> &[T] {
+    pub(crate) fn vertices_of(&self, body: usize) -> &[T] {
         let row = 3 * self.template.mesh.num_vertices;
         &self.vertices[body * row..][..row]
+    }
+
+    #[cfg(feature = "simulation")]
+    pub(crate) fn ground_of(&self, body: usize) -> &Ground<f64> {
+        &self.grounds[body]
+    }
+
+    #[cfg(feature = "simulation")]
+    pub(crate) fn interrupted(&self) -> &(dyn Fn() -> bool + Sync) {
+        self.interrupted
     }
 
     /// The closed body in local coordinates.

@@ -49,6 +49,13 @@ pub fn icosphere(levels: usize) -> (Vec<Vec3>, Vec<[i64; 3]>) {
     (vertices, faces.into_iter().map(|face| face.map(|index| index as i64)).collect())
 }
 
+/// A box with corners 0 and `size`.
+pub fn cuboid(size: Vec3) -> (Vec<Vec3>, Vec<[i64; 3]>) {
+    let vertices = (0..8).map(|i| std::array::from_fn(|k| if i >> k & 1 == 1 { size[k] } else { 0.0 })).collect();
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    (vertices, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+}
+
 /// An ellipsoid "person" 1.7 m tall with its lowest point near y = −1 cm, faces labelled by `label` of their centroid.
 pub fn ellipsoid(levels: usize, label: impl Fn(Vec3) -> i64) -> (Vec<Vec3>, Vec<[i64; 3]>, Vec<i64>) {
     let (sphere, faces) = icosphere(levels);

@@ -1,0 +1,140 @@
+"""`ipman simulate`: how firmly stiff bodies stand, and what becomes of them when they are let go."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .errors import FileError, one_line
+from .options import GROUND, TIMES, UP
+
+if TYPE_CHECKING:
+    from .falls import Fall
+
+MOST_ROWS = 40
+
+
+@click.command()
+@click.argument("bodies", nargs=-1, required=True, metavar="BODY...", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), help="Folder for the results.")
+@click.option("--body", "model", metavar="NAME|PATH", help="Body model that parameters pose, as in `ipman analyze`.")
+@click.option("--up", type=UP, metavar="AXIS", default=None, help="What points up, as in `ipman analyze`.")
+@click.option(
+    "--ground", type=GROUND, default="auto", show_default=True, metavar="HEIGHT|auto",
+    help="Height of the ground along that axis in metres; auto: through the lowest vertex of all frames.",
+)  # fmt: skip
+@click.option("--parts", type=click.Path(path_type=Path), metavar="FILE", help="Body parts of a mesh.")
+@click.option(
+    "--engine", type=click.Choice(("rapier", "bullet", "mujoco")), default="rapier", show_default=True,
+    help="rapier is built in; the others need pip install 'ipman_rs[bullet]' or 'ipman_rs[mujoco]'.",
+)  # fmt: skip
+@click.option(
+    "--shape", type=click.Choice(("hull", "vhacd")), default="hull", show_default=True,
+    help="What touches: the convex hull (exact on a plane), or the paper's V-HACD.",
+)  # fmt: skip
+@click.option(
+    "--times", type=TIMES, default="0.41667,2", show_default=True, metavar="SECONDS,...",
+    help="When to look; the first is the paper's 100 steps of 1/240 s.",
+)  # fmt: skip
+@click.option("--step", type=click.FloatRange(1e-5, 0.1), default=1 / 240, show_default="1/240", help="Seconds.")
+@click.option("--friction", type=click.FloatRange(0.0, 100.0), default=1.0, show_default=True, help="Coulomb's.")
+@click.option(
+    "--snap/--no-snap", default=True, show_default=True,
+    help="Put the lowest point of each body on the ground first; else it starts where it is, also in the air.",
+)  # fmt: skip
+@click.option("--tip-only", is_flag=True, help="The tip test alone: no simulation, thousands of bodies a second.")
+@click.option(
+    "--filmstrips", type=click.IntRange(0, 1000), default=6, show_default=True,
+    help="Pictures of so many falls a file, evenly spaced over its bodies (with -o).",
+)  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Print simulation.json to stdout and nothing else there.")
+def simulate(
+    bodies: tuple[Path, ...],
+    output: Path | None,
+    model: str | None,
+    up: tuple[float, float, float] | None,
+    ground: float | None,
+    parts: Path | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Let stiff bodies go on their ground: do they stand or fall?
+
+    BODY is a mesh or the parameters of a body model, one body or many, as in `ipman analyze`. Each body is a rigid one
+    with the mesh's exact mass, centre of mass and inertia. The table has for each
+
+    \b
+    margin    from the centre of mass to the edge of what it stands on, mm; negative outside
+    barrier   what tips it over the nearest edge, J, and the least push, degrees a second
+    roll      how far it tilts if nothing is quick, degrees; and after a nudge
+    moved     how far its centre of mass has moved after each time, mm; tilt: of its up axis, degrees
+
+    With -o: simulation.json, simulation.npz (with each pose on the way) and a filmstrip PNG of each fall.
+
+    \b
+    ipman simulate body.obj
+    ipman simulate poses.npz -o out --times 0.41667,2,5
+    ipman simulate *.obj -o out --engine mujoco
+    ipman simulate million.npz -o out --tip-only
+
+    Exit code: 0 when all is well, 1 when a file could not be read (the others are), 2 for wrong usage.
+    """
+    from . import console
+    from .falls import fall, write_falls
+    from .measure import Request
+
+    request = Request(model=model, up=up, ground=ground, parts=parts)
+    films = options.pop("filmstrips")
+    films = films if output is not None else 0
+    falls: list[Fall] = []
+    failures: list[tuple[str, str]] = []
+    for path in bodies:
+        try:
+            falls.append(fall(path, request, films, **options))
+        except FileError as error:
+            failures.append((str(path), error.what))
+            console.error(str(error))
+        except ImportError as error:
+            raise click.ClickException(str(error)) from error
+    record = {"bodies": [one.record() for one in falls], "failures": [dict(zip(("file", "error"), failure, strict=True))
+                                                                     for failure in failures]}  # fmt: skip
+    text = json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1)
+    if output is not None and falls:
+        try:
+            write_falls(falls, output, text)
+        except OSError as error:
+            console.error(f"{output}: cannot be written ({error.strerror or error}); choose another folder")
+            sys.exit(1)
+    if as_json:
+        click.echo(text)
+    elif falls:
+        print_falls(falls)
+        if output is not None:
+            console.say(f"results: {output.resolve()}")
+    sys.exit(1 if failures else 0)
+
+
+def print_falls(falls: Sequence[Fall]) -> None:
+    """A line for each body of a file; one for all of them where they are many."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
+    table.add_column("body", overflow="fold", min_width=14)
+    for title in falls[0].titles():
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("stands", no_wrap=True)
+    for one in falls:
+        for name, cells, stands in one.rows() if one.count <= MOST_ROWS else [one.summary()]:
+            style = "" if stands is None else ("green" if stands.startswith(("yes", "100")) else "red")
+            table.add_row(one_line(name), *cells, Text(stands or "–", style=style))
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 160
+    console.print(table)

@@ -1,0 +1,136 @@
+//! The test of a pose by simulation: the stiff body is put on its ground and let go, in the engine rapier.
+//!
+//! On a plane a stiff body touches through the corners of its convex hull alone, so these are what collides: as tiny balls
+//! over a half-space, for hull against plane creeps in this engine. Mass, centre and inertia are the solid's, never the
+//! hull's. Each body has a world of its own in double precision with the engine's deterministic arithmetic.
+
+pub mod contact;
+mod world;
+
+use crate::batch::Batch;
+use crate::error::{Error, Result, status};
+use crate::number::vector::{Vec3, add_scaled, dot};
+use crate::number::{Data, all_finite};
+use crate::solid::Solid;
+use crate::threads;
+use crate::volume::MassProperties;
+use contact::Shape;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// How bodies are put on their ground and let go.
+pub struct Simulation {
+    pub densities: MassProperties,
+    /// A body with its lowest vertex higher than this is in the air, m.
+    pub contact: f64,
+    pub shape: Shape,
+    /// Puts the lowest point of what collides on the ground first. Otherwise the body starts where it is, also in the air.
+    pub snap: bool,
+    /// s
+    pub step: f64,
+    pub friction: f64,
+    /// When to look, in steps, ascending.
+    pub looks: Vec<usize>,
+}
+
+/// Where a body is: its centre of mass in the world, and how it has turned since its pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    pub centre: Vec3<f64>,
+    pub rotation: [Vec3<f64>; 3],
+}
+
+/// What became of one body.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    pub status: u32,
+    /// Where it was let go, then one place a look; NaN for a body that is not simulated.
+    pub places: Vec<Place>,
+}
+
+impl Place {
+    fn nowhere() -> Self {
+        Place { centre: [f64::NAN; 3], rotation: [[f64::NAN; 3]; 3] }
+    }
+
+    fn at(centre: Vec3<f64>) -> Self {
+        Place { centre, rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }
+    }
+}
+
+impl Simulation {
+    /// An error names the number that is out of range.
+    pub fn check(&self) -> Result<()> {
+        let positive = |name, value: f64| match value > 0.0 && value.is_finite() {
+            true => Ok(()),
+            false => Err(Error::Argument { name, expected: "a positive number".into(), got: value.to_string() }),
+        };
+        positive("step", self.step)?;
+        if !(self.friction >= 0.0 && self.friction.is_finite()) {
+            let got = self.friction.to_string();
+            return Err(Error::Argument { name: "friction", expected: "zero or more".into(), got });
+        }
+        if !self.looks.is_sorted() {
+            let got = format!("{:?}", self.looks);
+            return Err(Error::Argument { name: "looks", expected: "ascending steps".into(), got });
+        }
+        Ok(())
+    }
+
+    fn unknown(&self, status: u32) -> Motion {
+        Motion { status, places: vec![Place::nowhere(); 1 + self.looks.len()] }
+    }
+
+    /// Whatever the engine may do to one body, the others must not notice.
+    fn run(&self, solid: &Solid, normal: Vec3<f64>, height: f64, points: impl FnOnce() -> Vec<Vec3<f64>>) -> Motion {
+        let places = catch_unwind(AssertUnwindSafe(|| {
+            let points = self.shape.touching(&points())?;
+            let depth = points.iter().map(|point| -dot(normal, *point)).fold(f64::NEG_INFINITY, f64::max);
+            let mut centre = solid.centre;
+            if self.snap {
+                let up = height + depth - dot(normal, centre);
+                add_scaled(&mut centre, up, normal);
+            }
+            let fall = world::Fall { solid, normal, height, points: &points, friction: self.friction, step: self.step };
+            let mut places = vec![Place::at(centre)];
+            places.extend(fall.run(centre, &self.looks)?);
+            Some(places)
+        }));
+        match places {
+            Ok(Some(places)) => Motion { status: solid.status, places },
+            _ => self.unknown(solid.status | status::NOT_SIMULATED),
+        }
+    }
+}
+
+impl<T: Data> Batch<'_, T> {
+    /// What becomes of each body. Bodies that are no solid are not simulated, nor are those in the air when they are to
+    /// be put on the ground.
+    pub fn simulate(&self, simulation: &Simulation) -> Result<Vec<Motion>> {
+        simulation.check()?;
+        let solids = self.solids(&simulation.densities, simulation.contact)?;
+        let mut motions: Vec<Motion> = solids.iter().map(|solid| simulation.unknown(solid.status)).collect();
+        let starts = |solid: &Solid| solid.is_grounded() || (solid.is_solid() && !simulation.snap);
+        let bodies = solids.iter().zip(&mut motions).enumerate().filter(|(_, (solid, _))| starts(solid)).collect();
+        threads::each(bodies, true, self.interrupted(), &|(body, (solid, motion))| {
+            let ground = self.ground_of(body);
+            let offset = |vertex: &[T; 3]| std::array::from_fn(|k| vertex[k].value() - solid.centre[k]);
+            let points = || self.vertices_of(body).as_chunks::<3>().0.iter().map(offset).collect();
+            *motion = simulation.run(solid, ground.normal, ground.height, points);
+        })?;
+        Ok(motions)
+    }
+
+    /// The points of each body that can touch a plane, in the world; none for a body that is not finite or has no hull.
+    pub fn touching(&self, shape: &Shape) -> Result<Vec<Vec<Vec3<f64>>>> {
+        let mut found = vec![Vec::new(); self.len()];
+        threads::each(found.iter_mut().enumerate().collect(), true, self.interrupted(), &|(body, found)| {
+            if all_finite(self.vertices_of(body)) {
+                let point = |vertex: &[T; 3]| std::array::from_fn(|k| vertex[k].value());
+                let points: Vec<Vec3<f64>> = self.vertices_of(body).as_chunks::<3>().0.iter().map(point).collect();
+                let touching = catch_unwind(AssertUnwindSafe(|| shape.touching(&points)));
+                *found = touching.ok().flatten().unwrap_or_default();
+            }
+        })?;
+        Ok(found)
+    }
+}
