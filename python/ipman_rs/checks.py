@@ -36,6 +36,15 @@ def not_negative(name: str, value: float) -> float:
     return float(value)
 
 
+def whole(name: str, value: int, low: int, high: int) -> int:
+    """A whole number from `low` to `high`."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise TypeError(f"{name}: expected a whole number, got {value!r}")
+    if not low <= value <= high:
+        raise ValueError(f"{name}: expected {low} to {high}, got {value}")
+    return int(value)
+
+
 def choice(name: str, value: str, words: Any) -> str:
     """`value`, if it is one of the words of a `Literal`."""
     options = get_args(words)

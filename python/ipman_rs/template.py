@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs import _core
 from ipman_rs.arrays import plain
+from ipman_rs.checks import whole
 from ipman_rs.status import warn_odd_size
 
 if TYPE_CHECKING:
@@ -59,8 +60,8 @@ class BodyTemplate:
         if labels.ndim != 1 or len(labels) != len(self.faces):
             raise ValueError(f"face_parts: expected ({len(self.faces)},), one label a face, got {labels.shape}")
         self.face_parts = _indices("face_parts", labels)
-        samples = _whole("num_samples", num_samples, 1, 10_000_000)
-        self._seed = _whole("seed", seed, 0, 2**64 - 1)
+        samples = whole("num_samples", num_samples, 1, 10_000_000)
+        self._seed = whole("seed", seed, 0, 2**64 - 1)
         self._core = _core.Template(self.vertices, self.faces, self.face_parts, samples, self._seed)
         self._collisions: dict[float, _core.Collision] = {}
         self.part_names = _names(part_names, self.num_parts)
@@ -148,14 +149,6 @@ def _indices(name: str, array: NDArray[Any]) -> NDArray[np.int64]:
     if array.dtype == np.uint64 and array.size and array.max() > np.iinfo(np.int64).max:
         raise ValueError(f"{name}: {array.max()} is no index")
     return np.array(array, dtype=np.int64, order="C")
-
-
-def _whole(name: str, value: int, low: int, high: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise TypeError(f"{name}: expected a whole number, got {value!r}")
-    if not low <= value <= high:
-        raise ValueError(f"{name}: expected {low} to {high}, got {value}")
-    return int(value)
 
 
 def _names(names: Sequence[str] | None, num_parts: int) -> tuple[str, ...]:

@@ -265,7 +265,7 @@ def open(path: str | os.PathLike[str], split: str | None = None, *, up: str | No
     """
     if split is not None:
         raise ValueError(f"split: recordings have none, got {split!r}")
-    files = _files(path)
+    files = sequences.recordings(path, ".c3d")
     recordings = [c3d.read(file) for file in files]
     names = list(dict.fromkeys(name for found in recordings for name in found.names))
 
@@ -307,7 +307,7 @@ def _frames(
 def check(path: str | os.PathLike[str]) -> list[Finding]:
     """What `.c3d` files there are, which of them can be read, and whether units, axes and loads can be right."""
     try:
-        files = _files(path)
+        files = sequences.recordings(path, ".c3d")
     except ValueError as error:
         return [Finding("missing", str(error), "expected a .c3d file or a folder of them")]
     found = [Finding("ok", f"{len(files)} .c3d {'file' if len(files) == 1 else 'files'}")]
@@ -349,13 +349,3 @@ def _loads(file: Path) -> Finding:
     heaviest = float(plates.loads.sum(axis=1).max())
     said = f"{file.name}: {plates.forces.shape[1]} force plates, together up to {heaviest:.0f} N"
     return Finding("ok", said) if heaviest > 200 else Finding("missing", said, "nobody stands on them")
-
-
-def _files(path: str | os.PathLike[str]) -> list[Path]:
-    place = Path(path)
-    files = sorted(place.glob("**/*.c3d")) if place.is_dir() else [place]
-    if not files or not files[0].is_file():
-        raise ValueError(
-            f"{path}: expected a .c3d file or a folder of them, {'none in it' if not files else 'not there'}"
-        )
-    return files

@@ -209,7 +209,7 @@ def open(path: str | os.PathLike[str], split: str | None = None) -> DataSet:
     """
     if split is not None:
         raise ValueError(f"split: recordings have none, got {split!r}")
-    files = _files(path)
+    files = sequences.recordings(path, ".trc")
     tracks = [trc.read(file) for file in files]
     markers = list(dict.fromkeys(name for found in tracks for name in found.names))
     parts = [
@@ -259,7 +259,7 @@ def _com_at(table: Storage, tracks: Tracks) -> Array:
 def check(path: str | os.PathLike[str]) -> list[Finding]:
     """Which recordings there are, what belongs to each, and whether units and axes can be right."""
     try:
-        files = _files(path)
+        files = sequences.recordings(path, ".trc")
     except ValueError as error:
         return [Finding("missing", str(error), "expected a .trc file or a folder of them")]
     found = [Finding("ok", f"{len(files)} .trc {'file' if len(files) == 1 else 'files'}")]
@@ -280,16 +280,6 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
     return found
-
-
-def _files(path: str | os.PathLike[str]) -> list[Path]:
-    place = Path(path)
-    files = sorted(place.glob("**/*.trc")) if place.is_dir() else [place]
-    if not files or not files[0].is_file():
-        raise ValueError(
-            f"{path}: expected a .trc file or a folder of them, {'none in it' if not files else 'not there'}"
-        )
-    return files
 
 
 def _beside(files: list[Path]) -> list[tuple[Path | None, Path | None]]:

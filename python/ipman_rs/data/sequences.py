@@ -34,6 +34,17 @@ class OnDemand:
         return self.read()[rows]
 
 
+def recordings(path: str | os.PathLike[str], suffix: str) -> list[Path]:
+    """The file `path`, or all files with this suffix anywhere below the folder. ValueError where there is none."""
+    place = Path(path)
+    files = sorted(place.glob(f"**/*{suffix}")) if place.is_dir() else [place]
+    if not files or not files[0].is_file():
+        raise ValueError(
+            f"{path}: expected a {suffix} file or a folder of them, {'none in it' if not files else 'not there'}"
+        )
+    return files
+
+
 def sequences(lengths: Sequence[int], read: Callable[[int], Frames], source: str | os.PathLike[str]) -> Joined:
     """One after the other; `read(i)` gives all the `lengths[i]` frames of the i-th.
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs import _core
 from ipman_rs.arrays import Bodies
-from ipman_rs.checks import choice, not_negative, number, positive
+from ipman_rs.checks import choice, not_negative, number, positive, whole
 from ipman_rs.ground import Ground
 from ipman_rs.status import Status
 from ipman_rs.template import BodyTemplate
@@ -109,7 +109,7 @@ def simulate(
     choice("engine", engine, Engine)
     options = _Options(
         shape=choice("shape", shape, Shape),
-        resolution=_whole("resolution", resolution, 2, 1024),
+        resolution=whole("resolution", resolution, 2, 1024),
         densities=densities(density, template),
         contact=positive("contact", contact),
         snap=bool(snap),
@@ -151,14 +151,6 @@ def _looks(times: Sequence[float], step: float) -> list[int]:
     if looks[-1] > MOST_STEPS:
         raise ValueError(f"times: {times[-1]:g} s are {looks[-1]:,} steps of {step:g} s; at most {MOST_STEPS:,}")
     return looks
-
-
-def _whole(name: str, value: int, low: int, high: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise TypeError(f"{name}: expected a whole number, got {value!r}")
-    if not low <= value <= high:
-        raise ValueError(f"{name}: expected {low} to {high}, got {value}")
-    return int(value)
 
 
 def _rapier(
