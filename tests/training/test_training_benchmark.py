@@ -12,13 +12,18 @@ import pytest
 import torch
 from click.testing import CliRunner
 
+import ipman_rs.data
+from ipman_rs.body import load_body
 from ipman_rs.cli import main
 from ipman_rs.training.benchmark import report
 from ipman_rs.training.benchmark.intervals import paired_over_seeds
+from ipman_rs.training.benchmark.pictures import Pictures
 from ipman_rs.training.benchmark.rows import BASELINE, CONTROL, OURS, settings
 from ipman_rs.training.figures import figures
 from ipman_rs.training.lifting import views
+from ipman_rs.training.lifting.views import KEYPOINTS
 from ipman_rs.training.model import Estimate
+from ipman_rs.training.sources.images import Images
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +99,7 @@ def test_the_settings_have_all_rows():
 
 def test_command(tmp_path):
     arguments = ["benchmark", "train", "-o", str(tmp_path), "-n", "14", "--people", "14", "--seeds", "2"]
-    arguments += ["--split", "tune", "--part", "0.001", "--tilt", "0", "--tilt", "8"]
+    arguments += ["--split", "tune", "--part", "0.001", "--tilt", "0", "--tilt", "8", "-j", "1"]
     first = CliRunner().invoke(main, arguments)
     assert first.exit_code == 0, first.output
     record = json.loads((tmp_path / "training_benchmark.json").read_text())
@@ -116,6 +121,36 @@ def test_command(tmp_path):
     assert again.exit_code == 0
     assert {path: path.stat().st_mtime_ns for path in kept} == kept  # nothing was done twice
     assert (tmp_path / "training_benchmark.md").read_text() == page
+    other = [argument if argument != str(tmp_path) else str(tmp_path / "other") for argument in arguments]
+    assert CliRunner().invoke(main, [*other[:-1], "2"]).exit_code == 0  # two processes: the same figures
+    lines = (tmp_path / "training_benchmark.csv").read_text()
+    assert (tmp_path / "other/training_benchmark.csv").read_text() == lines
+
+
+def test_command_on_images(tmp_path):
+    pytest.importorskip("embreex", reason="embreex is not installed")
+    images = ["data", "render", "-o", str(tmp_path / "images"), "-n", "8", "--val", "0", "--test", "8", "--size", "64"]
+    assert CliRunner().invoke(main, images).exit_code == 0
+    arguments = ["benchmark", "train", "--images", str(tmp_path / "images"), "-o", str(tmp_path / "out"), "-j", "1"]
+    done = CliRunner().invoke(main, [*arguments, "--seeds", "1", "--part", "0.0002"])
+    assert done.exit_code == 0, done.output
+    record = json.loads((tmp_path / "out/training_benchmark_images.json").read_text())
+    data = ipman_rs.data.open("rendered", tmp_path / "images", split="test")
+    standing = data[:].standing
+    assert standing is not None
+    assert [block["bodies"] for block in record["blocks"]] == [standing.sum()] * 2
+    assert [block["tilt"] for block in record["blocks"]] == [0, 8]
+    assert "small" in (tmp_path / "out/training_benchmark_images.md").read_text()
+    kept = Pictures(tmp_path / "out", tmp_path / "images")
+    assert len(kept.training()) == 2 * 8
+    # Crops as they are kept, with their colours as they are, are those of the trainer.
+    source = Images(data, load_body("anny-lite"), KEYPOINTS, 96)
+    rows = np.flatnonzero(standing)
+    for row, found in zip(rows, kept.truth().inputs, strict=True):
+        torch.testing.assert_close(found, source.sample(int(row), None)["inputs"], rtol=0, atol=1e-6)
+    empty = CliRunner().invoke(main, [*arguments, "--split", "tune"])
+    assert empty.exit_code == 1
+    assert "no images of the split val" in empty.output
 
 
 def test_verdicts_say_what_the_figures_say():

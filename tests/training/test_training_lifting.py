@@ -1,4 +1,4 @@
-"""Static people, what cameras see of them, labels that lean, and a regressor that learns."""
+"""Static people, what cameras see of them, and a regressor that learns."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import torch
 import ipman_rs as ip
 from ipman_rs.body import load_body
 from ipman_rs.fitting.benchmark.scenes import FAMILIES
+from ipman_rs.training.drill import Drill, drill, estimated
 from ipman_rs.training.lifting import bodies, views
-from ipman_rs.training.lifting.drill import Drill, drill, estimated
 from ipman_rs.training.lifting.network import lifter
 from ipman_rs.training.losses import Loss, Physics
 
@@ -57,8 +57,10 @@ def test_cameras_look_at_the_pelvis_from_above(static):
     pitch = torch.rad2deg(torch.asin(-forward[:, 1]))  # how far it looks down
     assert pitch.min() >= views.PITCH[0] - 1e-3
     assert pitch.max() <= views.PITCH[1] + 1e-3
-    assert pitch.mean().item() == pytest.approx(15, abs=1.5)
-    assert torch.rad2deg(torch.asin(right[:, 1])).std().item() == pytest.approx(views.ROLL, rel=0.15)
+    assert pitch.mean().item() == pytest.approx(20, abs=3)
+    # Of a camera that looks down by p and rolls by r, the right axis is sin r cos p high.
+    roll = torch.asin(right[:, 1] / (1 - forward[:, 1] ** 2).sqrt())
+    assert torch.rad2deg(roll).std().item() == pytest.approx(views.ROLL, rel=0.15)
     assert truth.keypoints[..., :2].abs().amax().item() == pytest.approx(1 / views.ROOM, rel=1e-5)
 
 
@@ -74,30 +76,6 @@ def test_keypoints_are_the_projected_body(static, posing):
         side = seen.amax(0) - seen.amin(0)
         middle = 0.5 * (seen.amax(0) + seen.amin(0))
         torch.testing.assert_close((seen - middle) / (0.5 * 1.2 * side.max()), told, atol=1e-4, rtol=0)
-
-
-@pytest.mark.parametrize("lean", ["camera", "any"])
-def test_labels_lean_as_told(static, lean):
-    """Root and joints turn together, about level axes, by 8 ± 5 degrees; nothing else changes."""
-    clean, leaning = (views.views(static, seed=1, per_body=40, tilt=tilt, lean=lean) for tilt in (0.0, 8.0))
-    for name in ("keypoints", "camera", "pelvis", "betas"):
-        assert torch.equal(getattr(clean, name), getattr(leaning, name))
-    turn = leaning.pose[:, 0].double() @ clean.pose[:, 0].double().transpose(1, 2)  # in camera axes
-    world = clean.camera.double().transpose(1, 2) @ turn @ clean.camera.double()
-    angle = torch.rad2deg(torch.arccos(((world.diagonal(dim1=1, dim2=2).sum(1) - 1) / 2).clamp(-1, 1)))
-    spread = 5.0 * np.random.default_rng(0).standard_normal(100_000) + 8.0
-    assert angle.mean().item() == pytest.approx(spread.clip(0).mean(), abs=0.4)
-    assert angle.std().item() == pytest.approx(spread.clip(0).std(), abs=0.4)
-    of_vertical = torch.rad2deg(torch.arccos(world[:, 1, 1].clamp(-1, 1)))  # all of it
-    torch.testing.assert_close(of_vertical, angle, atol=0.1, rtol=0)  # both from single precision
-    # Where the head goes: towards the camera, which looks along the third row; or any way.
-    towards = -(clean.camera.double()[:, 2] * world[..., 1]).sum(dim=1)
-    level = -(clean.camera.double()[:, 2, 1])  # of a head that does not lean
-    nearer = (towards > level)[angle > 1].float().mean().item()
-    assert nearer == (1.0 if lean == "camera" else pytest.approx(0.5, abs=0.06))
-    moved = (turn.float() @ clean.joints[..., :3].transpose(1, 2)).transpose(1, 2)
-    torch.testing.assert_close(moved, leaning.joints[..., :3], atol=1e-5, rtol=0)
-    assert torch.equal(clean.pose[:, 1:], leaning.pose[:, 1:])
 
 
 def test_noise(static):
@@ -116,15 +94,17 @@ def test_it_learns_and_repeats_itself(static, posing):
     plan = Drill(60, 1e-3, 32)
     models = [lifter(3) for _ in range(3)]
     start = copy.deepcopy(models[0])
-    drill(models[0], Loss(posing), data, plan, seed=5)
-    drill(models[1], Loss(posing), data, plan, seed=5)
-    drill(models[2], Loss(posing, Physics(posing.body.template)), data, plan, seed=5)
+    for model, physics in zip(models, (None, None, Physics(posing.body.template)), strict=True):
+        loss = Loss(posing, physics)
+        drill(
+            model, lambda batch, model=model, loss=loss: loss(model(batch.inputs), batch)[0], data, views.noisy, plan, 5
+        )
     first, again, physical = (model.state_dict() for model in models)
     assert all(torch.equal(first[name], again[name]) for name in first)
     assert any(not torch.equal(first[name], physical[name]) for name in first)
     errors = []
     for model in (start, models[0]):
         with torch.no_grad():
-            errors.append(Loss(posing)(estimated(model, data, 9), data)[1]["joints_3d"].item())
+            errors.append(Loss(posing)(estimated(model, data.inputs), data)[1]["joints_3d"].item())
     assert errors[1] < 0.5 * errors[0]
     assert math.isfinite(errors[1])

@@ -9,7 +9,8 @@ from torch import nn
 
 import ipman_rs.torch as ipt
 from ipman_rs.body import load_body, rotations
-from ipman_rs.training.model import HMR, MeanParameters, backbone, load_spin
+from ipman_rs.training.model import HMR, MeanParameters, backbone, keypoint_maps_loss, load_spin
+from ipman_rs.training.model.backbones import mean_positions
 from ipman_rs.training.projection import project
 
 STAGES = ((64, 3), (128, 4), (256, 6), (512, 3))  # of a ResNet-50: width and blocks
@@ -129,6 +130,46 @@ def test_the_small_backbone_ignores_its_batch():
     together = encoder(images)
     assert together.shape == (3, features)
     torch.testing.assert_close(encoder(images[1:2]), together[1:2], rtol=1e-5, atol=1e-5)
+
+
+def test_maps_learn_where_keypoints_are():
+    """Where the maps are the truth, the loss is its entropy, and the mean position is the keypoint's."""
+    keypoints = torch.tensor([[[0.3, -0.55, 1.0], [-1.0, 1.0, 1.0]], [[0.0, 0.1, 1.0], [0.2, 0.2, 0.0]]])
+    cells = torch.linspace(-1, 1, 12)
+    shares = [(1 - (keypoints[..., k, None] - cells).abs() * 5.5).clamp(min=0) for k in (1, 0)]
+    truth = shares[0][..., :, None] * shares[1][..., None, :]
+
+    class Knowing:
+        def maps(self, images):
+            return (truth + 1e-12).log(), None
+
+    torch.testing.assert_close(mean_positions(Knowing().maps(None)[0]), keypoints[..., :2], atol=1e-6, rtol=0)
+    entropy = -(truth * (truth + 1e-12).log()).sum(dim=(2, 3))
+    found = keypoint_maps_loss(Knowing(), torch.zeros(2, 3, 96, 96), keypoints)  # type: ignore[arg-type]
+    torch.testing.assert_close(found, entropy[keypoints[..., 2] > 0].mean(), atol=1e-6, rtol=0)
+
+
+def test_the_small_backbone_finds_a_spot():
+    """Bright squares on noise: some steps halve the loss and bring the first map's position to them."""
+    generator = torch.Generator().manual_seed(0)
+    torch.manual_seed(0)
+    encoder = backbone("small")[0]
+    optimizer = torch.optim.Adam(encoder.parameters(), lr=3e-3)
+    losses = []
+    for _ in range(80):
+        places = torch.randint(8, 88, (16, 2), generator=generator)
+        images = 0.3 * torch.randn(16, 3, 96, 96, generator=generator)
+        for image, (x, y) in zip(images, places.tolist(), strict=True):
+            image[:, y - 5 : y + 5, x - 5 : x + 5] += 3
+        keypoints = torch.cat([places / 48 - 1, torch.ones(16, 1)], dim=1)[:, None]
+        loss = keypoint_maps_loss(encoder, images, keypoints)  # type: ignore[arg-type]
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        losses.append(loss.item())
+    assert losses[-1] < 0.5 * losses[0]
+    error = mean_positions(encoder.maps(images)[0][:, :1]) - keypoints[..., :2]  # type: ignore[operator]
+    assert error.abs().mean() < 0.15
 
 
 @pytest.mark.parametrize("name", ["resnet18", "mobilenet_v3_small", "timm/resnet10t"])

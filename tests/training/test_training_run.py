@@ -98,20 +98,50 @@ def test_a_killed_run_goes_on_as_if_nothing_had_been(whole, settings, tmp_path):
     assert again[:24] == straight  # to the last digit
 
 
+def of_torchrun(arguments) -> list[str]:
+    python, *script = command(*arguments)
+    return [python, "-m", "torch.distributed.run", "--nproc-per-node", "2", *script]
+
+
+def ended(processes: list[subprocess.Popen]) -> None:
+    for process in processes:
+        _, said = process.communicate(timeout=900)
+        assert process.returncode == 0, said[-2000:]
+
+
 def test_two_processes_are_one_with_twice_the_batch(settings, tmp_path):
-    """Equal but for the order of sums: the first losses within 1e-5, the weights after six steps within 1e-4."""
+    """Equal but for the order of sums: weights after six steps within 1e-4. Lightning, torchrun and SLURM start them
+    in their own ways, and the same comes out."""
     common = ["train", settings, "steps=6", "validate=0", "save=6", "model.dropout=0"]
-    weights = []
-    for processes in (1, 2):
-        folder = tmp_path / str(processes)
-        arguments = [*common, "-o", folder, f"devices={processes}", f"batch={8 // processes}"]
-        done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=900, check=False)
-        assert done.returncode == 0, done.stderr[-2000:]
-        weights.append(torch.load(folder / "last.ckpt", weights_only=True)["state_dict"])
+    slurm = {
+        "SLURM_JOB_ID": "1", "SLURM_JOB_NAME": "train", "SLURM_NTASKS": "2", "SLURM_NTASKS_PER_NODE": "2",
+        "SLURM_NNODES": "1", "SLURM_NODEID": "0", "SLURM_NODELIST": "localhost", "SLURM_JOB_NODELIST": "localhost",
+        "SLURM_STEP_NODELIST": "localhost",
+    }  # fmt: skip
+    weights = {}
+    for way in ("one", "lightning", "torchrun", "slurm"):
+        number = 1 if way == "one" else 2
+        arguments = [*common, "-o", tmp_path / way, f"devices={number}", f"batch={8 // number}"]
+        ranks = [{}]
+        if way == "slurm":
+            ranks = [{**slurm, "SLURM_PROCID": str(rank), "SLURM_LOCALID": str(rank)} for rank in range(2)]
+        whole = of_torchrun(arguments) if way == "torchrun" else command(*arguments)
+        ended(
+            [
+                subprocess.Popen(
+                    whole, env={**os.environ, **own}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+                )
+                for own in ranks
+            ]
+        )
+        weights[way] = torch.load(tmp_path / way / "last.ckpt", weights_only=True)["state_dict"]
     # Adam's first steps are the gradient's sign: where a gradient is near zero the two may part by the rate.
-    differences = torch.cat([(weights[0][name] - weights[1][name]).abs().flatten() for name in weights[0]])
+    both = weights["lightning"]
+    differences = torch.cat([(weights["one"][name] - both[name]).abs().flatten() for name in both])
     assert (differences < 1e-4).float().mean() > 0.999
     assert differences.max() < 6e-3
+    for way in ("torchrun", "slurm"):
+        assert all(torch.equal(weights[way][name], both[name]) for name in both)
 
 
 def test_another_configuration_is_refused(whole, settings):

@@ -39,7 +39,7 @@ def say(text: str) -> None:
 class Step:
     """How far a piece of work is: `to` a number, or `one` further."""
 
-    def __init__(self, bar: Progress, total: int, title: str) -> None:
+    def __init__(self, bar: Progress, total: int | None, title: str) -> None:
         self._bar, self._task = bar, bar.add_task(one_line(title), total=total)
 
     def to(self, done: int) -> None:
@@ -48,9 +48,13 @@ class Step:
     def one(self) -> None:
         self._bar.advance(self._task)
 
+    def of(self, done: int, total: int) -> None:
+        """For work that tells its length as it goes."""
+        self._bar.update(self._task, completed=done, total=total)
+
 
 @contextmanager
-def progress(title: str, total: int) -> Iterator[Step]:
+def progress(title: str, total: int | None = None) -> Iterator[Step]:
     """A bar on stderr while the work lasts; nothing where stderr is no terminal."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 
 import click
 
@@ -87,3 +88,20 @@ class Times(click.ParamType):
 
 TIMES = Times()
 UP, GROUND, FLOOR, SIZE = UpAxis(), GroundHeight("auto"), GroundHeight("found"), ImageSize()
+
+
+def workers():
+    """The option of commands that work in several processes."""
+    return click.option(
+        "-j",
+        "--workers",
+        type=click.IntRange(1),
+        default=_cores,
+        show_default="one a processor core",
+        help="Processes.",
+    )
+
+
+def _cores() -> int:
+    """The processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

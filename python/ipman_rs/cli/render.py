@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
 import click
+
+from .options import workers
 
 
 @click.command()
@@ -25,7 +26,7 @@ import click
     help="Share of upright people who are tipped over or in the air; labelled as not static.",
 )  # fmt: skip
 @click.option("--shard-size", type=click.IntRange(1), default=500, show_default=True, help="Images a shard.")
-@click.option("-j", "--workers", type=click.IntRange(1), help="Processes. Default: one a processor core.")
+@workers()
 def render(
     output: Path,
     images: int,
@@ -36,7 +37,7 @@ def render(
     body: str,
     moving: float,
     shard_size: int,
-    workers: int | None,
+    workers: int,
 ) -> None:
     """Images of the built-in body on a known floor, with keypoints, parameters, cameras and ground.
 
@@ -65,7 +66,7 @@ def render(
     settings = Settings(seed, size, body, moving)
     try:
         with console.progress("rendering", sum(counts.values())) as step:
-            drawn = write(output, settings, counts, shard_size, workers or _cores(), step.to)
+            drawn = write(output, settings, counts, shard_size, workers, step.to)
     except (ValueError, ImportError) as error:
         console.error(str(error))
         sys.exit(1)
@@ -77,8 +78,3 @@ def render(
         sys.exit(1)
     listed = ", ".join(f"{count} {split}" for split, count in counts.items())
     console.say(f"{output}: {listed}; {drawn} drawn now")
-
-
-def _cores() -> int:
-    """The processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -82,8 +82,8 @@ def to_crop(box: Sequence[float], change: Augmentation) -> Array:
     return np.column_stack([linear, -linear @ [x + width / 2, y + height / 2]])
 
 
-def crop(image: Image.Image, box: Sequence[float], change: Augmentation, size: int) -> Tensor:
-    """The augmented crop (3, size, size), colours normalised as ImageNet's; black beyond the image."""
+def cut(image: Image.Image, box: Sequence[float], change: Augmentation, size: int) -> Pixels:
+    """The augmented crop (size, size, 3), in the image's colours; black beyond the image."""
     whole = to_crop(box, change)
     shrink = max(1, int(2 / np.linalg.norm(whole[:, 0]) / size))  # image pixels under one of the crop
     if shrink > 1:
@@ -92,13 +92,23 @@ def crop(image: Image.Image, box: Sequence[float], change: Augmentation, size: i
     linear, shift = whole[:, :2] * shrink * size / 2, (whole[:, 2] + 1) * size / 2
     back = np.linalg.inv(linear)
     inverse = np.column_stack([back, -back @ shift]).ravel()
-    pixels = np.array(
+    return np.array(
         image.convert("RGB").transform(
             (size, size), Image.Transform.AFFINE, inverse.tolist(), Image.Resampling.BILINEAR
         )
     )
-    colours = (pixels / 255.0 * change.gains).clip(0, 1)
-    return torch.from_numpy(((colours - MEAN) / SPREAD).transpose(2, 0, 1).astype(np.float32))
+
+
+def normalised(pixels: Tensor, gains: Tensor) -> Tensor:
+    """Crops (B, S, S, 3) uint8 as inputs (B, 3, S, S): colours times `gains` (B, 3), normalised as ImageNet's."""
+    colours = (pixels * (gains / 255.0)[:, None, None]).clamp(0, 1)
+    return ((colours - gains.new_tensor(MEAN)) / gains.new_tensor(SPREAD)).permute(0, 3, 1, 2).float()
+
+
+def crop(image: Image.Image, box: Sequence[float], change: Augmentation, size: int) -> Tensor:
+    """The augmented crop (3, size, size) as a network takes it."""
+    gains = torch.tensor([change.gains], dtype=torch.float64)
+    return normalised(torch.from_numpy(cut(image, box, change, size))[None], gains)[0]
 
 
 def follow(

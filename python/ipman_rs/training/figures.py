@@ -92,5 +92,5 @@ def _columns(rotations: Tensor) -> Tensor:
 def _tilt(root: Tensor, truth: Batch) -> Array:
     """Radians (B,) between true and estimated up, as seen by pelvises that turn (B, 3, 3) in camera axes."""
     to_world = truth.camera.double().transpose(1, 2)
-    turns = (to_world @ turn for turn in (root, truth.pose[:, 0].double()))
-    return np.asarray(root_tilt(*(turn.numpy() for turn in turns), truth.ground))
+    estimated, true = ((to_world @ turn).numpy() for turn in (root, truth.pose[:, 0].double()))
+    return np.asarray(root_tilt(estimated, true, truth.ground))

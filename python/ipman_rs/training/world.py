@@ -26,3 +26,12 @@ def to_world(points: Tensor, root: Tensor, batch: Batch) -> Tensor:
     )
     side = torch.where(batch.flip[:, None], batch.pelvis.new_tensor([-1.0, 1.0, 1.0]), 1.0)
     return turned + (side * batch.pelvis)[:, None]
+
+
+def seen_from(batch: Batch) -> Tensor:
+    """World to camera (B, 3, 3) of the augmented images: of the mirrored world where they are flipped."""
+    count = len(batch)
+    origin = batch.camera.new_zeros(count, 3)
+    axes = torch.eye(3, dtype=batch.camera.dtype, device=batch.camera.device).expand(count, 3, 3)
+    turned, _ = ipt.camera_to_world(axes, origin, batch.camera, origin, flip=batch.flip, rotation=batch.turn)
+    return turned.transpose(1, 2)

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from ..figures import Figures
 from .intervals import paired_over_seeds
-from .rows import BASELINE, CONTROL, OURS
+from .rows import BASELINE, CONTROL, OURS, settings
 from .run import Benchmark, Result
 
 Array = NDArray[np.floating]
 Found = Mapping[float, Sequence[Result]]
 
-NAME = "training_benchmark"
+PAGES = {"keypoints": "training_benchmark", "images": "training_benchmark_images"}
+TEMPLATE = "training_benchmark.md.j2"
 COLUMNS = {
     "MPJPE": 1, "PA-MPJPE": 1, "PVE": 1, "BoSE": 1, "strict BoSE": 1, "tilt": 2, "penetration": 1, "hover": 1,
 }  # fmt: skip
@@ -32,23 +33,25 @@ ASKED = 8.0  # degrees: the tilt at which something was to be shown
 
 def write(found: Found, run: Benchmark) -> Path:
     """The files into the folder of the run; the page's path."""
+    name = PAGES[run.task.name]
     record = {
-        "run": {name: value for name, value in asdict(run).items() if name != "folder"},
-        "settings": asdict(run.settings),
+        "run": {"seeds": run.seeds, "part": run.part, "lean": run.lean, **run.task.told()},
+        "plan": asdict(run.plan),
+        "rows": [asdict(row) for row in settings().rows],
         "blocks": [_record(tilt, results) for tilt, results in found.items()],
     }
-    (run.folder / f"{NAME}.json").write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
-    _write_csv(found, run.folder / f"{NAME}.csv")
-    _plot(record["blocks"], run.folder / f"{NAME}.svg")
+    (run.folder / f"{name}.json").write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
+    _write_csv(found, run.folder / f"{name}.csv")
+    _plot(record["blocks"], run.folder / f"{name}.svg")
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent), trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True,
     )  # fmt: skip
     environment.filters |= {"interval": _interval, "signed": _signed}
-    page = run.folder / f"{NAME}.md"
+    page = run.folder / f"{name}.md"
     page.write_text(
-        environment.get_template(f"{NAME}.md.j2").render(
-            record, verdicts=verdicts(record["blocks"]), columns=COLUMNS, differences=DIFFERENCES
+        environment.get_template(TEMPLATE).render(
+            record, name=name, verdicts=verdicts(record["blocks"]), columns=COLUMNS, differences=DIFFERENCES
         )
     )
     return page
@@ -163,7 +166,7 @@ def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:
         axis.set_title(f"{key} against HMR*, {'mm' if key == 'PVE' else 'points'}", fontsize=9)
         axis.tick_params(labelsize=8)
     axes[0].legend(fontsize=7)
-    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}):
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "training_benchmark"}):
         figure.savefig(path, metadata={"Date": None})
 
 

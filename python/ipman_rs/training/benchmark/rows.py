@@ -9,8 +9,9 @@ from pathlib import Path
 
 from ipman_rs import BodyTemplate
 
-from ..lifting.drill import Drill
+from ..drill import Drill
 from ..losses import Physics
+from .task import Plan
 
 BASELINE = "HMR*"
 OURS = "balanced"
@@ -33,8 +34,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Settings:
-    base: Drill
-    fine: Drill
+    """plans: of each task, by its name."""
+
+    plans: Mapping[str, Plan]
     rows: tuple[Row, ...]
 
 
@@ -43,5 +45,8 @@ def settings() -> Settings:
     import yaml
 
     told = yaml.safe_load((Path(__file__).parent / "settings.yaml").read_text())
-    base, fine = (Drill(size=told["batch"], **told[name]) for name in ("base", "fine"))
-    return Settings(base, fine, tuple(Row(**row) for row in told["rows"]))
+    plans = {
+        name: Plan(*(Drill(**plan[stage]) if stage in plan else None for stage in ("first", "base", "fine")))
+        for name, plan in told["plans"].items()
+    }
+    return Settings(plans, tuple(Row(**row) for row in told["rows"]))

@@ -1,12 +1,14 @@
-"""Training of all rows on all labels. What is done is kept in a folder, and not done again."""
+"""Training of all rows on all labels, in several processes. What is done is kept in a folder, and not done again."""
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import json
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -16,19 +18,17 @@ import torch
 from ipman_rs.fitting.fit import one_thread
 
 from ..batch import Batch
+from ..drill import Drill, drill, estimated
 from ..figures import Figures, figures
-from ..lifting import bodies, views
-from ..lifting.drill import drill, estimated
-from ..lifting.network import lifter
-from ..lifting.views import Lean
+from ..leaning import Lean, leaning
 from ..losses import Loss
 from ..model import HMR
-from .rows import Row, Settings, settings
+from .rows import Row, settings
+from .shuffled_camera import shuffled_camera
+from .task import Plan, Task
 
-TRAINING = 31_000  # seeds: of the people that are trained on, and those whose figures are reported or tuned on
-SPLITS = {"test": 33_000, "tune": 32_000}
-VIEWS = 4  # of each person that is trained on
-TILTS = (0.0, 4.0, 8.0, 12.0)
+LEANS, DEALS = 35_000, 36_000  # seeds of the labels' leans, and of the shuffled cameras
+TILTS = {"keypoints": (0.0, 4.0, 8.0, 12.0), "images": (0.0, 8.0)}
 
 
 @dataclass(frozen=True)
@@ -40,84 +40,148 @@ class Result:
 
 
 @dataclass(frozen=True)
+class Job:
+    """Training of a row; of what all rows go on from (row: None); or of the encoder first (tilt: None, too)."""
+
+    seed: int
+    tilt: float | None = None
+    row: Row | None = None
+
+
+@dataclass(frozen=True)
 class Benchmark:
-    """people: that are trained on. bodies: whose figures are taken, an image each. seeds: of weights and batches.
-    part: of the settings' steps, for trials. lean: as in `lifting.views`."""
+    """seeds: of weights and batches. part: of the settings' steps, for trials. lean: as in `leaning`."""
 
     folder: Path
-    people: int = 3500
-    bodies: int = 700
+    task: Task
     seeds: int = 3
-    split: str = "test"
     part: float = 1.0
     lean: Lean = "camera"
 
-    def run(self, tilt: float, progress: Callable[[], None] = lambda: None) -> list[Result]:
-        """All rows with labels that lean by `tilt` degrees; `progress` is called after each row of each seed."""
-        found: dict[str, list[Figures]] = {row.name: [] for row in self.settings.rows}
-        for seed in range(self.seeds):
-            for row in self.settings.rows:
-                place = self._place("figures", tilt, seed, row)
-                if not place.exists():
-                    with one_thread():
-                        self._measured(tilt, seed, row).save(place)
-                found[row.name].append(Figures.load(place))
-                progress()
-        return [Result(row, found[row.name]) for row in self.settings.rows]
-
-    @cached_property
-    def settings(self) -> Settings:
-        told = settings()
-        base, fine = (
-            type(plan)(max(1, round(plan.steps * self.part)), plan.rate, plan.size) for plan in (told.base, told.fine)
-        )
-        return Settings(base, fine, told.rows)
-
-    @cached_property
-    def truth(self) -> Batch:
-        seed = SPLITS[self.split]
-        return views.views(self.drawn(seed, self.bodies), seed)
-
-    def drawn(self, seed: int, count: int, progress: Callable[[int], None] | None = None) -> bodies.Bodies:
-        """People of a seed; `progress` is told how many are drawn."""
+    def run(
+        self, tilts: Sequence[float], workers: int = 1, progress: Callable[[int, int], None] | None = None
+    ) -> dict[float, list[Result]]:
+        """All rows with labels that lean by `tilts` degrees. progress: how many trainings of how many are done."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        path = self.folder / f"people-{seed}-{count}.npz"
-        if not path.exists():
-            bodies.draw_bodies(count, seed, progress).save(path)
-        return bodies.Bodies.load(path)
+        self.task.make()
+        first = [Job(seed) for seed in range(self.seeds)] if self.plan.first else []
+        base = [Job(seed, tilt) for tilt in tilts for seed in range(self.seeds)]
+        fine = [replace(job, row=row) for job in base for row in settings().rows]
+        count, done = len(first) + len(base) + len(fine), 0
+        for group in (first, base, fine):
+            for _ in self._all(group, workers):
+                done += 1
+                if progress is not None:
+                    progress(done, count)
+        return {tilt: [self._result(tilt, row) for row in settings().rows] for tilt in tilts}
 
-    def _measured(self, tilt: float, seed: int, row: Row) -> Figures:
-        data, posing = self._data(tilt), views.posing()
-        if row.shuffled:
-            data = views.shuffled(data, TRAINING)
-        model = self._base(tilt, seed)
-        drill(model, Loss(posing, row.physics(posing.body.template)), data, self.settings.fine, 1000 + seed)
-        return figures(estimated(model, self.truth, SPLITS[self.split]), self.truth, posing)
+    @cached_property
+    def plan(self) -> Plan:
+        told = settings().plans[self.task.name]
+        return Plan(*(plan and self._shortened(plan) for plan in (told.first, told.base, told.fine)))
 
-    def _base(self, tilt: float, seed: int) -> HMR:
-        """The regressor that all rows go on from."""
-        model, place = lifter(seed), self._place("base", tilt, seed)
-        if not place.exists():
-            trained = copy.deepcopy(model)
-            drill(trained, Loss(views.posing()), self._data(tilt), self.settings.base, seed)
-            torch.save(trained.state_dict(), place)
-        model.load_state_dict(torch.load(place, weights_only=True))
+    def _shortened(self, plan: Drill) -> Drill:
+        return replace(plan, steps=max(1, round(plan.steps * self.part)))
+
+    def do(self, job: Job) -> None:
+        """One training; the file of what came out."""
+        place = self._place(job)
+        if place.exists():
+            return
+        beside = place.with_suffix(".part.npz")
+        with one_thread():
+            model = self._begun(job)
+            self._train(model, job)
+            if job.row is None:
+                torch.save(model.state_dict(), beside)
+            else:
+                figures(estimated(model, self._truth.inputs), self._truth, self.task.posing()).save(beside)
+        os.replace(beside, place)
+
+    def _all(self, jobs: Sequence[Job], workers: int) -> Iterable[None]:
+        waiting = [job for job in jobs if not self._place(job).exists()]
+        yield from (None for _ in range(len(jobs) - len(waiting)))
+        if workers == 1:
+            yield from map(self.do, waiting)
+            return
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(workers, context, _in_process, (self,)) as pool:
+            try:
+                for future in as_completed([pool.submit(_do, job) for job in waiting]):
+                    yield future.result()
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+
+    def _begun(self, job: Job) -> HMR:
+        """The regressor as the stage before left it."""
+        model = self.task.network(job.seed)
+        if job.row is not None:
+            before = replace(job, row=None)
+        elif job.tilt is not None and self.plan.first:
+            before = Job(job.seed)
+        else:
+            return model
+        model.load_state_dict(torch.load(self._place(before), weights_only=True))
         return model
+
+    def _train(self, model: HMR, job: Job) -> None:
+        data = self._data(job.tilt or 0.0)
+        if job.tilt is None:
+            assert self.plan.first
+            drill(
+                model,
+                lambda batch: self.task.first_loss(model, batch),
+                data,
+                self.task.noisy,
+                self.plan.first,
+                job.seed,
+            )
+            return
+        posing = self.task.posing()
+        physics = None if job.row is None else job.row.physics(posing.body.template)
+        loss = Loss(posing, physics)
+        if job.row is not None and job.row.shuffled:
+            data = shuffled_camera(data, DEALS)
+        plan, seed = (self.plan.base, job.seed) if job.row is None else (self.plan.fine, 1000 + job.seed)
+        drill(model, lambda batch: loss(model(batch.inputs), batch)[0], data, self.task.noisy, plan, seed)
 
     def _data(self, tilt: float) -> Batch:
         if tilt not in self._kept:
             self._kept.clear()
-            self._kept[tilt] = views.views(self.drawn(TRAINING, self.people), TRAINING, VIEWS, tilt, self.lean)
+            self._kept[tilt] = leaning(self.task.training(), tilt, LEANS, self.lean)
         return self._kept[tilt]
 
     @cached_property
     def _kept(self) -> dict[float, Batch]:
         return {}
 
-    def _place(self, kind: str, tilt: float, seed: int, row: Row | None = None) -> Path:
+    @cached_property
+    def _truth(self) -> Batch:
+        return self.task.truth()
+
+    def _result(self, tilt: float, row: Row) -> Result:
+        return Result(row, [Figures.load(self._place(Job(seed, tilt, row))) for seed in range(self.seeds)])
+
+    def _place(self, job: Job) -> Path:
         """The file of a result: named by all that decides it."""
-        told: list[Any] = [self.people, VIEWS, tilt, tilt and self.lean, seed, asdict(self.settings.base)]
-        if row is not None:
-            told += [self.split, self.bodies, asdict(self.settings.fine), row.preset, dict(row.weights), row.shuffled]
+        told: list[Any] = [self.task.told(), job.seed, self.plan.first and asdict(self.plan.first)]
+        if job.tilt is not None:
+            told += [job.tilt, job.tilt and self.lean, asdict(self.plan.base)]
+        if job.row is not None:
+            row = job.row
+            told += [asdict(self.plan.fine), row.preset, dict(row.weights), row.shuffled]
         key = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
-        return self.folder / f"{kind}-{key}.{'pt' if row is None else 'npz'}"
+        return self.folder / (f"base-{key}.pt" if job.row is None else f"figures-{key}.npz")
+
+
+# The benchmark of a working process, which keeps the data of its last tilt.
+_BENCHMARK: list[Benchmark] = []
+
+
+def _in_process(benchmark: Benchmark) -> None:
+    _BENCHMARK[:] = [benchmark]
+
+
+def _do(job: Job) -> None:
+    _BENCHMARK[0].do(job)

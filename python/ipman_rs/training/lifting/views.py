@@ -1,15 +1,8 @@
-"""Cameras around static people, the keypoints they see, and labels whose gravity may lean.
-
-A tilt of d degrees turns the labelled body, parameters and joints, about a level axis through its pelvis by d ± 5/8 d
-degrees (standard deviation, not below 0), drawn once an image. The lean is towards the camera: depth is what fits to
-images get wrong, and a regressor learns what all its labels have in common. Or it is any way, which averages out.
-Keypoints, camera and ground stay true.
-"""
+"""Cameras around static people, and the keypoints they see."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Literal
 
 import numpy as np
 import torch
@@ -27,13 +20,11 @@ from .bodies import BODY, Bodies
 
 Array = NDArray[np.floating]
 Draw = np.random.Generator
-Lean = Literal["camera", "any"]
 
 KEYPOINTS = (*coco.NAMES, "left_big_toe", "right_big_toe", "left_heel", "right_heel")
-DISTANCE, PITCH, ROLL = (3.0, 6.0), (-5.0, 35.0), 4.0  # m, degrees the camera looks down, degrees
+DISTANCE, PITCH, ROLL = (3.0, 6.0), (-20.0, 60.0), 15.0  # m, degrees the camera looks down, degrees
 ROOM = 1.2  # side of the crop over the larger extent of the keypoints
 NOISE, DROPPED = 0.02, 0.05  # in half sides of the crop (each coordinate), share of keypoints that are not seen
-TILT_SPREAD = 5 / 8  # of the mean angle
 
 
 def posing() -> Posing:
@@ -41,12 +32,10 @@ def posing() -> Posing:
     return Posing(ipt.BodyModel(BODY), KEYPOINTS)
 
 
-def views(bodies: Bodies, seed: int, per_body: int = 1, tilt: float = 0.0, lean: Lean = "camera") -> Batch:
-    """`per_body` images of each person, one after the other: inputs (n, K, 3) without noise, labels that lean by `tilt`
-    degrees towards the camera or "any" way. Cameras do not depend on the tilt."""
+def views(bodies: Bodies, seed: int, per_body: int = 1) -> Batch:
+    """`per_body` images of each person, one after the other: inputs (n, K, 3) without noise, true labels."""
     rows = np.repeat(np.arange(len(bodies)), per_body)
     cameras, places = _cameras(len(rows), np.random.default_rng([seed, 0]))
-    tilts = _tilts(cameras, tilt, lean, np.random.default_rng([seed, 1]))
     matrices = rotations.from_axis_angle(np.asarray(bodies.pose, np.float64))[rows]
     body = posing()
     with torch.no_grad():
@@ -55,15 +44,14 @@ def views(bodies: Bodies, seed: int, per_body: int = 1, tilt: float = 0.0, lean:
         joints = (posed.joints - posed.joints[:, :1]).numpy()[rows]
         points = (body.points(posed) - posed.joints[:, :1]).numpy()[rows]
     seen = points @ cameras.swapaxes(1, 2) + places[:, None]
-    labelled = cameras @ tilts
-    matrices[:, 0] = labelled @ matrices[:, 0]
+    matrices[:, 0] = cameras @ matrices[:, 0]
     count, yes = len(rows), torch.ones(len(rows), dtype=torch.bool)
     one = np.ones((count, len(KEYPOINTS), 1))
     keypoints = _single(np.concatenate([_crop(seen[..., :2] / seen[..., 2:]), one], axis=2))
     return Batch(
         inputs=keypoints,
         keypoints=keypoints,
-        joints=_single(np.concatenate([joints @ labelled.swapaxes(1, 2), np.ones((count, joints.shape[1], 1))], 2)),
+        joints=_single(np.concatenate([joints @ cameras.swapaxes(1, 2), np.ones((count, joints.shape[1], 1))], 2)),
         pose=_single(matrices),
         betas=_single(bodies.betas[rows]),
         has_body=yes,
@@ -86,12 +74,6 @@ def noisy(batch: Batch, generator: torch.Generator) -> Batch:
     return dataclasses.replace(batch, inputs=torch.cat([points * there, there], dim=-1))
 
 
-def shuffled(batch: Batch, seed: int) -> Batch:
-    """The batch with its cameras dealt out anew: the physics terms see a wrong gravity (a negative control)."""
-    order = torch.randperm(len(batch), generator=torch.Generator().manual_seed(seed))
-    return dataclasses.replace(batch, camera=batch.camera[order])
-
-
 def _cameras(count: int, draw: Draw) -> tuple[Array, Array]:
     """R (n, 3, 3), world to camera, of cameras that look at the pelvis from anywhere around, and the pelvis' place
     (n, 3) in their axes."""
@@ -103,18 +85,6 @@ def _cameras(count: int, draw: Draw) -> tuple[Array, Array]:
     turns = Rotation.from_euler("ZXY", angles, degrees=True).as_matrix()
     depth = draw.uniform(*DISTANCE, count)
     return level @ turns, np.stack([0 * depth, 0 * depth, depth], axis=1)
-
-
-def _tilts(cameras: Array, degrees: float, lean: Lean, draw: Draw) -> Array:
-    """(n, 3, 3) turns about level axes of the world, for cameras (n, 3, 3)."""
-    count = len(cameras)
-    heading = draw.uniform(0, 2 * np.pi, count)
-    angle = np.radians((degrees * (1 + TILT_SPREAD * draw.standard_normal(count))).clip(min=0))
-    axis = np.stack([np.cos(heading), 0 * heading, np.sin(heading)], axis=1)
-    if lean == "camera":
-        axis = cameras[:, 0] * [1.0, 0.0, 1.0]  # to the right in the image: about it, up turns towards the camera
-        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-    return rotations.from_axis_angle(angle[:, None] * axis)
 
 
 def _crop(points: Array) -> Array:

@@ -2,8 +2,9 @@
 
 from .backbones import backbone
 from .hmr import HMR
+from .keypoint_maps import keypoint_maps_loss
 from .mean_parameters import MeanParameters
 from .regressor import Estimate, Regressor
 from .spin_checkpoint import load_spin
 
-__all__ = ["HMR", "Estimate", "MeanParameters", "Regressor", "backbone", "load_spin"]
+__all__ = ["HMR", "Estimate", "MeanParameters", "Regressor", "backbone", "keypoint_maps_loss", "load_spin"]

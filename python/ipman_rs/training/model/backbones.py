@@ -31,23 +31,47 @@ def backbone(name: str = "resnet50", pretrained: bool = False) -> tuple[nn.Modul
 
 
 class Small(nn.Module):
-    """Six 3 × 3 convolutions, each halving the image but for the first's quarter; a step on one core takes tenths of a
-    second. Groups are normalised, not batches: a sample's features do not depend on its batch."""
+    """For CPUs: a millisecond of one core for an image of 96 pixels, with the way back. Where in the image something is
+    says how a body is posed: so maps on an eighth of the pixels, with context from a sixteenth, and the mean position
+    in each. Groups are normalised, not batches: a sample's features do not depend on its batch."""
 
-    CHANNELS = (32, 64, 96, 128, 192)
-    FEATURES = 2 * 192
+    CHANNELS = (32, 64, 128)
+    MAPS = 48
+    FEATURES = 256
 
     def __init__(self) -> None:
         super().__init__()
-        layers: list[nn.Module] = [nn.Conv2d(3, self.CHANNELS[0], 7, stride=4, padding=3), nn.ReLU()]
-        for before, after in zip(self.CHANNELS, self.CHANNELS[1:], strict=False):
-            layers += [nn.Conv2d(before, after, 3, stride=2, padding=1, bias=False), nn.GroupNorm(8, after), nn.ReLU()]
-        self.layers = nn.Sequential(*layers)
-        # Where in the image something is says how the body is posed: pooled over rows and columns, not over all.
-        self.mix = nn.Sequential(nn.AdaptiveAvgPool2d(4), nn.Flatten(), nn.Linear(16 * 192, self.FEATURES), nn.ReLU())
+        first, middle, last = self.CHANNELS
+        self.stem = nn.Sequential(nn.Conv2d(3, first, 7, stride=4, padding=3), nn.ReLU())
+        self.fine = nn.Sequential(_convolution(first, middle, 2), _convolution(middle, middle))
+        self.coarse = nn.Sequential(_convolution(middle, last, 2), _convolution(last, last))
+        self.up = nn.Conv2d(last, middle, 1)
+        self.joined = nn.Sequential(_convolution(middle, middle), nn.Conv2d(middle, self.MAPS, 1))
+        self.mix = nn.Sequential(nn.Linear(2 * self.MAPS + last, self.FEATURES), nn.ReLU())
 
     def forward(self, images: Tensor) -> Tensor:
-        return self.mix(self.layers(images))
+        maps, coarse = self.maps(images)
+        return self.mix(torch.cat([mean_positions(maps).flatten(1), coarse.mean(dim=(2, 3))], dim=1))
+
+    def maps(self, images: Tensor) -> tuple[Tensor, Tensor]:
+        """Log-probabilities but for a constant (B, 48, H/8, W/8), and the coarse features (B, 128, H/16, W/16)."""
+        fine = self.fine(self.stem(images))
+        coarse = self.coarse(fine)
+        context = nn.functional.interpolate(self.up(coarse), size=fine.shape[2:])
+        return self.joined(fine + context), coarse
+
+
+def mean_positions(maps: Tensor) -> Tensor:
+    """Of the distribution that each of the maps (B, M, h, w) is the logarithm of: x, y (B, M, 2), in half sides."""
+    share = maps.flatten(2).softmax(dim=2).unflatten(2, maps.shape[2:])
+    y, x = (torch.linspace(-1, 1, size, dtype=maps.dtype, device=maps.device) for size in maps.shape[2:])
+    return torch.stack([(share.sum(dim=2) * x).sum(dim=2), (share.sum(dim=3) * y).sum(dim=2)], dim=2)
+
+
+def _convolution(before: int, after: int, stride: int = 1) -> nn.Sequential:
+    return nn.Sequential(
+        nn.Conv2d(before, after, 3, stride=stride, padding=1, bias=False), nn.GroupNorm(8, after), nn.ReLU()
+    )
 
 
 def _torchvision(name: str, pretrained: bool) -> tuple[nn.Module, int]:

@@ -15,7 +15,7 @@ from ipman_rs.body import BodyModel, rotations
 from ipman_rs.body.embedded import NAMES
 from ipman_rs.data import DataSet, Frames
 
-from ..augment import Augmentation, Augmenting, crop, follow, to_crop
+from ..augment import Augmentation, Augmenting, Pixels, cut, follow, normalised, to_crop
 from .source import BadSample
 
 Array = NDArray[np.floating]
@@ -52,17 +52,23 @@ class Images:
         return len(self.data)
 
     def sample(self, row: int, draw: np.random.Generator | None) -> dict[str, Tensor]:
+        change = Augmentation() if draw is None else self.augmenting.draw(draw)
+        pixels, labels = self.cut(row, change)
+        gains = torch.tensor([change.gains], dtype=torch.float64)
+        return {**labels, "inputs": normalised(torch.from_numpy(pixels)[None], gains)[0]}
+
+    def cut(self, row: int, change: Augmentation) -> tuple[Pixels, dict[str, Tensor]]:
+        """The augmented crop, its colours as they are, and its labels: fields of `Batch`, less inputs."""
         frame = self.data[slice(row, row + 1)]
         if frame.boxes is None:
             raise BadSample(f"{frame.names[0]}: no box around the person")
-        change = Augmentation() if draw is None else self.augmenting.draw(draw)
+        box = frame.boxes[0].tolist()
         try:
-            whole = to_crop(frame.boxes[0].tolist(), change)
-            pixels = crop(self._image(frame, row), frame.boxes[0].tolist(), change, self.size)
+            whole = to_crop(box, change)
+            pixels = cut(self._image(frame, row), box, change, self.size)
         except (OSError, SyntaxError, ValueError) as error:
             raise BadSample(f"{frame.names[0]}: {error}") from None
-        labels = self.labels(frame)
-        return {**follow(labels, whole, change, self.keypoints, self.body.joint_names), "inputs": pixels}
+        return pixels, follow(self.labels(frame), whole, change, self.keypoints, self.body.joint_names)
 
     def labels(self, frame: Frames) -> dict[str, Tensor]:
         """Of the one image as it is: fields of `Batch`, keypoints in pixels. What is not labelled has zeros."""

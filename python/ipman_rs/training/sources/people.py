@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from ..batch import Batch
+from ..leaning import leaning
 from ..lifting.bodies import draw_bodies
 from ..lifting.views import noisy, views
 
@@ -17,7 +18,7 @@ class People:
     """`count` people of a seed, an image each; labels lean by `tilt` degrees."""
 
     def __init__(self, count: int, seed: int, tilt: float = 0.0) -> None:
-        self.views = views(draw_bodies(count, seed), seed, tilt=tilt)
+        self.views = leaning(views(draw_bodies(count, seed), seed), tilt, seed)
 
     def __len__(self) -> int:
         return len(self.views)

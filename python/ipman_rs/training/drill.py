@@ -6,11 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor, nn
 
-from ..batch import Batch
-from ..losses import Loss
-from ..model import HMR, Estimate
-from .views import noisy
+from .batch import Batch
+from .model import HMR, Estimate
+
+Noisy = Callable[[Batch, torch.Generator], Batch]
+AT_ONCE = 100  # images of an estimate
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,7 @@ class Drill:
     size: int = 64
 
 
-def drill(model: HMR, loss: Loss, data: Batch, plan: Drill, seed: int, progress: Callable[[], None] | None = None):
+def drill(model: nn.Module, loss: Callable[[Batch], Tensor], data: Batch, noisy: Noisy, plan: Drill, seed: int) -> None:
     """Train in place. Which images a step draws, and their noise, depend on the seed and the step alone."""
     optimizer = torch.optim.Adam(model.parameters(), lr=plan.rate)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, plan.steps, eta_min=plan.rate / 10)
@@ -31,17 +33,17 @@ def drill(model: HMR, loss: Loss, data: Batch, plan: Drill, seed: int, progress:
     for _ in range(plan.steps):
         rows = torch.randint(len(data), (plan.size,), generator=generator)
         batch = noisy(data[rows], generator)
-        total, _ = loss(model(batch.inputs), batch)
         optimizer.zero_grad()
-        total.backward()
+        loss(batch).backward()
         optimizer.step()
         schedule.step()
-        if progress is not None:
-            progress()
 
 
 @torch.no_grad()
-def estimated(model: HMR, data: Batch, seed: int) -> Estimate:
-    """Estimates of all images, from keypoints with the noise of a seed."""
+def estimated(model: HMR, inputs: Tensor) -> Estimate:
+    """Estimates of all inputs."""
     model.eval()
-    return model(noisy(data, torch.Generator().manual_seed(seed)).inputs)
+    parts = [model(part) for part in inputs.split(AT_ONCE)]
+    return Estimate(
+        *(torch.cat(columns) for columns in zip(*((e.pose, e.betas, e.camera) for e in parts), strict=True))
+    )

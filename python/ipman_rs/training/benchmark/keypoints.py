@@ -1,0 +1,71 @@
+"""The ablation on a regressor from keypoints of static people, which trains in seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ..batch import Batch
+from ..lifting import bodies, network, views
+from ..model import HMR
+from ..posing import Posing
+from .task import Progress
+
+TRAINING = 31_000  # seeds: of the people that are trained on, and those whose figures are reported or tuned on
+SPLITS = {"test": 34_000, "tune": 32_000}
+VIEWS = 4  # of each person that is trained on
+
+
+@dataclass(frozen=True)
+class Keypoints:
+    """people: that are trained on. bodies: whose figures are taken, an image each. folder: where people are kept."""
+
+    folder: Path
+    people: int = 3500
+    bodies: int = 700
+    split: str = "test"
+    name: str = "keypoints"
+
+    def told(self) -> dict[str, Any]:
+        told = {name: value for name, value in asdict(self).items() if name != "folder"}
+        return {**told, "views": VIEWS, "seeds": [TRAINING, SPLITS[self.split]]}
+
+    def make(self, progress: Progress | None = None) -> None:
+        count = self.people + self.bodies
+        if progress is None:
+            self._drawn(TRAINING, self.people)
+            self._drawn(SPLITS[self.split], self.bodies)
+        else:
+            self._drawn(TRAINING, self.people, lambda done: progress(done, count))
+            self._drawn(SPLITS[self.split], self.bodies, lambda done: progress(self.people + done, count))
+
+    def training(self) -> Batch:
+        return views.views(self._drawn(TRAINING, self.people), TRAINING, VIEWS)
+
+    def truth(self) -> Batch:
+        seed = SPLITS[self.split]
+        return self.noisy(views.views(self._drawn(seed, self.bodies), seed), torch.Generator().manual_seed(seed))
+
+    def noisy(self, batch: Batch, generator: torch.Generator) -> Batch:
+        return views.noisy(batch, generator)
+
+    def network(self, seed: int) -> HMR:
+        return network.lifter(seed)
+
+    def first_loss(self, model: HMR, batch: Batch) -> Tensor:
+        raise NotImplementedError("keypoints need no encoder that learns first")
+
+    def posing(self) -> Posing:
+        return views.posing()
+
+    def _drawn(self, seed: int, count: int, progress: Callable[[int], None] | None = None) -> bodies.Bodies:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / f"people-{seed}-{count}.npz"
+        if not path.exists():
+            bodies.draw_bodies(count, seed, progress).save(path)
+        return bodies.Bodies.load(path)

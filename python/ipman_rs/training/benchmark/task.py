@@ -1,0 +1,63 @@
+"""What a regressor of the ablation sees: from keypoints (`keypoints.py`), or from rendered images (`pictures.py`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import torch
+from torch import Tensor
+
+from ..batch import Batch
+from ..drill import Drill
+from ..model import HMR
+from ..posing import Posing
+
+Progress = Callable[[int, int], None]  # how many of how many are made
+
+
+@dataclass(frozen=True)
+class Plan:
+    """first: of the encoder, once for each seed; None for none. base: training without physics, once for each seed and
+    tilt. fine: what each row goes on with."""
+
+    first: Drill | None
+    base: Drill
+    fine: Drill
+
+
+class Task(Protocol):
+    """name: of the plan in settings.yaml, and of the page. A task is made once and may be sent to other processes."""
+
+    name: str
+
+    def told(self) -> dict[str, Any]:
+        """All that decides the data, for the page and for the names of kept results."""
+        ...
+
+    def make(self, progress: Progress | None = None) -> None:
+        """Draw or read the data, and keep them in files."""
+        ...
+
+    def training(self) -> Batch:
+        """What is trained on, with true labels."""
+        ...
+
+    def truth(self) -> Batch:
+        """What figures are taken of: inputs as the regressor takes them, true labels, static people."""
+        ...
+
+    def noisy(self, batch: Batch, generator: torch.Generator) -> Batch:
+        """Rows of `training` with inputs as the regressor takes them, with noise that is new at each step."""
+        ...
+
+    def network(self, seed: int) -> HMR:
+        """The regressor with the weights that a seed draws."""
+        ...
+
+    def first_loss(self, model: HMR, batch: Batch) -> Tensor:
+        """What the encoder learns first."""
+        ...
+
+    def posing(self) -> Posing: ...

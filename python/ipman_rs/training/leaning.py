@@ -1,0 +1,62 @@
+"""Labels whose gravity leans, as pseudo labels' does; images, cameras and ground stay true.
+
+A lean of d degrees turns the labelled body, parameters and joints, about a level axis through its pelvis by d ± 5/8 d
+degrees (standard deviation, not below 0), drawn once an image. The lean is towards the camera: depth is what fits to
+images get wrong, and a regressor learns what all its labels have in common. Or it is any way, which averages out.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Literal
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from ipman_rs.body import rotations
+
+from .batch import Batch
+from .world import seen_from
+
+Array = NDArray[np.floating]
+Lean = Literal["camera", "any"]
+
+SPREAD = 5 / 8  # of the mean angle
+
+
+def leaning(batch: Batch, degrees: float, seed: int, lean: Lean = "camera") -> Batch:
+    """The batch with leaning labels. Image k of all leans have the same numbers drawn; 0 degrees change nothing."""
+    if degrees == 0:
+        return batch
+    seen = seen_from(batch).double()
+    up = batch.up.double()
+    turn = seen @ torch.from_numpy(_turns(seen.numpy(), up.numpy(), degrees, lean, seed)) @ seen.transpose(1, 2)
+    return dataclasses.replace(batch, pose=_turned_root(batch.pose, turn), joints=_turned(batch.joints, turn))
+
+
+def _turns(seen: Array, up: Array, degrees: float, lean: Lean, seed: int) -> Array:
+    """(n, 3, 3) turns about level axes of the world, for cameras (n, 3, 3)."""
+    draw = np.random.default_rng(seed)
+    heading = draw.uniform(0, 2 * np.pi, len(seen))
+    angle = np.radians((degrees * (1 + SPREAD * draw.standard_normal(len(seen)))).clip(min=0))
+    # About `right`, what is up turns towards the camera, which looks along the third row.
+    right = np.cross(seen[:, 2], up)
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    axis = (
+        right if lean == "camera" else np.cos(heading)[:, None] * right + np.sin(heading)[:, None] * np.cross(up, right)
+    )
+    return rotations.from_axis_angle(angle[:, None] * axis)
+
+
+def _turned_root(pose: Tensor, turn: Tensor) -> Tensor:
+    root = (turn @ pose[:, 0].double()).to(pose.dtype)
+    return torch.cat([root[:, None], pose[:, 1:]], dim=1)
+
+
+def _turned(joints: Tensor, turn: Tensor) -> Tensor:
+    """Joints (B, J, 4) about the first, the pelvis."""
+    pelvis = joints[:, :1, :3]
+    moved = pelvis + (joints[..., :3] - pelvis) @ turn.transpose(1, 2).to(joints.dtype)
+    return torch.cat([moved, joints[..., 3:]], dim=-1)
