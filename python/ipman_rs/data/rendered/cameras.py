@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 Array = NDArray[np.floating]
 
 FOCAL = (1.0, 2.5)  # sides of the image
-ELEVATION = (-5.0, 40.0)  # degrees that the camera looks down
+ELEVATION = (-10.0, 60.0)  # degrees that the camera looks down
 ROLL = 5.0  # degrees, standard deviation
 EXTENT = (0.6, 0.88)  # of the image that the person spans
 MARGIN = 0.03  # of the image, at its border

@@ -33,7 +33,7 @@ from .task import Progress
 SPLITS = {"test": "test", "tune": "val"}
 SIZE = 96  # pixels of a crop
 CUTS = 2  # of each image that is trained on, flipped, turned and scaled by themselves
-AUGMENTING = Augmenting(degrees=15.0, turned=1.0, scale=0.1, noise=0.2)
+AUGMENTING = Augmenting(degrees=30.0, turned=1.0, scale=0.1, noise=0.2)
 HIDDEN = 512
 
 
