@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 import signal
 import subprocess
@@ -188,6 +189,7 @@ def test_configurations_survive_their_file(settings):
     ("changes", "said"),
     [
         (["model.backbone=small"], "people.*need model.backbone: keypoints"),
+        (["loss.keypoint_maps=1"], "loss.keypoint_maps: has maps with model.backbone: small alone"),
         (["data=[{name: rendered, path: nowhere}]"], "keypoints' is for 'people' alone"),
         (["data=[{name: rendered, path: nowhere}]", "model.backbone=small", "validation=[]"], "rendered: .*nowhere"),
         (
@@ -227,6 +229,7 @@ def test_rendered_images(tmp_path):
 data: [{{name: rendered, path: {tmp_path / "images"}, options: {{split: train}}}}]
 validation: [{{name: rendered, path: {tmp_path / "images"}, options: {{split: val}}}}]
 model: {{backbone: small, size: 64}}
+loss: {{keypoint_maps: 0.02}}
 physics: {{preset: balanced}}
 steps: 3
 batch: 4
@@ -239,6 +242,7 @@ accelerator: cpu
     terms = curve(tmp_path / "out")[2]
     assert float(terms["balance"]) > 0
     assert float(terms["keypoints_2d"]) > 0
+    assert 0 < float(terms["keypoint_maps"]) < 1.2 * math.log(64)  # of maps of 8 x 8
     assert float(terms["pose"]) > 0
     assert float(curve(tmp_path / "out", "validation.csv")[0]["rendered/0/PVE"]) > 0
 

@@ -81,7 +81,7 @@ class Pictures:
 
     def first_loss(self, model: HMR, batch: Batch) -> Tensor:
         """Where the keypoints are."""
-        return keypoint_maps_loss(cast("Small", model.encoder), batch.inputs, batch.keypoints)
+        return keypoint_maps_loss(cast("Small", model.encoder).maps(batch.inputs)[0], batch.keypoints)
 
     def posing(self) -> Posing:
         return Posing(ipt.BodyModel(self._data("train").index["settings"]["body"]), KEYPOINTS)

@@ -23,11 +23,14 @@ from .positive_scale import positive_scale_loss
 
 @dataclass(frozen=True)
 class Weights:
+    """keypoint_maps: of `model.keypoint_maps_loss`, which the trainer adds for the backbone "small"."""
+
     keypoints_2d: float = 5.0
     joints_3d: float = 5.0
     pose: float = 1.0
     betas: float = 0.001
     scale: float = 1.0
+    keypoint_maps: float = 0.0
     all: float = 60.0
 
 

@@ -32,8 +32,8 @@ def backbone(name: str = "resnet50", pretrained: bool = False) -> tuple[nn.Modul
 
 class Small(nn.Module):
     """For CPUs: a millisecond of one core for an image of 96 pixels, with the way back. Where in the image something is
-    says how a body is posed: so maps on an eighth of the pixels, with context from a sixteenth, and the mean position
-    in each. Groups are normalised, not batches: a sample's features do not depend on its batch."""
+    says how a body is posed: so maps at an eighth of the resolution, with context from a sixteenth, and the mean
+    position in each. Groups are normalised, not batches: a sample's features do not depend on its batch."""
 
     CHANNELS = (32, 64, 128)
     MAPS = 48
@@ -50,8 +50,7 @@ class Small(nn.Module):
         self.mix = nn.Sequential(nn.Linear(2 * self.MAPS + last, self.FEATURES), nn.ReLU())
 
     def forward(self, images: Tensor) -> Tensor:
-        maps, coarse = self.maps(images)
-        return self.mix(torch.cat([mean_positions(maps).flatten(1), coarse.mean(dim=(2, 3))], dim=1))
+        return self.features(*self.maps(images))
 
     def maps(self, images: Tensor) -> tuple[Tensor, Tensor]:
         """Log-probabilities but for a constant (B, 48, H/8, W/8), and the coarse features (B, 128, H/16, W/16)."""
@@ -59,6 +58,10 @@ class Small(nn.Module):
         coarse = self.coarse(fine)
         context = nn.functional.interpolate(self.up(coarse), size=fine.shape[2:])
         return self.joined(fine + context), coarse
+
+    def features(self, maps: Tensor, coarse: Tensor) -> Tensor:
+        """(B, 256) of what `maps` gave."""
+        return self.mix(torch.cat([mean_positions(maps).flatten(1), coarse.mean(dim=(2, 3))], dim=1))
 
 
 def mean_positions(maps: Tensor) -> Tensor:

@@ -1,22 +1,21 @@
-"""What the small backbone may learn first: where in the image the keypoints are. It gets its positions from that, as a
-large backbone gets its features from ImageNet; from labels of bodies alone it learns them many times slower."""
+"""Where in the image the keypoints are, as the maps of the small backbone have it. It learns positions from that, as a
+large backbone has its features from ImageNet; from labels of bodies alone it takes many times as long."""
 
 from __future__ import annotations
 
 import torch
 from torch import Tensor
 
-from .backbones import Small
 
+def keypoint_maps_loss(maps: Tensor, keypoints: Tensor) -> Tensor:
+    """Mean cross-entropy of the first K of the maps (B, M, h, w) of `Small.maps` against keypoints (B, K, 3).
 
-def keypoint_maps_loss(network: Small, images: Tensor, keypoints: Tensor) -> Tensor:
-    """Mean cross-entropy of the first K maps of images (B, 3, H, W) against keypoints (B, K, 3), x and y in half sides
-    of the crop and confidence. The truth lies on the four cells around a keypoint, in bilinear shares."""
-    maps = network.maps(images)[0][:, : keypoints.shape[1]]
-    truth = (
-        _shares(keypoints[..., 1], maps.shape[2])[..., :, None]
-        * _shares(keypoints[..., 0], maps.shape[3])[..., None, :]
-    )
+    Keypoints: x and y in half sides of the crop, and confidence. The truth lies on the four cells around one, in
+    bilinear shares.
+    """
+    maps = maps[:, : keypoints.shape[1]]
+    rows, columns = _shares(keypoints[..., 1], maps.shape[2]), _shares(keypoints[..., 0], maps.shape[3])
+    truth = rows[..., :, None] * columns[..., None, :]
     entropy = -(truth.flatten(2) * maps.flatten(2).log_softmax(dim=2)).sum(dim=2)
     return (keypoints[..., 2] * entropy).sum() / keypoints[..., 2].sum().clamp(min=1)
 

@@ -106,6 +106,8 @@ def config(content: Mapping[str, Any]) -> Config:
         raise ValueError("data: expected at least one data set to train on, got none")
     if made.physics.preset != "none" and made.physics.preset not in PRESETS:
         raise ValueError(f"physics.preset: expected none or one of {', '.join(PRESETS)}, got {made.physics.preset!r}")
+    if made.loss.keypoint_maps and made.model.backbone != "small":
+        raise ValueError("loss.keypoint_maps: has maps with model.backbone: small alone")
     for name in ("steps", "batch", "save", "log"):
         if getattr(made, name) < 1:
             raise ValueError(f"{name}: expected at least 1, got {getattr(made, name)}")
