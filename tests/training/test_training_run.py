@@ -246,6 +246,20 @@ accelerator: cpu
     assert float(terms["pose"]) > 0
     assert float(curve(tmp_path / "out", "validation.csv")[0]["rendered/0/PVE"]) > 0
 
+    # Predictions for the same images, measured by `ipman evaluate`: what the trainer's validation said.
+    seen = ["--data", "rendered", "--path", str(tmp_path / "images"), "--split", "val"]
+    predicting = ["predict", *seen, "--checkpoint", str(tmp_path / "out/last.ckpt"), "-o", str(tmp_path / "predicted")]
+    done = CliRunner().invoke(main, predicting)
+    assert done.exit_code == 0, done.output
+    measuring = ["evaluate", str(tmp_path / "predicted/predictions.npz"), *seen, "-o", str(tmp_path / "measured")]
+    done = CliRunner().invoke(main, measuring)
+    assert done.exit_code == 0, done.output
+    with (tmp_path / "measured/evaluation.csv").open() as file:
+        measured = {line["figure"]: float(line["mean"]) for line in csv.DictReader(file)}
+    validated = curve(tmp_path / "out", "validation.csv")[0]
+    for figure in ("PVE", "MPJPE", "PA-MPJPE", "BoSE", "hover"):
+        assert measured[figure] == pytest.approx(float(validated[f"rendered/0/{figure}"]), abs=0.01)
+
     # And back: bodies for two of the images and a file that is none.
     import numpy as np
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("images", nargs=-1, required=True, metavar="IMAGE|FOLDER...", type=click.Path(path_type=Path))
+@click.argument("images", nargs=-1, metavar="[IMAGE|FOLDER...]", type=click.Path(path_type=Path))
 @click.option("--checkpoint", required=True, type=click.Path(dir_okay=False, path_type=Path), help="Of `ipman train`.")
 @click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Output folder.")
 @click.option(
@@ -30,17 +30,43 @@ if TYPE_CHECKING:
 @click.option(
     "--pictures", type=click.IntRange(0), default=8, show_default=True, help="Draw the first N images (seconds each)."
 )
-def predict(images: tuple[Path, ...], checkpoint: Path, output: Path, pictures: int, **seen: Any) -> None:
+@click.option("--data", metavar="NAME", help="Instead of images: a data set of `ipman data list` that has some.")
+@click.option("--path", type=click.Path(path_type=Path), help="With --data: where it is.")
+@click.option("--split", help="With --data: which part of it. Default: all.")
+@click.option(
+    "--image-folder", type=click.Path(file_okay=False, path_type=Path), default=Path(),
+    help="With --data: where the paths of its images begin.",
+)  # fmt: skip
+def predict(
+    images: tuple[Path, ...],
+    checkpoint: Path,
+    output: Path,
+    pictures: int,
+    data: str | None,
+    path: Path | None,
+    split: str | None,
+    image_folder: Path,
+    **seen: Any,
+) -> None:
     """A body for the person in each image, from a regressor that `ipman train` trained, in one look.
 
     The same report as of `ipman fit`, and for each image a folder with parameters (.npz, for `ipman analyze`) and mesh
     (.glb). The floor lies under the body's lowest vertex; up is the camera's, but for --camera-pitch.
+
+    With --data the people of a data set, in its axes, in OUTPUT/predictions.npz for `ipman evaluate`:
+
+    \b
+    ipman predict photos/ --checkpoint out/hmr/best.ckpt -o out/found
+    ipman predict --data rich-ipman --path rich_test.npz --image-folder RICH --checkpoint out/hmr/best.ckpt -o out/rich
+    ipman evaluate out/rich/predictions.npz --table rich --path rich_test.npz --models models/ -o out/table
 
     Exit code: 0 when every image has a body, 1 when one has none (the others have), 2 for wrong usage.
     """
     from . import console
     from .fit_inputs import IMAGES
 
+    if (data is None) == (not images) or (data is None) != (path is None):
+        raise click.UsageError("expected images, or --data with --path")
     try:
         from ..training.predict import Trained
 
@@ -51,6 +77,9 @@ def predict(images: tuple[Path, ...], checkpoint: Path, output: Path, pictures: 
     except ValueError as error:
         console.error(str(error))
         sys.exit(1)
+    if data is not None:
+        _write_predictions(trained, data, path, split, image_folder, output)
+        return
     paths = [found for path in images for found in (_inside(path, IMAGES) if path.is_dir() else [path])]
     studies: list[Study] = []
     failures: list[tuple[str, str]] = []
@@ -69,6 +98,26 @@ def predict(images: tuple[Path, ...], checkpoint: Path, output: Path, pictures: 
         console.print_table(studies)
         console.say(f"report: {page}")
     sys.exit(1 if failures or not paths else 0)
+
+
+def _write_predictions(
+    trained: Trained, name: str, path: Path | None, split: str | None, images: Path, output: Path
+) -> None:
+    import ipman_rs.data
+
+    from . import console
+    from .fit_outputs import npz, write_whole
+
+    try:
+        data = ipman_rs.data.open(name, path, **({} if split is None else {"split": split}))
+        with console.progress("looking", len(data)) as step:
+            found = trained.of_data_set(data, images, step.to)
+    except (OSError, TypeError, ValueError) as error:
+        console.error(f"{name}: {error}")
+        sys.exit(1)
+    output.mkdir(parents=True, exist_ok=True)
+    write_whole(output / "predictions.npz", npz(found))
+    console.say(f"{output / 'predictions.npz'}: {len(found['names'])} of {len(data)} people")
 
 
 def _inside(folder: Path, endings: tuple[str, ...]) -> list[Path]:

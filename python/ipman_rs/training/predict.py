@@ -1,11 +1,14 @@
-"""Bodies for images from a trained regressor: parameters in a world whose up is the camera's, but for its pitch."""
+"""Bodies for images from a trained regressor: in a world whose up is the camera's, but for its pitch, or in that of a
+data set."""
 
 from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,15 +17,21 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import ipman_rs.torch as ipt
+from ipman_rs.data import DataSet
 
 from .augment import ROOM, Augmentation, crop, to_crop
+from .batch import Batch
 from .lifting.views import KEYPOINTS
 from .model import HMR
 from .model.made import made
 from .posing import Posing
+from .sources import BadSample, Images
+from .sources.images import body_kind
 from .trainer.config import Config, config
 
 Array = NDArray[np.floating]
+
+PREDICTED = ("names", "pose", "betas", "transl")
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +76,40 @@ class Trained:
         }
         model.load_state_dict(weights)
         return cls(model.eval(), settings, posing)
+
+    @torch.no_grad()
+    def of_data_set(
+        self, data: DataSet, images: Path = Path(), progress: Callable[[int], None] = lambda done: None
+    ) -> dict[str, Array]:
+        """The people of a data set with images, as `ipman evaluate` reads them.
+
+        names (F,); pose (F, J, 3), betas (F, b) and transl (F, 3) in the axes of its bodies; and body, a word.
+
+        images: the folder in which their paths begin. As in the authors' code, an estimated pelvis is put where the
+        true one is. Frames whose image cannot be read are warned of and left out; progress is told how many are done.
+        ValueError: none is left.
+        """
+        body = self.posing.body.body
+        source = Images(data, body, KEYPOINTS, self.settings.model.size, folder=images)
+        rows: list[tuple[Any, ...]] = []
+        for row in range(len(data)):
+            try:
+                batch = Batch.of([source.sample(row, None)])
+            except BadSample as error:
+                warnings.warn(f"left out: {error}", stacklevel=2)
+                continue
+            estimate = self.model(batch.inputs)
+            matrices, betas = estimate.rotations[0].double().numpy(), estimate.betas[0].double().numpy()
+            matrices[0] = batch.camera[0].double().numpy().T @ matrices[0]
+            pelvis = body.J_template[0] + body.J_shapedirs[0] @ betas
+            pose = Rotation.from_matrix(matrices).as_rotvec()
+            name = str(data[slice(row, row + 1)].names[0])
+            rows.append((name, pose, betas, batch.pelvis[0].double().numpy() - pelvis))
+            progress(row + 1)
+        if not rows:
+            raise ValueError("data: none of its images can be read")
+        found = {key: np.array(column) for key, column in zip(PREDICTED, zip(*rows, strict=True), strict=True)}
+        return {**found, "body": np.array(body_kind(body))}
 
     @torch.no_grad()
     def predict(self, image: Any, box: Sequence[float], focal: float | None = None, pitch: float = 0.0) -> Prediction:

@@ -106,7 +106,7 @@ class Images:
 
     def _is_own(self, name: str | None) -> bool:
         """Whether parameters of the body `name` are those of this model."""
-        return name == self.body.name or (self.body.name not in NAMES and name == KINDS.get(self.body.num_joints))
+        return name == body_kind(self.body)
 
     def _image(self, frame: Frames, row: int) -> Any:
         """A PIL image: the data set's own, or the file that the frame names."""
@@ -119,6 +119,11 @@ class Images:
             raise BadSample(f"{frame.names[0]}: no image")
         with Image.open(self.folder / str(frame.images[0])) as image:
             return image.convert("RGB")
+
+
+def body_kind(body: BodyModel) -> str:
+    """By which name data sets and predictions call the parameters of a model: "smpl", "smplh", "smplx", or its own."""
+    return body.name if body.name in NAMES else KINDS.get(body.num_joints, body.name)
 
 
 def _named(
