@@ -255,10 +255,10 @@ accelerator: cpu
     done = CliRunner().invoke(main, measuring)
     assert done.exit_code == 0, done.output
     with (tmp_path / "measured/evaluation.csv").open() as file:
-        measured = {line["figure"]: float(line["mean"]) for line in csv.DictReader(file)}
+        measured = {line["figure"]: line["mean"] for line in csv.DictReader(file)}
     validated = curve(tmp_path / "out", "validation.csv")[0]
     for figure in ("PVE", "MPJPE", "PA-MPJPE", "BoSE", "hover"):
-        assert measured[figure] == pytest.approx(float(validated[f"rendered/0/{figure}"]), abs=0.01)
+        assert float(measured[figure]) == pytest.approx(float(validated[f"rendered/0/{figure}"]), abs=0.01)
 
     # And back: bodies for two of the images and a file that is none.
     import numpy as np
