@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from ipman_rs import BodyTemplate
 
@@ -45,8 +46,9 @@ def settings() -> Settings:
     import yaml
 
     told = yaml.safe_load((Path(__file__).parent / "settings.yaml").read_text())
-    plans = {
-        name: Plan(*(Drill(**plan[stage]) if stage in plan else None for stage in ("first", "base", "fine")))
-        for name, plan in told["plans"].items()
-    }
+    plans = {name: _plan(**plan) for name, plan in told["plans"].items()}
     return Settings(plans, tuple(Row(**row) for row in told["rows"]))
+
+
+def _plan(base: dict[str, Any], fine: dict[str, Any], first: dict[str, Any] | None = None) -> Plan:
+    return Plan(Drill(**first) if first else None, Drill(**base), Drill(**fine))

@@ -78,7 +78,8 @@ class Benchmark:
     @cached_property
     def plan(self) -> Plan:
         told = settings().plans[self.task.name]
-        return Plan(*(plan and self._shortened(plan) for plan in (told.first, told.base, told.fine)))
+        first = told.first and self._shortened(told.first)
+        return Plan(first, self._shortened(told.base), self._shortened(told.fine))
 
     def _shortened(self, plan: Drill) -> Drill:
         return replace(plan, steps=max(1, round(plan.steps * self.part)))
