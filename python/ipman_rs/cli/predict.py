@@ -77,7 +77,7 @@ def predict(
     except ValueError as error:
         console.error(str(error))
         sys.exit(1)
-    if data is not None:
+    if data is not None and path is not None:
         _write_predictions(trained, data, path, split, image_folder, output)
         return
     paths = [found for path in images for found in (_inside(path, IMAGES) if path.is_dir() else [path])]
@@ -100,9 +100,7 @@ def predict(
     sys.exit(1 if failures or not paths else 0)
 
 
-def _write_predictions(
-    trained: Trained, name: str, path: Path | None, split: str | None, images: Path, output: Path
-) -> None:
+def _write_predictions(trained: Trained, name: str, path: Path, split: str | None, images: Path, output: Path) -> None:
     import ipman_rs.data
 
     from . import console

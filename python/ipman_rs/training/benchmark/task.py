@@ -28,9 +28,12 @@ class Plan:
 
 
 class Task(Protocol):
-    """name: of the plan in settings.yaml, and of the page. A task is made once and may be sent to other processes."""
+    """A task is made once and may be sent to other processes."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """Of the plan in settings.yaml, and of the page."""
+        ...
 
     def told(self) -> dict[str, Any]:
         """All that decides the data, for the page and for the names of kept results."""
