@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from .options import workers
+from .options import several_processes
 
 
 @click.group()
@@ -85,7 +85,7 @@ def fit(output: Path, bodies: int, controls: int, iterations: int, split: str, o
     help="Where to labels lean: all towards the camera, or each any way.",
 )  # fmt: skip
 @click.option("--part", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Of the steps, for a trial.")
-@workers()
+@several_processes
 def train(
     output: Path,
     images: Path | None,

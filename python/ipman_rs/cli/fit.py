@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import FileError
-from .options import FLOOR, SIZE
+from .options import FLOOR, SIZE, of_unknown_camera
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -30,11 +30,7 @@ if TYPE_CHECKING:
     "--body", "model", default="anny-lite", show_default=True, metavar="NAME|PATH",
     help="Body model: anny-lite, anny, or an SMPL, SMPL+H or SMPL-X file (.pkl, .npz).",
 )  # fmt: skip
-@click.option("--focal", type=float, metavar="PX", help="Focal length in pixels. Default: the image's diagonal.")
-@click.option(
-    "--camera-pitch", "pitch", type=float, default=0.0, show_default=True, metavar="DEGREES",
-    help="How far the camera looks down; negative: up.",
-)  # fmt: skip
+@of_unknown_camera
 @click.option(
     "--camera", type=click.Path(path_type=Path), metavar="FILE",
     help="JSON of a known camera: R, t (world to camera), focal, center, or K; before --focal and --camera-pitch.",

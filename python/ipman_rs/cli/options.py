@@ -1,4 +1,4 @@
-"""The types of the options: an up axis and a ground height. Light: `ipman --help` loads this."""
+"""The types of the options, and options that commands share. Light: `ipman --help` loads this."""
 
 from __future__ import annotations
 
@@ -90,18 +90,24 @@ TIMES = Times()
 UP, GROUND, FLOOR, SIZE = UpAxis(), GroundHeight("auto"), GroundHeight("found"), ImageSize()
 
 
-def workers():
+def several_processes(command):
     """The option of commands that work in several processes."""
     return click.option(
-        "-j",
-        "--workers",
-        type=click.IntRange(1),
-        default=_cores,
-        show_default="one a processor core",
+        "-j", "--workers", type=click.IntRange(1), default=_cores, show_default="one a processor core",
         help="Processes.",
-    )
+    )(command)  # fmt: skip
 
 
 def _cores() -> int:
     """The processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def of_unknown_camera(command):
+    """The options of commands that assume a camera for an image."""
+    pitch = click.option(
+        "--camera-pitch", "pitch", type=float, default=0.0, show_default=True, metavar="DEGREES",
+        help="How far the camera looks down; negative: up.",
+    )  # fmt: skip
+    diagonal = "Focal length in pixels. Default: the image's diagonal."
+    return click.option("--focal", type=float, metavar="PX", help=diagonal)(pitch(command))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import FileError
+from .options import of_unknown_camera
 
 if TYPE_CHECKING:
     from ..training.predict import Trained
@@ -22,11 +23,7 @@ if TYPE_CHECKING:
 @click.option(
     "--box", type=float, nargs=4, metavar="X Y W H", help="Pixels around the person. Default: the whole image."
 )
-@click.option("--focal", type=float, metavar="PX", help="Focal length in pixels. Default: the image's diagonal.")
-@click.option(
-    "--camera-pitch", "pitch", type=float, default=0.0, show_default=True, metavar="DEGREES",
-    help="How far the camera looks down; negative: up.",
-)  # fmt: skip
+@of_unknown_camera
 @click.option(
     "--pictures", type=click.IntRange(0), default=8, show_default=True, help="Draw the first N images (seconds each)."
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from .options import workers
+from .options import several_processes
 
 
 @click.command()
@@ -26,7 +26,7 @@ from .options import workers
     help="Share of upright people who are tipped over or in the air; labelled as not static.",
 )  # fmt: skip
 @click.option("--shard-size", type=click.IntRange(1), default=500, show_default=True, help="Images a shard.")
-@workers()
+@several_processes
 def render(
     output: Path,
     images: int,
