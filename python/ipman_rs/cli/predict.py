@@ -54,8 +54,8 @@ def predict(
 
     \b
     ipman predict photos/ --checkpoint out/hmr/best.ckpt -o out/found
-    ipman predict --data rich-ipman --path rich_test.npz --image-folder RICH --checkpoint out/hmr/best.ckpt -o out/rich
-    ipman evaluate out/rich/predictions.npz --table rich --path rich_test.npz --models models/ -o out/table
+    ipman predict --data rich-ipman --path RICH/ --image-folder RICH/ --checkpoint out/hmr/best.ckpt -o out/rich
+    ipman evaluate out/rich/predictions.npz --table rich --path RICH/ --models models/ -o out/table
 
     Exit code: 0 when every image has a body, 1 when one has none (the others have), 2 for wrong usage.
     """
