@@ -111,6 +111,8 @@ def train(
     ipman data render -o out/images -n 10000 --size 128
     ipman benchmark train --images out/images -o out/ablation
     """
+    from concurrent.futures.process import BrokenProcessPool
+
     from ..training.benchmark import report
     from ..training.benchmark.keypoints import Keypoints
     from ..training.benchmark.pictures import Pictures
@@ -127,6 +129,9 @@ def train(
             found = run.run(chosen, workers, step.of)
     except ValueError as error:
         console.error(str(error))
+        sys.exit(1)
+    except BrokenProcessPool:
+        console.error("a process ended too early, for want of memory perhaps; the same command, with fewer -j, goes on")
         sys.exit(1)
     page = report.write(found, run)
     click.echo(page.read_text())

@@ -16,6 +16,7 @@ from typing import Any
 import torch
 
 from ipman_rs.fitting.fit import one_thread
+from ipman_rs.presets import get
 
 from ..batch import Batch
 from ..drill import Drill, drill, estimated
@@ -130,14 +131,8 @@ class Benchmark:
         data = self._data(job.tilt or 0.0)
         if job.tilt is None:
             assert self.plan.first
-            drill(
-                model,
-                lambda batch: self.task.first_loss(model, batch),
-                data,
-                self.task.noisy,
-                self.plan.first,
-                job.seed,
-            )
+            first = self.plan.first
+            drill(model, lambda batch: self.task.first_loss(model, batch), data, self.task.noisy, first, job.seed)
             return
         posing = self.task.posing()
         physics = None if job.row is None else job.row.physics(posing.body.template)
@@ -171,7 +166,7 @@ class Benchmark:
             told += [job.tilt, job.tilt and self.lean, asdict(self.plan.base)]
         if job.row is not None:
             row = job.row
-            told += [asdict(self.plan.fine), row.preset, dict(row.weights), row.shuffled]
+            told += [asdict(self.plan.fine), row.preset and asdict(get(row.preset)), dict(row.weights), row.shuffled]
         key = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
         return self.folder / (f"base-{key}.pt" if job.row is None else f"figures-{key}.npz")
 
