@@ -65,6 +65,10 @@ def fit(output: Path, bodies: int, controls: int, iterations: int, split: str, o
     help="Of `ipman data render`: train on these images. Default: on keypoints of built people.",
 )  # fmt: skip
 @click.option(
+    "--test-images", "others", type=click.Path(file_okay=False, exists=True, path_type=Path), metavar="FOLDER",
+    help="Take figures of the images in this folder instead.",
+)  # fmt: skip
+@click.option(
     "-n", "--bodies", type=click.IntRange(2), default=700, show_default=True,
     help="Whose figures are taken, from keypoints.",
 )  # fmt: skip
@@ -89,6 +93,7 @@ def fit(output: Path, bodies: int, controls: int, iterations: int, split: str, o
 def train(
     output: Path,
     images: Path | None,
+    others: Path | None,
     bodies: int,
     people: int,
     seeds: int,
@@ -119,7 +124,7 @@ def train(
     from ..training.benchmark.run import TILTS, Benchmark
     from . import console
 
-    task = Keypoints(output, people, bodies, split) if images is None else Pictures(output, images, split)
+    task = Keypoints(output, people, bodies, split) if images is None else Pictures(output, images, split, others)
     run = Benchmark(output, task, seeds, part, lean)
     chosen = tuple(dict.fromkeys(tilts)) or TILTS[task.name]
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,9 +31,11 @@ class Keypoints:
     split: str = "test"
     name: str = "keypoints"
 
-    def told(self) -> dict[str, Any]:
-        told = {name: value for name, value in asdict(self).items() if name != "folder"}
-        return {**told, "views": VIEWS, "seeds": [TRAINING, SPLITS[self.split]]}
+    def trained_on(self) -> dict[str, Any]:
+        return {"name": self.name, "people": self.people, "views": VIEWS, "seed": TRAINING}
+
+    def tested_on(self) -> dict[str, Any]:
+        return {"split": self.split, "bodies": self.bodies, "test_seed": SPLITS[self.split]}
 
     def make(self, progress: Progress | None = None) -> None:
         count = self.people + self.bodies

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,7 +26,7 @@ from ..model.backbones import Small, backbone
 from ..posing import Posing
 from ..sources import BadSample
 from ..sources.images import Images
-from .task import Progress
+from .task import Progress, key_of
 
 SPLITS = {"test": "test", "tune": "val"}
 SIZE = 96  # pixels of a crop
@@ -39,32 +37,38 @@ HIDDEN = 512
 
 @dataclass(frozen=True)
 class Pictures:
-    """images: a folder of `ipman data render`. folder: where its crops are kept."""
+    """images: a folder of `ipman data render`. others: another one, whose images figures are taken of. folder: where
+    crops are kept."""
 
     folder: Path
     images: Path
     split: str = "test"
+    others: Path | None = None
     name: str = "images"
 
-    def told(self) -> dict[str, Any]:
+    def trained_on(self) -> dict[str, Any]:
         index = self._data("train").index
         return {
-            "name": self.name, "split": self.split, "size": SIZE, "cuts": CUTS,
-            "augmenting": dataclasses.asdict(AUGMENTING), "rendered": index["settings"], "counts": index["counts"],
+            "name": self.name, "size": SIZE, "cuts": CUTS, "augmenting": dataclasses.asdict(AUGMENTING),
+            "rendered": index["settings"], "images": index["counts"]["train"],
         }  # fmt: skip
 
+    def tested_on(self) -> dict[str, Any]:
+        index = self._tested().index
+        count = index["counts"][SPLITS[self.split]]
+        return {"split": self.split, "test_rendered": index["settings"], "test_images": count}
+
     def make(self, progress: Progress | None = None) -> None:
-        for split, cuts in (("train", CUTS), (SPLITS[self.split], 0)):
-            path = self._place(split)
-            if not path.exists():
-                _save(_cut(self._data(split), cuts, progress), path)
+        for place, data, cuts in ((self._place(), self._data("train"), CUTS), (self._test_place(), self._tested(), 0)):
+            if not place.exists():
+                _save(_cut(data, cuts, progress), place)
 
     def training(self) -> Batch:
-        return self._kept("train")
+        return _kept(self._place())
 
     def truth(self) -> Batch:
         """Of the static people: the others have no balance to be judged."""
-        kept = self._kept(SPLITS[self.split])
+        kept = _kept(self._test_place())
         static = kept[kept.standing]
         return dataclasses.replace(static, inputs=normalised(static.inputs, torch.ones(len(static), 3)))
 
@@ -86,16 +90,22 @@ class Pictures:
     def posing(self) -> Posing:
         return Posing(ipt.BodyModel(self._data("train").index["settings"]["body"]), KEYPOINTS)
 
-    def _data(self, split: str) -> Rendered:
-        return ipman_rs.data.open("rendered", self.images, split=split)  # type: ignore[return-value]
+    def _data(self, split: str, folder: Path | None = None) -> Rendered:
+        return ipman_rs.data.open("rendered", folder or self.images, split=split)  # type: ignore[return-value]
 
-    def _place(self, split: str) -> Path:
-        key = hashlib.sha256(json.dumps([self.told(), split], sort_keys=True).encode()).hexdigest()[:16]
-        return self.folder / f"crops-{key}.pt"
+    def _tested(self) -> Rendered:
+        return self._data(SPLITS[self.split], self.others)
 
-    def _kept(self, split: str) -> Batch:
-        """From the file, which processes share in memory."""
-        return Batch(**torch.load(self._place(split), weights_only=True, mmap=True))
+    def _place(self) -> Path:
+        return self.folder / f"crops-{key_of(self.trained_on())}.pt"
+
+    def _test_place(self) -> Path:
+        return self.folder / f"crops-{key_of([SIZE, self.tested_on()])}.pt"
+
+
+def _kept(place: Path) -> Batch:
+    """From the file, which processes share in memory."""
+    return Batch(**torch.load(place, weights_only=True, mmap=True))
 
 
 def _cut(data: Rendered, cuts: int, progress: Progress | None) -> Batch:

@@ -35,7 +35,13 @@ def write(found: Found, run: Benchmark) -> Path:
     """The files into the folder of the run; the page's path."""
     name = PAGES[run.task.name]
     record = {
-        "run": {"seeds": run.seeds, "part": run.part, "lean": run.lean, **run.task.told()},
+        "run": {
+            "seeds": run.seeds,
+            "part": run.part,
+            "lean": run.lean,
+            **run.task.trained_on(),
+            **run.task.tested_on(),
+        },
         "plan": asdict(run.plan),
         "rows": [asdict(row) for row in settings().rows],
         "blocks": [_record(tilt, results) for tilt, results in found.items()],

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Sequence
@@ -26,7 +24,7 @@ from ..losses import Loss
 from ..model import HMR
 from .rows import Row, settings
 from .shuffled_camera import shuffled_camera
-from .task import Plan, Task
+from .task import Plan, Task, key_of
 
 LEANS, DEALS = 35_000, 36_000  # seeds of the labels' leans, and of the shuffled cameras
 TILTS = {"keypoints": (0.0, 4.0, 8.0, 12.0), "images": (0.0, 8.0)}
@@ -161,14 +159,14 @@ class Benchmark:
 
     def _place(self, job: Job) -> Path:
         """The file of a result: named by all that decides it."""
-        told: list[Any] = [self.task.told(), job.seed, self.plan.first and asdict(self.plan.first)]
+        told: list[Any] = [self.task.trained_on(), job.seed, self.plan.first and asdict(self.plan.first)]
         if job.tilt is not None:
             told += [job.tilt, job.tilt and self.lean, asdict(self.plan.base)]
         if job.row is not None:
             row = job.row
             told += [asdict(self.plan.fine), row.preset and asdict(get(row.preset)), dict(row.weights), row.shuffled]
-        key = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
-        return self.folder / (f"base-{key}.pt" if job.row is None else f"figures-{key}.npz")
+            told.append(self.task.tested_on())
+        return self.folder / (f"base-{key_of(told)}.pt" if job.row is None else f"figures-{key_of(told)}.npz")
 
 
 # The benchmark of a working process, which keeps the data of its last tilt.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -35,8 +37,12 @@ class Task(Protocol):
         """Of the plan in settings.yaml, and of the page."""
         ...
 
-    def told(self) -> dict[str, Any]:
-        """All that decides the data, for the page and for the names of kept results."""
+    def trained_on(self) -> dict[str, Any]:
+        """All that decides the data that is trained on, for the page and for the names of kept results."""
+        ...
+
+    def tested_on(self) -> dict[str, Any]:
+        """The same of the data that figures are taken of."""
         ...
 
     def make(self, progress: Progress | None = None) -> None:
@@ -64,3 +70,8 @@ class Task(Protocol):
         ...
 
     def posing(self) -> Posing: ...
+
+
+def key_of(told: Any) -> str:
+    """A short name of all that decides a result."""
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
