@@ -148,6 +148,17 @@ def test_command_on_images(tmp_path):
     rows = np.flatnonzero(standing)
     for row, found in zip(rows, kept.truth().inputs, strict=True):
         torch.testing.assert_close(found, source.sample(int(row), None)["inputs"], rtol=0, atol=1e-6)
+    # Figures of another folder's images, of the same regressors.
+    trained = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("base-*.pt")}
+    others = ["data", "render", "-o", str(tmp_path / "others"), "-n", "1", "--val", "0", "--test", "4", "--size", "64"]
+    assert CliRunner().invoke(main, [*others, "--seed", "5"]).exit_code == 0
+    arguments += ["--test-images", str(tmp_path / "others")]
+    done = CliRunner().invoke(main, [*arguments, "--seeds", "1", "--part", "0.0002"])
+    assert done.exit_code == 0, done.output
+    record = json.loads((tmp_path / "out/training_benchmark_images.json").read_text())
+    assert record["run"]["test_images"] == 4
+    assert record["run"]["test_rendered"]["seed"] == 5
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("base-*.pt")} == trained
     empty = CliRunner().invoke(main, [*arguments, "--split", "tune"])
     assert empty.exit_code == 1
     assert "no images of the split val" in empty.output
