@@ -159,19 +159,22 @@ def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:
 
     shown = [row["name"] for row in blocks[0]["rows"] if row["name"] != BASELINE]
     keys = ("PVE", "BoSE", "strict BoSE")
-    figure = Figure(figsize=(12, 4.5), layout="constrained")
+    figure = Figure(figsize=(12, 5), layout="constrained")
     axes = figure.subplots(1, len(keys), sharex=True)
     for key, axis in zip(keys, axes, strict=True):
         for number, name in enumerate(shown):
             values = np.array([_row(block, name)["against baseline"][key] for block in blocks])
             tilts = np.array([block["tilt"] for block in blocks]) + 0.12 * (number - len(shown) / 2)
             reach = np.abs(values[:, 1:] - values[:, :1]).T
-            axis.errorbar(tilts, values[:, 0], yerr=reach, fmt="o-", markersize=3, capsize=2, linewidth=0.8, label=name)
+            width = 2.0 if name == OURS else 0.8
+            axis.errorbar(
+                tilts, values[:, 0], yerr=reach, fmt="o-", markersize=3, capsize=2, linewidth=width, label=name
+            )
         axis.axhline(0, color="#999999", linewidth=0.8)
         axis.set_xlabel("tilt of the labels, degrees", fontsize=9)
         axis.set_title(f"{key} against HMR*, {'mm' if key == 'PVE' else 'points'}", fontsize=9)
         axis.tick_params(labelsize=8)
-    axes[0].legend(fontsize=7)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "training_benchmark"}):
         figure.savefig(path, metadata={"Date": None})
 
