@@ -13,6 +13,9 @@ from .model import HMR, Estimate
 
 Noisy = Callable[[Batch, torch.Generator], Batch]
 AT_ONCE = 100  # images of an estimate
+# Of the gradient: the first steps reach 3,000, later ones hundreds; where a camera's scale passes zero, projections and
+# gradients explode, and training would not recover.
+LARGEST = 5000.0
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,7 @@ def drill(model: nn.Module, loss: Callable[[Batch], Tensor], data: Batch, noisy:
         batch = noisy(data[rows], generator)
         optimizer.zero_grad()
         loss(batch).backward()
+        torch.nn.utils.clip_grad_norm_(model.parameters(), LARGEST)
         optimizer.step()
         schedule.step()
 
