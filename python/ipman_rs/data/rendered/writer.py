@@ -9,13 +9,14 @@ import json
 import multiprocessing
 import os
 import tarfile
-import threading
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+from ipman_rs.processes import end_with_parent
 
 from .figures import keypoint_names
 from .layout import FORMAT, INDEX, SPLITS, Shard, plan, read_index
@@ -119,21 +120,6 @@ def drawn(task: tuple[Settings, str, range]) -> list[tuple[str, dict[str, bytes]
     settings, split, numbers = task
     samples = [draw_sample(settings, split, number) for number in numbers]
     return [(sample.key, files(sample)) for sample in samples]
-
-
-def end_with_parent() -> None:
-    """A worker's beginning: it computes on one core, and ends when its parent does, even by a kill."""
-    import ipman_rs as ip
-
-    ip.set_num_threads(1)
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def watch() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def add(archive: tarfile.TarFile, name: str, content: bytes) -> None:

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
 from ipman_rs.body import BodyModel, load_body, poses
+from ipman_rs.body.model import BodyOutput
 
 from .people import Draw, person
 
@@ -31,7 +32,8 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "hands and feet": ("all_fours", "plank", "push_up"),
     "sitting, lying": ("sitting", "lying", "cobra"),
 }
-SPREAD, LEG_SPREAD, ROOT_SPREAD = 8.0, 4.0, 3.0  # degrees, of each number of a rotation vector
+# Degrees, of each number of a rotation vector: of most joints, those of the legs, and the root.
+SPREADS = (8.0, 4.0, 3.0)
 FARTHEST_TILT = 12.0  # degrees
 CLOSE = 0.01  # m
 TRIES = 400
@@ -89,17 +91,18 @@ def at_rest(family: str, draw: Draw) -> Scene:
     raise RuntimeError(f"{name}: none of {TRIES} tries came to rest within {FARTHEST_TILT:g} degrees")
 
 
-def perturbed(pose: Array, body: BodyModel, draw: Draw) -> Array:
-    spread = np.full(body.num_joints, SPREAD)
+def perturbed(pose: Array, body: BodyModel, draw: Draw, spreads: tuple[float, float, float] = SPREADS) -> Array:
+    most, legs, root = spreads
+    spread = np.full(body.num_joints, most)
     for index, name in enumerate(body.joint_names):
         if name.partition("_")[2] in ("hip", "knee", "ankle", "foot"):
-            spread[index] = LEG_SPREAD
-    spread[0] = ROOT_SPREAD
+            spread[index] = legs
+    spread[0] = root
     return pose + np.radians(spread)[:, None] * draw.standard_normal(pose.shape)
 
 
-def settle(pose: Array, body: BodyModel, template: ip.BodyTemplate) -> tuple[Array, Array] | None:
-    """The pose tilted onto the floor with its translation, or None if it would tip over."""
+def settle(pose: Array, body: Callable[[Array], BodyOutput], template: ip.BodyTemplate) -> tuple[Array, Array] | None:
+    """The pose tilted onto the floor with its translation, or None if it would tip over. body: of a pose."""
     vertices = np.asarray(body(pose).vertices)
     com = np.asarray(ip.center_of_mass(vertices, template, "exact"))
     tilt = to_rest(vertices, com)

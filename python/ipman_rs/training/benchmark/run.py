@@ -15,6 +15,7 @@ import torch
 
 from ipman_rs.fitting.fit import one_thread
 from ipman_rs.presets import get
+from ipman_rs.processes import end_with_parent
 
 from ..batch import Batch
 from ..drill import Drill, drill, estimated
@@ -174,6 +175,7 @@ _BENCHMARK: list[Benchmark] = []
 
 
 def _in_process(benchmark: Benchmark) -> None:
+    end_with_parent()
     _BENCHMARK[:] = [benchmark]
 
 

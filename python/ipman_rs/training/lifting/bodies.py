@@ -9,23 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-import ipman_rs as ip
 from ipman_rs.body import joints, load_body, poses
-from ipman_rs.fitting.benchmark.scenes import CLOSE, FAMILIES, TRIES, to_rest
+from ipman_rs.fitting.benchmark.scenes import FAMILIES, TRIES, perturbed, settle
 
 Array = NDArray[np.floating]
 Draw = np.random.Generator
 
 BODY = "anny-lite"
 BETAS, LARGEST_BETA = 0.7, 1.5
-SPREAD, LEG_SPREAD, ROOT_SPREAD = 12.0, 6.0, 4.0  # degrees, of each number of a rotation vector
-LEGS = ("hip", "knee", "ankle", "foot")
+SPREADS = (12.0, 6.0, 4.0)  # as those of `fitting.benchmark.scenes`
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +69,8 @@ def _at_rest(family: str, draw: Draw) -> tuple[Array, Array, Array]:
     for _ in range(TRIES):
         name = FAMILIES[family][draw.integers(len(FAMILIES[family]))]
         pose = poses.pose_of(body, name)
-        pose = _perturbed(mirrored(pose) if draw.integers(2) else pose, draw)
-        settled = _settled(pose, betas)
+        pose = perturbed(mirrored(pose) if draw.integers(2) else pose, body, draw, SPREADS)
+        settled = settle(pose, partial(body, betas=betas), body.template)
         if settled is not None:
             heading = Rotation.from_rotvec([0.0, draw.uniform(0, 2 * np.pi), 0.0])
             pose, transl = settled
@@ -90,25 +89,3 @@ def mirrored(pose: Array) -> Array:
 def _other_side(name: str) -> str:
     side, _, rest = name.partition("_")
     return {"left": f"right_{rest}", "right": f"left_{rest}"}.get(side, name)
-
-
-def _perturbed(pose: Array, draw: Draw) -> Array:
-    leg = [name.partition("_")[2] in LEGS for name in joints.SMPL]
-    spread = np.where(leg, LEG_SPREAD, SPREAD)
-    spread[0] = ROOT_SPREAD
-    return pose + np.radians(spread)[:, None] * draw.standard_normal(pose.shape)
-
-
-def _settled(pose: Array, betas: Array) -> tuple[Array, Array] | None:
-    """The pose tilted onto the floor with its translation, or None if it would tip over."""
-    body, floor = load_body(BODY), ip.Ground.y_up()
-    vertices = np.asarray(body(pose, betas).vertices)
-    tilt = to_rest(vertices, np.asarray(ip.center_of_mass(vertices, body.template, "exact")))
-    if tilt is None:
-        return None
-    pose = pose.copy()
-    pose[0] = (tilt * Rotation.from_rotvec(pose[0])).as_rotvec()
-    vertices = np.asarray(body(pose, betas).vertices)
-    transl = np.array([0.0, -vertices[:, 1].min(), 0.0])
-    margin = ip.support_margin(vertices + transl, body.template, floor, CLOSE, "exact")
-    return (pose, transl) if margin >= 0 else None
