@@ -166,6 +166,14 @@ def test_shadow_of_a_ball(ball):
     assert (dark[within > 1.06] == 0).all()
 
 
+@pytest.mark.filterwarnings("error")
+def test_no_floor_is_seen(ball):
+    """A camera that looks up sees what is behind the ball."""
+    around = surroundings.draw_surroundings(np.random.default_rng(0))
+    eye, rays = np.array([0.0, 0.3, 2.0], np.float32), np.array([[0, 0.3, -1], [0.2, 0.5, -1]], np.float32)
+    np.testing.assert_array_equal(renderer.background(ball, eye, rays, 0 * rays, around), around.behind(eye, rays))
+
+
 def test_light_follows_lambert():
     light = surroundings.Light(*(np.array(value, float) for value in ([0, 1, 0], [1] * 3, [0.5] * 3, [0.1] * 3)))
     up, side = np.array([[0.0, 1, 0]]), np.array([[1.0, 0, 0]])

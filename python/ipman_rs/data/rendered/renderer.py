@@ -107,6 +107,8 @@ def background(solid: Solid, eye: Array, rays: Array, scatter: Array, around: Su
     floor, rest = np.flatnonzero(on_floor), np.flatnonzero(~on_floor)
     colors = np.empty_like(rays)
     colors[rest] = around.behind(eye, rays.take(rest, 0))
+    if not len(floor):
+        return colors
     distance, scatter = distance.take(floor), scatter.take(floor, 0)
     points = eye + distance[:, None] * rays.take(floor, 0)
     points[:, 1] = 0.0
