@@ -19,6 +19,7 @@ from ipman_rs.training.benchmark import report
 from ipman_rs.training.benchmark.intervals import paired_over_seeds
 from ipman_rs.training.benchmark.pictures import Pictures
 from ipman_rs.training.benchmark.rows import BASELINE, CONTROL, OURS, settings
+from ipman_rs.training.drill import Drill
 from ipman_rs.training.figures import figures
 from ipman_rs.training.lifting import views
 from ipman_rs.training.lifting.views import KEYPOINTS
@@ -131,7 +132,7 @@ def test_command_on_images(tmp_path):
     pytest.importorskip("embreex", reason="embreex is not installed")
     images = ["data", "render", "-o", str(tmp_path / "images"), "-n", "8", "--val", "0", "--test", "8", "--size", "64"]
     assert CliRunner().invoke(main, images).exit_code == 0
-    arguments = ["benchmark", "train", "--images", str(tmp_path / "images"), "-o", str(tmp_path / "out"), "-j", "1"]
+    arguments = ["benchmark", "train", "--images", str(tmp_path / "images"), "-o", str(tmp_path / "out"), "-j", "2"]
     done = CliRunner().invoke(main, [*arguments, "--seeds", "1", "--part", "0.0002"])
     assert done.exit_code == 0, done.output
     record = json.loads((tmp_path / "out/training_benchmark_images.json").read_text())
@@ -148,6 +149,16 @@ def test_command_on_images(tmp_path):
     rows = np.flatnonzero(standing)
     for row, found in zip(rows, kept.truth().inputs, strict=True):
         torch.testing.assert_close(found, source.sample(int(row), None)["inputs"], rtol=0, atol=1e-6)
+    # What the backbone finds is in the crop, and depends on the seed alone.
+    for name, seed in (("seen", 0), ("again", 0), ("other", 1)):
+        kept.see(seed, Drill(2, 1e-3, 4), tmp_path / name)
+    seen, again, other = (kept.training(tmp_path / name).inputs for name in ("seen", "again", "other"))
+    assert seen.shape == (2 * 8, len(KEYPOINTS), 3)
+    assert seen[..., :2].abs().max() <= 1
+    assert (seen[..., 2] == 1).all()
+    assert torch.equal(seen, again)
+    assert not torch.equal(seen, other)
+    assert torch.equal(kept.truth(tmp_path / "seen").inputs, kept.truth(tmp_path / "again").inputs)
     # Figures of another folder's images, of the same regressors.
     trained = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("base-*.pt")}
     others = ["data", "render", "-o", str(tmp_path / "others"), "-n", "1", "--val", "0", "--test", "4", "--size", "64"]

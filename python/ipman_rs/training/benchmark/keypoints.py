@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor
 
 from ..batch import Batch
+from ..drill import Drill
 from ..lifting import bodies, network, views
 from ..model import HMR
 from ..posing import Posing
@@ -46,21 +46,21 @@ class Keypoints:
             self._drawn(TRAINING, self.people, lambda done: progress(done, count))
             self._drawn(SPLITS[self.split], self.bodies, lambda done: progress(self.people + done, count))
 
-    def training(self) -> Batch:
+    def see(self, seed: int, plan: Drill, place: Path) -> None:
+        """Nothing: keypoints are given."""
+
+    def training(self, seen: Path | None = None) -> Batch:
         return views.views(self._drawn(TRAINING, self.people), TRAINING, VIEWS)
 
-    def truth(self) -> Batch:
+    def truth(self, seen: Path | None = None) -> Batch:
         seed = SPLITS[self.split]
         return self.noisy(views.views(self._drawn(seed, self.bodies), seed), torch.Generator().manual_seed(seed))
 
     def noisy(self, batch: Batch, generator: torch.Generator) -> Batch:
         return views.noisy(batch, generator)
 
-    def network(self, seed: int) -> HMR:
+    def lifter(self, seed: int) -> HMR:
         return network.lifter(seed)
-
-    def first_loss(self, model: HMR, batch: Batch) -> Tensor:
-        raise NotImplementedError("keypoints need no encoder that learns first")
 
     def posing(self) -> Posing:
         return views.posing()

@@ -1,4 +1,5 @@
-"""The ablation on HMR with the small backbone, on images that `ipman data render` drew."""
+"""The ablation on images that `ipman data render` drew: the small backbone learns where keypoints are, and the
+regressor from keypoints is trained on what it finds."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import torch
@@ -20,9 +21,11 @@ from ipman_rs.data.rendered import Rendered
 
 from ..augment import Augmentation, Augmenting, normalised
 from ..batch import Batch
+from ..drill import AT_ONCE, Drill, drill
+from ..lifting.network import lifter
 from ..lifting.views import KEYPOINTS
-from ..model import HMR, MeanParameters, keypoint_maps_loss
-from ..model.backbones import Small, backbone
+from ..model import HMR, keypoint_maps_loss
+from ..model.backbones import Small, mean_positions
 from ..posing import Posing
 from ..sources import BadSample
 from ..sources.images import Images
@@ -32,7 +35,7 @@ SPLITS = {"test": "test", "tune": "val"}
 SIZE = 96  # pixels of a crop
 CUTS = 2  # of each image that is trained on, flipped, turned and scaled by themselves
 AUGMENTING = Augmenting(degrees=30.0, turned=1.0, scale=0.1, noise=0.2)
-HIDDEN = 512
+WIDTH, BLOCKS = 512, 2  # of the regressor from keypoints: what is found has more to be made out than what is given
 
 
 @dataclass(frozen=True)
@@ -63,29 +66,42 @@ class Pictures:
             if not place.exists():
                 _save(_cut(data, cuts, progress), place)
 
-    def training(self) -> Batch:
-        return _kept(self._place())
-
-    def truth(self) -> Batch:
-        """Of the static people: the others have no balance to be judged."""
-        kept = _kept(self._test_place())
-        static = kept[kept.standing]
-        return dataclasses.replace(static, inputs=normalised(static.inputs, torch.ones(len(static), 3)))
-
-    def noisy(self, batch: Batch, generator: torch.Generator) -> Batch:
-        """Each colour brighter or darker."""
-        gains = 1 + AUGMENTING.noise * (2 * torch.rand(len(batch), 3, generator=generator) - 1)
-        return dataclasses.replace(batch, inputs=normalised(batch.inputs, gains))
-
-    def network(self, seed: int) -> HMR:
+    def see(self, seed: int, plan: Drill, place: Path) -> None:
+        """The file gets the backbone, and the keypoints (n, K, 3) that it finds in the crops that are trained on."""
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            mean = MeanParameters.of(load_body(self._data("train").index["settings"]["body"]))
-            return HMR(*backbone("small"), mean, hidden=HIDDEN, dropout=0.0)
+            eye = Small()
+        crops = _kept(self._place())
+        drill(
+            eye, lambda batch: keypoint_maps_loss(eye.maps(batch.inputs)[0], batch.keypoints), crops, tinted, plan, seed
+        )
+        generator = torch.Generator().manual_seed(seed)
+        parts = (crops[start : start + AT_ONCE] for start in range(0, len(crops), AT_ONCE))
+        found = torch.cat([found_by(eye, tinted(part, generator)) for part in parts])
+        torch.save({"backbone": eye.state_dict(), "keypoints": found}, place)
 
-    def first_loss(self, model: HMR, batch: Batch) -> Tensor:
-        """Where the keypoints are."""
-        return keypoint_maps_loss(cast("Small", model.encoder).maps(batch.inputs)[0], batch.keypoints)
+    def training(self, seen: Path | None = None) -> Batch:
+        """With what was seen as inputs, else with crops."""
+        kept = _kept(self._place())
+        return kept if seen is None else dataclasses.replace(kept, inputs=_read(seen)["keypoints"])
+
+    def truth(self, seen: Path | None = None) -> Batch:
+        """Of the static people: the others have no balance to be judged. Crops are normalised."""
+        kept = _kept(self._test_place())
+        static = kept[kept.standing]
+        crops = dataclasses.replace(static, inputs=normalised(static.inputs, torch.ones(len(static), 3)))
+        if seen is None:
+            return crops
+        eye = Small()
+        eye.load_state_dict(_read(seen)["backbone"])
+        return dataclasses.replace(crops, inputs=found_by(eye, crops))
+
+    def noisy(self, batch: Batch, generator: torch.Generator) -> Batch:
+        """As they are: what is seen has errors of its own."""
+        return batch
+
+    def lifter(self, seed: int) -> HMR:
+        return lifter(seed, self._data("train").index["settings"]["body"], WIDTH, BLOCKS)
 
     def posing(self) -> Posing:
         return Posing(ipt.BodyModel(self._data("train").index["settings"]["body"]), KEYPOINTS)
@@ -103,9 +119,28 @@ class Pictures:
         return self.folder / f"crops-{key_of([SIZE, self.tested_on()])}.pt"
 
 
+def tinted(crops: Batch, generator: torch.Generator) -> Batch:
+    """Normalised, each colour brighter or darker."""
+    gains = 1 + AUGMENTING.noise * (2 * torch.rand(len(crops), 3, generator=generator) - 1)
+    return dataclasses.replace(crops, inputs=normalised(crops.inputs, gains))
+
+
+@torch.no_grad()
+def found_by(eye: Small, crops: Batch) -> Tensor:
+    """Keypoints (B, K, 3), confidence 1, where their maps have their mean."""
+    eye.eval()
+    places = torch.cat([mean_positions(eye.maps(part)[0]) for part in crops.inputs.split(AT_ONCE)])
+    places = places[:, : crops.keypoints.shape[1]]
+    return torch.cat([places, torch.ones_like(places[..., :1])], dim=2)
+
+
 def _kept(place: Path) -> Batch:
+    return Batch(**_read(place))
+
+
+def _read(place: Path) -> dict[str, Any]:
     """From the file, which processes share in memory."""
-    return Batch(**torch.load(place, weights_only=True, mmap=True))
+    return torch.load(place, weights_only=True, mmap=True)
 
 
 def _cut(data: Rendered, cuts: int, progress: Progress | None) -> Batch:

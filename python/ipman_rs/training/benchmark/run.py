@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,7 +22,6 @@ from ..drill import Drill, drill, estimated
 from ..figures import Figures, figures
 from ..leaning import Lean, leaning
 from ..losses import Loss
-from ..model import HMR
 from .rows import Row, settings
 from .shuffled_camera import shuffled_camera
 from .task import Plan, Task, key_of
@@ -41,7 +40,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Job:
-    """Training of a row; of what all rows go on from (row: None); or of the encoder first (tilt: None, too)."""
+    """Training of a row; of what all rows go on from (row: None); or first learning to see (tilt: None, too)."""
 
     seed: int
     tilt: float | None = None
@@ -67,12 +66,10 @@ class Benchmark:
         first = [Job(seed) for seed in range(self.seeds)] if self.plan.first else []
         base = [Job(seed, tilt) for tilt in tilts for seed in range(self.seeds)]
         fine = [replace(job, row=row) for job in base for row in settings().rows]
-        count, done = len(first) + len(base) + len(fine), 0
-        for group in (first, base, fine):
-            for _ in self._all(group, workers):
-                done += 1
-                if progress is not None:
-                    progress(done, count)
+        jobs = [*first, *base, *fine]
+        for done, _ in enumerate(self._all(jobs, workers), 1):
+            if progress is not None:
+                progress(done, len(jobs))
         return {tilt: [self._result(tilt, row) for row in settings().rows] for tilt in tilts}
 
     @cached_property
@@ -91,12 +88,11 @@ class Benchmark:
             return
         beside = place.with_suffix(".part.npz")
         with one_thread():
-            model = self._begun(job)
-            self._train(model, job)
-            if job.row is None:
-                torch.save(model.state_dict(), beside)
+            if job.tilt is None:
+                assert self.plan.first
+                self.task.see(job.seed, self.plan.first, beside)
             else:
-                figures(estimated(model, self._truth.inputs), self._truth, self.task.posing()).save(beside)
+                self._train(job, job.tilt, beside)
         os.replace(beside, place)
 
     def _all(self, jobs: Sequence[Job], workers: int) -> Iterable[None]:
@@ -108,52 +104,55 @@ class Benchmark:
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(workers, context, _in_process, (self,)) as pool:
             try:
-                for future in as_completed([pool.submit(_do, job) for job in waiting]):
-                    yield future.result()
+                running: set[Future[None]] = set()
+                while waiting or running:
+                    ready = [job for job in waiting if self._can_begin(job)]
+                    waiting = [job for job in waiting if job not in ready]
+                    finished, running = wait(running | {pool.submit(_do, job) for job in ready}, None, FIRST_COMPLETED)
+                    yield from (future.result() for future in finished)
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise
 
-    def _begun(self, job: Job) -> HMR:
-        """The regressor as the stage before left it."""
-        model = self.task.network(job.seed)
+    def _can_begin(self, job: Job) -> bool:
+        """Whether what it goes on from is there."""
         if job.row is not None:
-            before = replace(job, row=None)
-        elif job.tilt is not None and self.plan.first:
-            before = Job(job.seed)
-        else:
-            return model
-        model.load_state_dict(torch.load(self._place(before), weights_only=True))
-        return model
+            return self._place(replace(job, row=None)).exists()
+        seen = self._seen(job.seed)
+        return job.tilt is None or seen is None or seen.exists()
 
-    def _train(self, model: HMR, job: Job) -> None:
-        data = self._data(job.tilt or 0.0)
-        if job.tilt is None:
-            assert self.plan.first
-            first = self.plan.first
-            drill(model, lambda batch: self.task.first_loss(model, batch), data, self.task.noisy, first, job.seed)
-            return
-        posing = self.task.posing()
+    def _train(self, job: Job, tilt: float, place: Path) -> None:
+        """The file gets weights, or figures of a row."""
+        model, data, posing = self.task.lifter(job.seed), self._data(job.seed, tilt), self.task.posing()
+        if job.row is not None:
+            model.load_state_dict(torch.load(self._place(replace(job, row=None)), weights_only=True))
         physics = None if job.row is None else job.row.physics(posing.body.template)
         loss = Loss(posing, physics)
         if job.row is not None and job.row.shuffled:
             data = shuffled_camera(data, DEALS)
         plan, seed = (self.plan.base, job.seed) if job.row is None else (self.plan.fine, 1000 + job.seed)
         drill(model, lambda batch: loss(model(batch.inputs), batch)[0], data, self.task.noisy, plan, seed)
+        if job.row is None:
+            torch.save(model.state_dict(), place)
+        else:
+            truth = self.task.truth(self._seen(job.seed))
+            figures(estimated(model, truth.inputs), truth, posing).save(place)
 
-    def _data(self, tilt: float) -> Batch:
-        if tilt not in self._kept:
+    def _data(self, seed: int, tilt: float) -> Batch:
+        """The last one is kept."""
+        seen = self._seen(seed)
+        if (seen, tilt) not in self._kept:
             self._kept.clear()
-            self._kept[tilt] = leaning(self.task.training(), tilt, LEANS, self.lean)
-        return self._kept[tilt]
+            self._kept[seen, tilt] = leaning(self.task.training(seen), tilt, LEANS, self.lean)
+        return self._kept[seen, tilt]
 
     @cached_property
-    def _kept(self) -> dict[float, Batch]:
+    def _kept(self) -> dict[tuple[Path | None, float], Batch]:
         return {}
 
-    @cached_property
-    def _truth(self) -> Batch:
-        return self.task.truth()
+    def _seen(self, seed: int) -> Path | None:
+        """The file of what the first stage sees."""
+        return self._place(Job(seed)) if self.plan.first else None
 
     def _result(self, tilt: float, row: Row) -> Result:
         return Result(row, [Figures.load(self._place(Job(seed, tilt, row))) for seed in range(self.seeds)])

@@ -6,10 +6,10 @@ import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 import torch
-from torch import Tensor
 
 from ..batch import Batch
 from ..drill import Drill
@@ -21,8 +21,8 @@ Progress = Callable[[int, int], None]  # how many of how many are made
 
 @dataclass(frozen=True)
 class Plan:
-    """first: of the encoder, once for each seed; None for none. base: training without physics, once for each seed and
-    tilt. fine: what each row goes on with."""
+    """first: learning to see keypoints, once for each seed; None for none. base: training without physics, once for
+    each seed and tilt. fine: what each row goes on with."""
 
     first: Drill | None
     base: Drill
@@ -49,11 +49,15 @@ class Task(Protocol):
         """Draw or read the data, and keep them in files."""
         ...
 
-    def training(self) -> Batch:
-        """What is trained on, with true labels."""
+    def see(self, seed: int, plan: Drill, place: Path) -> None:
+        """Learn to see keypoints; what `training` and `truth` need of it goes into a file."""
         ...
 
-    def truth(self) -> Batch:
+    def training(self, seen: Path | None) -> Batch:
+        """What is trained on: keypoints, with true labels. seen: the file of `see`, where the plan has that stage."""
+        ...
+
+    def truth(self, seen: Path | None) -> Batch:
         """What figures are taken of: inputs as the regressor takes them, true labels, static people."""
         ...
 
@@ -61,12 +65,8 @@ class Task(Protocol):
         """Rows of `training` with inputs as the regressor takes them, with noise that is new at each step."""
         ...
 
-    def network(self, seed: int) -> HMR:
-        """The regressor with the weights that a seed draws."""
-        ...
-
-    def first_loss(self, model: HMR, batch: Batch) -> Tensor:
-        """What the encoder learns first."""
+    def lifter(self, seed: int) -> HMR:
+        """The regressor from keypoints with the weights that a seed draws."""
         ...
 
     def posing(self) -> Posing: ...

@@ -15,20 +15,25 @@ WIDTH = 256
 
 
 class KeypointEncoder(nn.Module):
-    """Keypoints (B, K, 3) -> features (B, 256): a layer, and a residual block."""
+    """Keypoints (B, K, 3) -> features (B, width): a layer, and residual blocks."""
 
-    def __init__(self, count: int = len(KEYPOINTS)) -> None:
+    def __init__(self, count: int = len(KEYPOINTS), width: int = WIDTH, blocks: int = 1) -> None:
         super().__init__()
-        self.first = nn.Linear(3 * count, WIDTH)
-        self.block = nn.Sequential(nn.Linear(WIDTH, WIDTH), nn.ReLU(), nn.Linear(WIDTH, WIDTH))
+        self.first = nn.Linear(3 * count, width)
+        self.blocks = nn.ModuleList(
+            nn.Sequential(nn.Linear(width, width), nn.ReLU(), nn.Linear(width, width)) for _ in range(blocks)
+        )
 
     def forward(self, keypoints: Tensor) -> Tensor:
         features = self.first(keypoints.flatten(1)).relu()
-        return (features + self.block(features)).relu()
+        for block in self.blocks:
+            features = (features + block(features)).relu()
+        return features
 
 
-def lifter(seed: int) -> HMR:
-    """A regressor with the weights that a seed draws."""
+def lifter(seed: int, body: str = BODY, width: int = WIDTH, blocks: int = 1) -> HMR:
+    """A regressor of an embedded body with the weights that a seed draws."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        return HMR(KeypointEncoder(), WIDTH, MeanParameters.of(load_body(BODY)), hidden=WIDTH, dropout=0.0)
+        encoder = KeypointEncoder(width=width, blocks=blocks)
+        return HMR(encoder, width, MeanParameters.of(load_body(body)), hidden=WIDTH, dropout=0.0)

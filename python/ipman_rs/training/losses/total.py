@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from ..batch import Batch
-from ..model import Estimate
+from ..model import HMR, Estimate, keypoint_maps_loss
 from ..posing import Posed, Posing
 from ..projection import project
 from .body_parameters import betas_loss, pose_loss
@@ -23,7 +23,7 @@ from .positive_scale import positive_scale_loss
 
 @dataclass(frozen=True)
 class Weights:
-    """keypoint_maps: of `model.keypoint_maps_loss`, which the trainer adds for the backbone "small"."""
+    """keypoint_maps: of `model.keypoint_maps_loss`, for the backbone "small"."""
 
     keypoints_2d: float = 5.0
     joints_3d: float = 5.0
@@ -51,6 +51,16 @@ class Loss(nn.Module):
             physics, found = self.physics(posed, batch)
             total, terms = total + physics, terms | found
         return self.weights.all * total, terms
+
+    def of(self, model: HMR, batch: Batch) -> tuple[Tensor, dict[str, Tensor]]:
+        """The same of what a model estimates of the batch, and of its maps, where they have a weight."""
+        weight = self.weights.keypoint_maps
+        if weight == 0:
+            return self(model(batch.inputs), batch)
+        estimate, maps = model.with_maps(batch.inputs)
+        total, terms = self(estimate, batch)
+        found = keypoint_maps_loss(maps, batch.keypoints)
+        return total + self.weights.all * weight * found, terms | {"keypoint_maps": found.detach()}
 
     def _data_terms(self, estimate: Estimate, posed: Posed, batch: Batch) -> dict[str, Tensor]:
         return {

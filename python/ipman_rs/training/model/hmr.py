@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 from torch import Tensor, nn
 
-from .backbones import backbone
+from .backbones import Small, backbone
 from .mean_parameters import MeanParameters
 from .regressor import Estimate, Regressor
 
@@ -32,3 +34,9 @@ class HMR(nn.Module):
 
     def forward(self, inputs: Tensor) -> Estimate:
         return self.regressor(self.encoder(inputs))
+
+    def with_maps(self, inputs: Tensor) -> tuple[Estimate, Tensor]:
+        """The estimate, and the maps (B, M, h, w) of the backbone "small" which it came of."""
+        encoder = cast("Small", self.encoder)
+        maps, coarse = encoder.maps(inputs)
+        return self.regressor(encoder.features(maps, coarse)), maps

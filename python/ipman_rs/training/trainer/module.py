@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import lightning
 import numpy as np
@@ -15,8 +15,6 @@ from ..batch import Batch
 from ..benchmark.report import COLUMNS, columns
 from ..figures import figures
 from ..losses import Loss, Physics
-from ..model import keypoint_maps_loss
-from ..model.backbones import Small
 from ..model.made import made
 from ..posing import Posing
 from . import config, data
@@ -58,17 +56,8 @@ class Training(lightning.LightningModule):
         torch.manual_seed(int(seed.generate_state(1, np.uint64)[0] >> 1))
 
     def training_step(self, batch: Batch, batch_idx: int) -> dict[str, Any]:
-        batch = batch.sound()
-        weight = self.settings.loss.keypoint_maps
-        if weight == 0:
-            total, terms = self.loss(self.model(batch.inputs), batch)
-            return {"loss": total, "terms": terms}
-        encoder = cast("Small", self.model.encoder)
-        maps, coarse = encoder.maps(batch.inputs)
-        total, terms = self.loss(self.model.regressor(encoder.features(maps, coarse)), batch)
-        found = keypoint_maps_loss(maps, batch.keypoints)
-        total = total + self.settings.loss.all * weight * found
-        return {"loss": total, "terms": {**terms, "keypoint_maps": found.detach()}}
+        total, terms = self.loss.of(self.model, batch.sound())
+        return {"loss": total, "terms": terms}
 
     def on_validation_epoch_start(self) -> None:
         self._sums = torch.zeros(len(self.settings.validation), len(COLUMNS), 2, dtype=torch.float64)
