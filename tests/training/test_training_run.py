@@ -23,6 +23,7 @@ from ipman_rs.cli import main
 from ipman_rs.training.augment import Augmentation, crop
 from ipman_rs.training.projection import project
 from ipman_rs.training.trainer import config
+from ipman_rs.training.trainer.module import Training
 
 SETTINGS = """
 data: [{name: people, path: 28}]
@@ -99,6 +100,49 @@ def test_a_killed_run_goes_on_as_if_nothing_had_been(whole, settings, tmp_path):
     assert again[:24] == straight  # to the last digit
 
 
+def test_the_rate_falls_along_half_a_cosine(settings):
+    told = Training(config.load(settings, ["schedule=cosine"])).configure_optimizers()
+    assert isinstance(told, dict)
+    rates = []
+    for _ in range(25):
+        rates.append(told["optimizer"].param_groups[0]["lr"])
+        told["optimizer"].step()
+        told["lr_scheduler"]["scheduler"].step()
+    expected = [1e-3 * (0.1 + 0.9 * (1 + math.cos(math.pi * step / 24)) / 2) for step in range(25)]
+    assert rates == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_killed_run_goes_on_with_its_rate(settings, tmp_path):
+    changes = ["steps=300", "validate=0", "schedule=cosine"]
+    process = subprocess.Popen(
+        command("train", settings, "-o", tmp_path / "killed", *changes), stderr=subprocess.DEVNULL
+    )
+    until = time.time() + 300
+    while time.time() < until and not (tmp_path / "killed/last.ckpt").exists():
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert 5 <= len(curve(tmp_path / "killed")) < 300
+    for name in ("killed", "straight"):
+        result = CliRunner().invoke(main, ["train", str(settings), "-o", str(tmp_path / name), *changes])
+        assert result.exit_code == 0, result.output
+    assert curve(tmp_path / "killed") == curve(tmp_path / "straight")
+    other = CliRunner().invoke(main, ["train", str(settings), "-o", str(tmp_path / "killed"), *changes, "steps=400"])
+    assert other.exit_code == 1
+    assert "another steps" in other.output
+
+
+def test_starting_from_a_checkpoint(whole, settings):
+    start = f"model.start={whole / 'last.ckpt'}"
+    found = Training(config.load(settings, ["seed=5", start])).model.state_dict()
+    kept = torch.load(whole / "last.ckpt", weights_only=True)["state_dict"]
+    assert all(torch.equal(value, kept[f"model.{name}"]) for name, value in found.items())
+    with pytest.raises(ValueError, match=r"last.ckpt: does not fit .* keypoints for anny-lite"):
+        Training(config.load(settings, ["model.backbone=small", start]))
+    with pytest.raises(ValueError, match=r"run.yaml: cannot be read as a checkpoint"):
+        Training(config.load(settings, [f"model.start={settings}"]))
+
+
 def of_torchrun(arguments) -> list[str]:
     python, *script = command(*arguments)
     return [python, "-m", "torch.distributed.run", "--nproc-per-node", "2", *script]
@@ -172,6 +216,8 @@ def test_damaged_checkpoints_are_named(settings, tmp_path):
         ("data=[{name: people}]", r"data\[0\].path: missing"),
         ("data=3", "data: expected a list"),
         ("steps", "steps: expected name=value"),
+        ("schedule=steep", "schedule: expected one of constant, cosine"),
+        ("model={backbone: small, start: a.ckpt, spin: b.pt}", "model.start: has all weights"),
     ],
 )
 def test_configurations_that_cannot_be(settings, change, said):

@@ -4,9 +4,8 @@ data set."""
 from __future__ import annotations
 
 import os
-import pickle
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from .batch import Batch
 from .lifting.views import KEYPOINTS
 from .model import HMR
 from .model.made import made
+from .model.trained_weights import read_trained
 from .posing import Posing
 from .sources import BadSample, Images
 from .sources.images import body_kind
@@ -58,22 +58,12 @@ class Trained:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Trained:
         """A checkpoint of `ipman train`. ValueError, naming the file, for another file or a regressor of keypoints."""
-        try:
-            content: Any = torch.load(path, map_location="cpu", weights_only=True)
-        except (OSError, RuntimeError, EOFError, ValueError, KeyError, pickle.UnpicklingError) as error:
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise ValueError(f"{path}: cannot be read as a checkpoint: {reason}") from None
-        if not isinstance(content, Mapping) or not {"settings", "state_dict"} <= set(content):
-            raise ValueError(f"{path}: expected a checkpoint of `ipman train`, which has settings and state_dict")
-        settings = config(content["settings"])
+        told, weights = read_trained(path)
+        settings = config(told)
         if settings.model.backbone == "keypoints":
             raise ValueError(f"{path}: this regressor sees keypoints, not images")
         posing = Posing(ipt.BodyModel(settings.body), KEYPOINTS)
         model = made(settings, posing.body.body, start=False)
-        own = "model."
-        weights = {
-            name.removeprefix(own): value for name, value in content["state_dict"].items() if name.startswith(own)
-        }
         model.load_state_dict(weights)
         return cls(model.eval(), settings, posing)
 

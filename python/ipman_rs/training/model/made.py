@@ -11,6 +11,7 @@ from .backbones import backbone
 from .hmr import HMR
 from .mean_parameters import MeanParameters
 from .spin_checkpoint import load_spin
+from .trained_weights import read_trained
 
 if TYPE_CHECKING:
     from ..trainer.config import Config
@@ -21,6 +22,23 @@ def made(settings: Config, body: BodyModel, start: bool = True) -> HMR:
 
     ValueError for files that do not fit, and unknown backbones.
     """
+    told = settings.model
+    model = _made(settings, body, start)
+    if told.start and start:
+        _go_on_from(model, told.start)
+    return model
+
+
+def _go_on_from(model: HMR, path: str) -> None:
+    settings, weights = read_trained(path)
+    try:
+        model.load_state_dict(weights)
+    except RuntimeError:
+        found = f"{settings['model']['backbone']} for {settings['body']}"
+        raise ValueError(f"{path}: does not fit this model: it has the backbone {found}") from None
+
+
+def _made(settings: Config, body: BodyModel, start: bool) -> HMR:
     from ..lifting.network import WIDTH, KeypointEncoder
 
     told = settings.model

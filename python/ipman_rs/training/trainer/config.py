@@ -13,6 +13,8 @@ from ipman_rs.presets import PRESETS
 from ..augment import Augmenting
 from ..losses import Weights
 
+SCHEDULES = ("constant", "cosine")
+
 
 @dataclass(frozen=True)
 class DataSet:
@@ -39,12 +41,13 @@ class Physics:
 @dataclass(frozen=True)
 class Model:
     """backbone: as in `model.backbone`, or "keypoints". pretrained: with ImageNet's weights. size: of the crop, pixels.
-    spin: a checkpoint in SPIN's format to start from. mean: SPIN's file of mean parameters. dropout: of the
-    regressor."""
+    start: a checkpoint of `ipman train` to start from; spin: one in SPIN's format. mean: SPIN's file of mean
+    parameters. dropout: of the regressor."""
 
     backbone: str = "resnet50"
     pretrained: bool = False
     size: int = 224
+    start: str = ""
     spin: str = ""
     mean: str = ""
     dropout: float = 0.5
@@ -52,7 +55,8 @@ class Model:
 
 @dataclass(frozen=True)
 class Config:
-    """batch: of each process. rate: of Adam. devices, nodes, accelerator, precision: Lightning's. workers: processes
+    """batch: of each process. rate: of Adam; schedule: "constant", or "cosine", which lets it fall to a tenth along
+    half a cosine until the last step. devices, nodes, accelerator, precision: Lightning's. workers: processes
     that load data. validate, save, log: every so many steps; validate: 0 for never."""
 
     data: tuple[DataSet, ...]
@@ -65,6 +69,7 @@ class Config:
     steps: int = 10_000
     batch: int = 64
     rate: float = 5e-5
+    schedule: str = "constant"
     seed: int = 0
     validate: int = 1000
     save: int = 500
@@ -108,6 +113,10 @@ def config(content: Mapping[str, Any]) -> Config:
         raise ValueError(f"physics.preset: expected none or one of {', '.join(PRESETS)}, got {made.physics.preset!r}")
     if made.loss.keypoint_maps and made.model.backbone != "small":
         raise ValueError("loss.keypoint_maps: has maps with model.backbone: small alone")
+    if made.schedule not in SCHEDULES:
+        raise ValueError(f"schedule: expected one of {', '.join(SCHEDULES)}, got {made.schedule!r}")
+    if made.model.start and (made.model.spin or made.model.pretrained):
+        raise ValueError("model.start: has all weights; leave out model.spin and model.pretrained")
     for name in ("steps", "batch", "save", "log"):
         if getattr(made, name) < 1:
             raise ValueError(f"{name}: expected at least 1, got {getattr(made, name)}")

@@ -41,7 +41,12 @@ class Training(lightning.LightningModule):
         return self.model(inputs)
 
     def configure_optimizers(self):
-        return torch.optim.Adam(self.parameters(), lr=self.settings.rate)
+        rate, steps = self.settings.rate, self.settings.steps
+        optimizer = torch.optim.Adam(self.parameters(), lr=rate)
+        if self.settings.schedule == "constant":
+            return optimizer
+        falling = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps, eta_min=rate / 10)
+        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": falling, "interval": "step"}}
 
     def train_dataloader(self):
         start = self.trainer.global_step

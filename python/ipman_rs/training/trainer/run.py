@@ -70,7 +70,7 @@ def _keep(settings: Config, folder: Path) -> None:
     path = folder / SETTINGS
     if path.exists():
         before = config(yaml.safe_load(path.read_text()))
-        same = {name: getattr(before, name) for name in FREE}
+        same = {name: getattr(before, name) for name in FREE if name != "steps" or before.schedule == "constant"}
         changed = dataclasses.replace(settings, **same)
         for entry in dataclasses.fields(Config):
             if getattr(changed, entry.name) != getattr(before, entry.name):
