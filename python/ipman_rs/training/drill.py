@@ -30,7 +30,7 @@ class Drill:
 def drill(model: nn.Module, loss: Callable[[Batch], Tensor], data: Batch, noisy: Noisy, plan: Drill, seed: int) -> None:
     """Train in place. Which images a step draws, and their noise, depend on the seed and the step alone."""
     optimizer = torch.optim.Adam(model.parameters(), lr=plan.rate)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, plan.steps, eta_min=plan.rate / 10)
+    schedule = falling(optimizer, plan.rate, plan.steps)
     generator = torch.Generator().manual_seed(seed)
     model.train()
     for _ in range(plan.steps):
@@ -41,6 +41,11 @@ def drill(model: nn.Module, loss: Callable[[Batch], Tensor], data: Batch, noisy:
         torch.nn.utils.clip_grad_norm_(model.parameters(), LARGEST)
         optimizer.step()
         schedule.step()
+
+
+def falling(optimizer: torch.optim.Optimizer, rate: float, steps: int) -> torch.optim.lr_scheduler.CosineAnnealingLR:
+    """From `rate` to a tenth of it along half a cosine, in `steps`."""
+    return torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps, eta_min=rate / 10)
 
 
 @torch.no_grad()

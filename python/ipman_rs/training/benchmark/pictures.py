@@ -71,7 +71,7 @@ class Pictures:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             eye = Small()
-        crops = _kept(self._place())
+        crops = self.training()
         drill(
             eye, lambda batch: keypoint_maps_loss(eye.maps(batch.inputs)[0], batch.keypoints), crops, tinted, plan, seed
         )

@@ -135,7 +135,7 @@ class Benchmark:
         if job.row is None:
             torch.save(model.state_dict(), place)
         else:
-            truth = self.task.truth(self._seen(job.seed))
+            truth = self._truth(job.seed)
             figures(estimated(model, truth.inputs), truth, posing).save(place)
 
     def _data(self, seed: int, tilt: float) -> Batch:
@@ -148,6 +148,17 @@ class Benchmark:
 
     @cached_property
     def _kept(self) -> dict[tuple[Path | None, float], Batch]:
+        return {}
+
+    def _truth(self, seed: int) -> Batch:
+        """Kept for each seed."""
+        seen = self._seen(seed)
+        if seen not in self._truths:
+            self._truths[seen] = self.task.truth(seen)
+        return self._truths[seen]
+
+    @cached_property
+    def _truths(self) -> dict[Path | None, Batch]:
         return {}
 
     def _seen(self, seed: int) -> Path | None:

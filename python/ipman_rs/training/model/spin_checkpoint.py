@@ -7,13 +7,11 @@ then `fc1`, `fc2`, `decpose`, `decshape`, `deccam`, and the mean parameters `ini
 from __future__ import annotations
 
 import os
-import pickle
 from collections.abc import Mapping
-from typing import Any
 
-import torch
 from torch import Tensor
 
+from .checkpoint_file import read_checkpoint
 from .hmr import HMR
 
 OF_REGRESSOR = ("fc1.", "fc2.", "decpose.", "decshape.", "deccam.", "init_")
@@ -45,11 +43,7 @@ def load_spin(model: HMR, path: str | os.PathLike[str]) -> None:
 
 
 def _weights(path: str | os.PathLike[str]) -> dict[str, Tensor]:
-    try:
-        content: Any = torch.load(path, map_location="cpu", weights_only=True)
-    except (OSError, RuntimeError, EOFError, ValueError, KeyError, pickle.UnpicklingError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ValueError(f"{path}: cannot be read as a checkpoint of plain tensors: {reason}") from None
+    content = read_checkpoint(path)
     weights = content.get("model") if isinstance(content, Mapping) else None
     if not isinstance(weights, Mapping) or not all(isinstance(value, Tensor) for value in weights.values()):
         found = ", ".join(map(str, list(content)[:8])) if isinstance(content, Mapping) else type(content).__name__

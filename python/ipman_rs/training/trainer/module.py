@@ -13,6 +13,7 @@ import ipman_rs.torch as ipt
 
 from ..batch import Batch
 from ..benchmark.report import COLUMNS, columns
+from ..drill import falling
 from ..figures import figures
 from ..losses import Loss, Physics
 from ..model.made import made
@@ -45,8 +46,10 @@ class Training(lightning.LightningModule):
         optimizer = torch.optim.Adam(self.parameters(), lr=rate)
         if self.settings.schedule == "constant":
             return optimizer
-        falling = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps, eta_min=rate / 10)
-        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": falling, "interval": "step"}}
+        return {
+            "optimizer": optimizer,
+            "lr_scheduler": {"scheduler": falling(optimizer, rate, steps), "interval": "step"},
+        }
 
     def train_dataloader(self):
         start = self.trainer.global_step
