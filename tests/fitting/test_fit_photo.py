@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from ipman_rs.fitting import keypoints, photo
+from ipman_rs.fitting.detections import Detections
 
 EXAMPLE = resources.files("ipman_rs.fitting") / "examples" / "basketball.json"
 
@@ -56,6 +57,13 @@ def test_nobody_in_the_photo(pose, tmp_path):
     Image.new("RGB", (200, 300), (90, 120, 60)).save(tmp_path / "meadow.png")
     with pytest.raises(ValueError, match="meadow.png: expected a person, found none"):
         photo.detect([tmp_path / "meadow.png"])
+
+
+def test_box_around_landmarks(monkeypatch):
+    points = np.array([[[10.0, 20.0], [30.0, 120.0], [20.0, 60.0]]])
+    found = Detections(("nose", "left_heel", "left_wrist"), points, np.ones((1, 3)), ("a.png",))
+    monkeypatch.setattr(photo, "detect", lambda paths: found)
+    assert photo.box("a.png") == pytest.approx((6, 16, 28, 108))  # 4 % of 100 around
 
 
 @pytest.mark.parametrize(

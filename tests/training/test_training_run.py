@@ -321,6 +321,7 @@ accelerator: cpu
     arguments = [
         "predict",
         str(photos),
+        "--whole",
         "--checkpoint",
         str(tmp_path / "out" / "last.ckpt"),
         "-o",
@@ -346,6 +347,27 @@ accelerator: cpu
     # Perspectives differ in depth by the body's own: by a few pixels at its ends, none at its middle.
     assert np.abs(pixels - own).max() < 8
     assert np.linalg.norm((pixels - own)[0]) < 1
+
+
+def test_box_of_predicting(tmp_path):
+    """Around MediaPipe's landmarks; one of --box and --whole."""
+    arguments = [
+        "predict",
+        "x.png",
+        "--checkpoint",
+        "x.ckpt",
+        "-o",
+        str(tmp_path),
+        "--whole",
+        "--box",
+        "0",
+        "0",
+        "9",
+        "9",
+    ]
+    done = CliRunner().invoke(main, arguments)
+    assert done.exit_code == 2
+    assert "--box or --whole, not both" in done.output
 
 
 def test_predicting_needs_a_checkpoint_of_images(whole, tmp_path):

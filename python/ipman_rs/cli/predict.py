@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 @click.option("--checkpoint", required=True, type=click.Path(dir_okay=False, path_type=Path), help="Of `ipman train`.")
 @click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Output folder.")
 @click.option(
-    "--box", type=float, nargs=4, metavar="X Y W H", help="Pixels around the person. Default: the whole image."
-)
+    "--box", type=float, nargs=4, metavar="X Y W H",
+    help="Pixels around the person. Default: around the landmarks that MediaPipe finds (the extra photo).",
+)  # fmt: skip
+@click.option("--whole", is_flag=True, help="The person's box is the whole image.")
 @of_unknown_camera
 @click.option(
     "--pictures", type=click.IntRange(0), default=8, show_default=True, help="Draw the first N images (seconds each)."
@@ -64,6 +66,8 @@ def predict(
 
     if (data is None) == (not images) or (data is None) != (path is None):
         raise click.UsageError("expected images, or --data with --path")
+    if seen["box"] and seen["whole"]:
+        raise click.UsageError("expected --box or --whole, not both")
     try:
         from ..training.predict import Trained
 
@@ -136,8 +140,10 @@ def _predicted(trained: Trained, path: Path, output: Path, pictured: bool, seen:
     try:
         pixels = photo.read(path)
         height, width = pixels.shape[:2]
-        box = seen["box"] or (0.0, 0.0, float(width), float(height))
+        box = (0.0, 0.0, float(width), float(height)) if seen["whole"] else seen["box"] or photo.box(path)
         found = trained.predict(Image.fromarray(pixels), box, seen["focal"], seen["pitch"])
+    except ImportError as error:
+        raise FileError(path, f"{error}; or give --box or --whole") from error
     except ValueError as error:
         raise FileError(path, str(error)) from error
     body = trained.posing.body.body

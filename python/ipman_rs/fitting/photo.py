@@ -15,6 +15,7 @@ from .detections import Array, Detections, join
 from .keypoints import mediapipe
 
 SMALLEST = 32  # pixels: nobody is found in less
+AROUND = 0.04  # of the longer side: how far a body reaches beyond its landmarks; the median of rendered people
 
 
 def detect(paths: Sequence[str | os.PathLike[str]]) -> Detections:
@@ -34,6 +35,16 @@ def landmarks(path: str | os.PathLike[str]) -> tuple[Array, Array, tuple[int, in
     """
     with _model() as model:
         return _landmarks(model, path)
+
+
+def box(path: str | os.PathLike[str]) -> tuple[float, float, float, float]:
+    """The person's box, x, y, width, height in pixels: around MediaPipe's landmarks. Raises as `detect`."""
+    points = detect([path]).points[0]
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = AROUND * (high - low).max()
+    x, y = (low - margin).tolist()
+    width, height = (high - low + 2 * margin).tolist()
+    return x, y, width, height
 
 
 def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
