@@ -41,9 +41,9 @@ PRESETS: dict[str, Preset] = {
             contact="released",
             weights={"stability": 0.01, "pull": 0.01, "push": 0.1},
         ),
-        # A push ten times the pull makes uncertain predictions hover: hence 2.5, at a tenth of the λ of the pull.
-        # The λ stand, as paper-r's, inside SPIN's bracket that is multiplied by 60, so the balance cost counts once.
-        Preset("balanced", beta1=2.5, stability="balance", weights={"balance": 1 / 60, "pull": 0.03, "push": 0.003}),
+        # A push ten times the pull makes uncertain predictions hover: hence five times.
+        # The λ stand, as paper-r's, inside SPIN's bracket that is multiplied by 60: the balance cost counts 0.75 times.
+        Preset("balanced", beta1=2.5, stability="balance", weights={"balance": 0.0125, "pull": 0.06, "push": 0.13}),
     )
 }
 

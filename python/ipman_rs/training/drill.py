@@ -38,8 +38,9 @@ def drill(model: nn.Module, loss: Callable[[Batch], Tensor], data: Batch, noisy:
         batch = noisy(data[rows], generator)
         optimizer.zero_grad()
         loss(batch).backward()
-        torch.nn.utils.clip_grad_norm_(model.parameters(), LARGEST)
-        optimizer.step()
+        # A projection so far away that it is infinite would make all weights NaN: its step is left out.
+        if torch.nn.utils.clip_grad_norm_(model.parameters(), LARGEST).isfinite():
+            optimizer.step()
         schedule.step()
 
 
