@@ -15,9 +15,10 @@ from click.testing import CliRunner
 import ipman_rs.data
 from ipman_rs.body import load_body
 from ipman_rs.cli import main
+from ipman_rs.training.augment import normalised
 from ipman_rs.training.benchmark import report
 from ipman_rs.training.benchmark.intervals import paired_over_seeds
-from ipman_rs.training.benchmark.pictures import Pictures
+from ipman_rs.training.benchmark.pictures import AUGMENTING, Pictures, moved
 from ipman_rs.training.benchmark.rows import BASELINE, CONTROL, OURS, settings
 from ipman_rs.training.drill import Drill
 from ipman_rs.training.figures import figures
@@ -144,11 +145,20 @@ def test_command_on_images(tmp_path):
     assert "small" in (tmp_path / "out/training_benchmark_images.md").read_text()
     kept = Pictures(tmp_path / "out", tmp_path / "images")
     assert len(kept.training()) == 2 * 8
-    # Crops as they are kept, with their colours as they are, are those of the trainer.
+    # Crops as they are kept, with their colours as they are, are those of the trainer, turned.
     source = Images(data, load_body("anny-lite"), KEYPOINTS, 96)
-    rows = np.flatnonzero(standing)
-    for row, found in zip(rows, kept.truth().inputs, strict=True):
-        torch.testing.assert_close(found, source.sample(int(row), None)["inputs"], rtol=0, atol=1e-6)
+    rows, truth = np.flatnonzero(standing), kept.truth()
+    for row, found, turn in zip(rows, truth.inputs, truth.turn, strict=True):
+        change = dataclasses.replace(AUGMENTING.draw(np.random.default_rng([row, 0])), gains=(1.0, 1.0, 1.0))
+        assert turn == pytest.approx(change.turn)
+        pixels, _ = source.cut(int(row), change)
+        expected = normalised(torch.from_numpy(pixels)[None], torch.ones(1, 3))[0]
+        torch.testing.assert_close(found, expected, rtol=0, atol=1e-6)
+    # And bodies stand in the world as they did before: true ones have no error there.
+    exactly = figures(exact(truth), truth, kept.posing())
+    assert truth.turn.abs().min() > 0.01
+    assert max(exactly.tilt.max(), exactly.mpjpe.max()) < 1e-5
+    assert np.abs(exactly.lowest).max() < 1e-5
     # What the backbone finds is in the crop, and depends on the seed alone.
     for name, seed in (("seen", 0), ("again", 0), ("other", 1)):
         kept.see(seed, Drill(2, 1e-3, 4), tmp_path / name)
@@ -173,6 +183,34 @@ def test_command_on_images(tmp_path):
     empty = CliRunner().invoke(main, [*arguments, "--split", "tune"])
     assert empty.exit_code == 1
     assert "no images of the split val" in empty.output
+
+
+def test_moved_crops_have_their_keypoints_with_them(truth):
+    """A white spot at each keypoint is where the keypoint went, to half a pixel; what left the crop is not seen."""
+    count, side = 40, 96
+    batch = truth[torch.arange(count) % len(truth)]
+    generator = torch.Generator().manual_seed(0)
+    places = 2 * torch.rand(count, 1, 2, generator=generator) - 1
+    pixels = ((places + 1) * side / 2).long().clamp(0, side - 1)[:, 0]
+    inputs = torch.zeros(count, side, side, 3, dtype=torch.uint8)
+    inputs[torch.arange(count), pixels[:, 1], pixels[:, 0]] = 255
+    middles = (pixels[:, None] + 0.5) * 2 / side - 1
+    batch = dataclasses.replace(batch, inputs=inputs, keypoints=torch.cat([middles, torch.ones(count, 1, 1)], dim=2))
+    after = moved(batch, generator)
+    bright = (after.inputs - after.inputs.amin(dim=(2, 3), keepdim=True)).sum(dim=1)
+    grid = (torch.arange(side) + 0.5) * 2 / side - 1
+    total = bright.sum(dim=(1, 2))
+    found = (
+        torch.stack([(bright.sum(dim=1) * grid).sum(dim=1), (bright.sum(dim=2) * grid).sum(dim=1)], dim=1)
+        / total[:, None]
+    )
+    well = (after.keypoints[:, 0, :2].abs() < 0.9).all(dim=1) & (middles[:, 0].abs() < 0.95).all(dim=1)
+    assert well.sum() > count / 2
+    assert (found - after.keypoints[:, 0, :2])[well].abs().max() < 1 / side
+    assert (after.keypoints[:, 0, :2] - middles[:, 0]).abs().max() > 0.1
+    outside = (after.keypoints[:, 0, :2].abs() > 1).any(dim=1)
+    assert outside.any()
+    assert torch.equal(after.keypoints[:, 0, 2] == 0, outside)
 
 
 def test_verdicts_say_what_the_figures_say():

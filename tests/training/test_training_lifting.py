@@ -108,3 +108,21 @@ def test_it_learns_and_repeats_itself(static, posing):
             errors.append(Loss(posing)(estimated(model, data.inputs), data)[1]["joints_3d"].item())
     assert errors[1] < 0.5 * errors[0]
     assert math.isfinite(errors[1])
+
+
+def test_a_step_whose_gradient_is_infinite_is_left_out(static):
+    """As if it had not been: the weights are those of the steps beside it, less its fall of the rate."""
+    data = views.views(static, seed=1)
+    model = torch.nn.Linear(1, 1, bias=False)
+    torch.nn.init.ones_(model.weight)
+    steps = iter([1.0, math.inf, 1.0])
+    seen = []
+
+    def loss(batch):
+        seen.append(model.weight.item())
+        return next(steps) * model.weight.sum()
+
+    drill(model, loss, data, lambda batch, generator: batch, Drill(3, 0.1, 4), 0)
+    assert seen[1] == pytest.approx(0.9)  # Adam's first step is the rate
+    assert seen[2] == seen[1]
+    assert model.weight.item() < seen[1]
