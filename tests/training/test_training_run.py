@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import csv
 import math
 import os
@@ -20,6 +21,7 @@ pytest.importorskip("lightning", reason="lightning is not installed")
 from PIL import Image
 
 from ipman_rs.cli import main
+from ipman_rs.training import drill
 from ipman_rs.training.augment import Augmentation, crop
 from ipman_rs.training.projection import project
 from ipman_rs.training.trainer import config
@@ -98,6 +100,22 @@ def test_a_killed_run_goes_on_as_if_nothing_had_been(whole, settings, tmp_path):
     again, straight = curve(folder), curve(whole)
     assert [int(line["step"]) for line in again] == list(range(max(24, saved + 3)))
     assert again[:24] == straight  # to the last digit
+
+
+def test_a_gradient_is_clipped_and_one_that_is_infinite_dropped(settings, tmp_path, monkeypatch):
+    module = Training(config.load(settings, []))
+    before = copy.deepcopy(module.state_dict())
+    monkeypatch.setattr(drill, "LARGEST", 0.0)
+    done = CliRunner().invoke(
+        main, ["train", str(settings), "-o", str(tmp_path / "out"), "steps=2", "save=1", "validate=0"]
+    )
+    assert done.exit_code == 0, done.output
+    after = torch.load(tmp_path / "out/last.ckpt", weights_only=True)["state_dict"]
+    assert all(torch.equal(after[name], before[name]) for name in before)
+    first, *others = module.model.parameters()
+    first.grad, others[0].grad = torch.full_like(first, math.inf), torch.ones_like(others[0])
+    module.configure_gradient_clipping(None)
+    assert all(weights.grad is None for weights in module.parameters())
 
 
 def test_the_rate_falls_along_half_a_cosine(settings):

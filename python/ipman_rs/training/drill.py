@@ -38,10 +38,16 @@ def drill(model: nn.Module, loss: Callable[[Batch], Tensor], data: Batch, noisy:
         batch = noisy(data[rows], generator)
         optimizer.zero_grad()
         loss(batch).backward()
-        # A projection so far away that it is infinite would make all weights NaN: its step is left out.
-        if torch.nn.utils.clip_grad_norm_(model.parameters(), LARGEST).isfinite():
-            optimizer.step()
+        clip_gradient(model)
+        optimizer.step()
         schedule.step()
+
+
+def clip_gradient(model: nn.Module) -> None:
+    """To LARGEST. One that is not finite, of a projection that passed through infinity, is dropped: no optimizer moves
+    weights without a gradient, and with it they would all be NaN."""
+    if not torch.nn.utils.clip_grad_norm_(model.parameters(), LARGEST).isfinite():
+        model.zero_grad(set_to_none=True)
 
 
 def falling(optimizer: torch.optim.Optimizer, rate: float, steps: int) -> torch.optim.lr_scheduler.CosineAnnealingLR:

@@ -13,7 +13,7 @@ import ipman_rs.torch as ipt
 
 from ..batch import Batch
 from ..benchmark.report import COLUMNS, columns
-from ..drill import falling
+from ..drill import clip_gradient, falling
 from ..figures import figures
 from ..losses import Loss, Physics
 from ..model.made import made
@@ -66,6 +66,9 @@ class Training(lightning.LightningModule):
     def training_step(self, batch: Batch, batch_idx: int) -> dict[str, Any]:
         total, terms = self.loss.of(self.model, batch.sound())
         return {"loss": total, "terms": terms}
+
+    def configure_gradient_clipping(self, optimizer: Any, *_: Any, **__: Any) -> None:
+        clip_gradient(self)
 
     def on_validation_epoch_start(self) -> None:
         self._sums = torch.zeros(len(self.settings.validation), len(COLUMNS), 2, dtype=torch.float64)
