@@ -85,11 +85,10 @@ def draw_overlay(study: Study, path: Path) -> None:
     scale = LONGEST / max(fitted.size)
     width, height = (max(round(side * scale), 1) for side in fitted.size)
     page_width = max(width, _NARROWEST)
-    figure, page = new_page(page_width, height + _STRIP)
-    left = (page_width - width) / 2
-    axes = figure.add_axes(
-        (left / page_width, _STRIP / (height + _STRIP), width / page_width, height / (height + _STRIP))
-    )
+    strip = _STRIP if len(fitted.seen) else 0  # the key to points, where there are some
+    figure, page = new_page(page_width, height + strip)
+    left, whole = (page_width - width) / 2, height + strip
+    axes = figure.add_axes((left / page_width, strip / whole, width / page_width, height / whole))
     axes.set(xticks=[], yticks=[])
     for side in axes.spines.values():
         side.set_color(colors.GRID)
@@ -105,7 +104,8 @@ def draw_overlay(study: Study, path: Path) -> None:
         draw_body(axes, camera, study, body, heat_top(study), (width, height), opacity)
     _draw_points(axes, fitted, scale)
     axes.set(xlim=(0, width), ylim=(height, 0))
-    _write_strip(page, fitted, height, page_width)
+    if strip:
+        _write_strip(page, fitted, height, page_width)
     save(figure, path)
 
 
