@@ -118,7 +118,7 @@ def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
                 )
         elif block["tilt"] == ASKED:
             title = f"labels that lean by {ASKED:g}°"
-            each = ", ".join(map(_signed, seeds["BoSE"]))
+            each = ", ".join(_signed(value, 2) for value in seeds["BoSE"])  # 3.98 is not 4.0 here
             judged.append((f"{title}: BoSE 4 points up in every seed", min(seeds["BoSE"]) >= 4, each))
             judged.append((f"{title}: PVE not above HMR*'s", pve[0] <= 0, f"{_interval(pve)} mm"))
             for key, gain, unit in (("PVE", pve, "mm"), ("BoSE", bose, "points")):
