@@ -367,23 +367,9 @@ accelerator: cpu
     assert np.linalg.norm((pixels - own)[0]) < 1
 
 
-def test_box_of_predicting(tmp_path):
-    """Around MediaPipe's landmarks; one of --box and --whole."""
-    arguments = [
-        "predict",
-        "x.png",
-        "--checkpoint",
-        "x.ckpt",
-        "-o",
-        str(tmp_path),
-        "--whole",
-        "--box",
-        "0",
-        "0",
-        "9",
-        "9",
-    ]
-    done = CliRunner().invoke(main, arguments)
+def test_box_of_predicting_is_told_once(tmp_path):
+    options = ["--checkpoint", "x.ckpt", "--whole", "--box", "0", "0", "9", "9"]
+    done = CliRunner().invoke(main, ["predict", "x.png", "-o", str(tmp_path), *options])
     assert done.exit_code == 2
     assert "--box or --whole, not both" in done.output
 

@@ -61,8 +61,10 @@ class Pictures:
     def tested_on(self) -> dict[str, Any]:
         index = self._tested().index
         count = index["counts"][SPLITS[self.split]]
-        told = {"split": self.split, "test_rendered": index["settings"], "test_images": count}
-        return {**told, "test_augmenting": dataclasses.asdict(AUGMENTING)}
+        return {
+            "split": self.split, "test_rendered": index["settings"], "test_images": count,
+            "test_augmenting": dataclasses.asdict(AUGMENTING),
+        }  # fmt: skip
 
     def make(self, progress: Progress | None = None) -> None:
         for place, data, cuts in ((self._place(), self._data("train"), CUTS), (self._test_place(), self._tested(), 1)):
