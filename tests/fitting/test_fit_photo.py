@@ -10,7 +10,6 @@ import pytest
 from PIL import Image
 
 from ipman_rs.fitting import keypoints, photo
-from ipman_rs.fitting.detections import Detections
 
 EXAMPLE = resources.files("ipman_rs.fitting") / "examples" / "basketball.json"
 
@@ -59,11 +58,20 @@ def test_nobody_in_the_photo(pose, tmp_path):
         photo.detect([tmp_path / "meadow.png"])
 
 
-def test_box_around_landmarks(monkeypatch):
-    points = np.array([[[10.0, 20.0], [30.0, 120.0], [20.0, 60.0]]])
-    found = Detections(("nose", "left_heel", "left_wrist"), points, np.ones((1, 3)), ("a.png",))
-    monkeypatch.setattr(photo, "detect", lambda paths: found)
-    assert photo.box("a.png") == pytest.approx((6, 16, 28, 108))  # 4 % of 100 around
+def test_box_around_landmarks():
+    points = np.array([[10.0, 20.0], [30.0, 120.0], [20.0, 60.0]])
+    assert photo.around(points) == pytest.approx((6, 16, 28, 108))  # 4 % of 100 around
+
+
+def test_boxes_of_several_images(pose, shared, tmp_path):
+    path = shared("photo") / "basketball1.png"
+    pixels = photo.read(path)
+    with photo.boxes() as box:
+        whole, part = box(path, pixels), box("part", pixels[40:, :300])
+        with pytest.raises(ValueError, match="meadow: expected a person, found none"):
+            box("meadow", np.full((300, 200, 3), (90, 120, 60), np.uint8))
+    assert whole == photo.around(photo.detect([path]).points[0])
+    np.testing.assert_allclose(np.subtract(whole, part), [0, 40, 0, 0], atol=8)
 
 
 @pytest.mark.parametrize(

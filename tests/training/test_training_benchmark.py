@@ -85,18 +85,20 @@ def test_intervals_hold_the_mean_and_tell_a_difference():
         paired_over_seeds(baseline, baseline[0])
 
 
-def test_the_settings_have_all_rows():
-    rows = {row.name: row for row in settings().rows}
-    assert settings().rows[0].name == BASELINE
+@pytest.mark.parametrize("task", ["keypoints", "images"])
+def test_the_settings_have_all_rows(task):
+    rows = {row.name: row for row in settings(task).rows}
+    assert next(iter(rows)) == BASELINE
     assert rows[BASELINE].preset is None
     assert rows[CONTROL] == dataclasses.replace(rows[OURS], name=CONTROL, shuffled=True)
     template = views.posing().body.template
-    for row in settings().rows[1:]:
+    for row in settings(task).rows[1:]:
         physics = row.physics(template)
         assert physics is not None
         assert sum(weight > 0 for weight in physics.loss.weights.values()) >= 1
     assert rows["both, λ of the paper"].weights == {}
-    assert rows["balanced"].weights == {}
+    assert rows["push only"].weights == {"stability": 0, "pull": 0, "push": 0.05}
+    assert (settings(task).plan.first is None) == (task == "keypoints")
 
 
 def test_command(tmp_path):
@@ -107,7 +109,7 @@ def test_command(tmp_path):
     record = json.loads((tmp_path / "training_benchmark.json").read_text())
     assert [block["tilt"] for block in record["blocks"]] == [0, 8]
     rows = record["blocks"][1]["rows"]
-    assert [row["name"] for row in rows] == [row.name for row in settings().rows]
+    assert [row["name"] for row in rows] == [row.name for row in settings("keypoints").rows]
     assert rows[0]["against baseline"]["PVE"] == [0, 0, 0]
     with (tmp_path / "training_benchmark.csv").open() as file:
         lines = list(csv.DictReader(file))

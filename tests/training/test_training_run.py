@@ -270,7 +270,7 @@ def test_data_that_does_not_fit(settings, tmp_path, changes, said):
     assert re.search(said, result.output), result.output
 
 
-def test_rendered_images(tmp_path):
+def test_rendered_images(tmp_path, monkeypatch):
     """From rendering to a checkpoint, with a network for images."""
     pytest.importorskip("embreex", reason="embreex is not installed")
     render = [
@@ -365,6 +365,13 @@ accelerator: cpu
     # Perspectives differ in depth by the body's own: by a few pixels at its ends, none at its middle.
     assert np.abs(pixels - own).max() < 8
     assert np.linalg.norm((pixels - own)[0]) < 1
+
+    # Who holds no MediaPipe hears it once, not for each image.
+    monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
+    done = CliRunner().invoke(main, [argument for argument in arguments if argument != "--whole"])
+    assert done.exit_code == 1
+    assert done.output.count("photos need MediaPipe") == 1
+    assert "or give --box or --whole" in " ".join(done.output.split())
 
 
 def test_box_of_predicting_is_told_once(tmp_path):

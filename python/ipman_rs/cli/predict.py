@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +14,7 @@ from .errors import FileError
 from .options import of_unknown_camera
 
 if TYPE_CHECKING:
+    from ..fitting.photo import Box
     from ..training.predict import Trained
     from ..view import Study
 
@@ -84,14 +87,18 @@ def predict(
     paths = [found for path in images for found in (_inside(path, IMAGES) if path.is_dir() else [path])]
     studies: list[Study] = []
     failures: list[tuple[str, str]] = []
-    with console.progress("looking", len(paths)) as step:
-        for number, path in enumerate(paths):
-            try:
-                studies.append(_predicted(trained, path, output, number < pictures, seen))
-            except FileError as error:
-                failures.append((str(path), error.what))
-                console.error(str(error))
-            step.one()
+    try:
+        with _boxes(seen["box"], seen["whole"]) as box, console.progress("looking", len(paths)) as step:
+            for number, path in enumerate(paths):
+                try:
+                    studies.append(_predicted(trained, path, box, output, number < pictures, seen))
+                except FileError as error:
+                    failures.append((str(path), error.what))
+                    console.error(str(error))
+                step.one()
+    except ImportError as error:
+        console.error(f"{error}; or give --box or --whole")
+        sys.exit(1)
     if studies:
         from .commands import write
 
@@ -123,7 +130,18 @@ def _inside(folder: Path, endings: tuple[str, ...]) -> list[Path]:
     return sorted(path for path in folder.iterdir() if path.suffix.lower() in endings)
 
 
-def _predicted(trained: Trained, path: Path, output: Path, pictured: bool, seen: dict[str, Any]) -> Study:
+def _boxes(given: Box | None, whole: bool) -> AbstractContextManager[Callable[[Path, Any], Box]]:
+    """Where the person is, of an image's path and pixels."""
+    from ..fitting import photo
+
+    if whole:
+        return nullcontext(lambda path, pixels: (0.0, 0.0, float(pixels.shape[1]), float(pixels.shape[0])))
+    return photo.boxes() if given is None else nullcontext(lambda path, pixels: given)
+
+
+def _predicted(
+    trained: Trained, path: Path, box_of: Callable[[Path, Any], Box], output: Path, pictured: bool, seen: dict[str, Any]
+) -> Study:
     """The analysed body of one image, whose files are written. FileError if it cannot be read or has an empty box."""
     from dataclasses import replace
 
@@ -140,10 +158,8 @@ def _predicted(trained: Trained, path: Path, output: Path, pictured: bool, seen:
     try:
         pixels = photo.read(path)
         height, width = pixels.shape[:2]
-        box = (0.0, 0.0, float(width), float(height)) if seen["whole"] else seen["box"] or photo.box(path)
+        box = box_of(path, pixels)
         found = trained.predict(Image.fromarray(pixels), box, seen["focal"], seen["pitch"])
-    except ImportError as error:
-        raise FileError(path, f"{error}; or give --box or --whole") from error
     except ValueError as error:
         raise FileError(path, str(error)) from error
     body = trained.posing.body.body

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 
 from .detections import Array, Detections, join
 from .keypoints import mediapipe
+
+Box = tuple[float, float, float, float]  # x, y, width, height in pixels
 
 SMALLEST = 32  # pixels: nobody is found in less
 AROUND = 0.04  # of the longer side: how far a body reaches beyond its landmarks; the median of rendered people
@@ -25,7 +28,7 @@ def detect(paths: Sequence[str | os.PathLike[str]]) -> Detections:
     unreadable image, one under 32 pixels, and one without a person.
     """
     with _model() as model:
-        return join([_detections(path, *_landmarks(model, path)) for path in paths])
+        return join([_detections(path, *_landmarks(model, path, read(path))) for path in paths])
 
 
 def landmarks(path: str | os.PathLike[str]) -> tuple[Array, Array, tuple[int, int]]:
@@ -34,12 +37,21 @@ def landmarks(path: str | os.PathLike[str]) -> tuple[Array, Array, tuple[int, in
     What `keypoints.mediapipe.write` takes. Raises as `detect`.
     """
     with _model() as model:
-        return _landmarks(model, path)
+        return _landmarks(model, path, read(path))
 
 
-def box(path: str | os.PathLike[str]) -> tuple[float, float, float, float]:
-    """The person's box, x, y, width, height in pixels: around MediaPipe's landmarks. Raises as `detect`."""
-    points = detect([path]).points[0]
+@contextmanager
+def boxes() -> Iterator[Callable[[str | os.PathLike[str], NDArray[np.uint8]], Box]]:
+    """Gives a function of an image's name and pixels: the person's box in it, around MediaPipe's landmarks.
+
+    ImportError without the extra. The function raises ValueError, with the name, for an image without a person.
+    """
+    with _model() as model:
+        yield lambda path, pixels: around(_detections(path, *_landmarks(model, path, pixels)).points[0])
+
+
+def around(points: Array) -> Box:
+    """The box of a body whose landmarks (N, 2) these are."""
     low, high = points.min(axis=0), points.max(axis=0)
     margin = AROUND * (high - low).max()
     x, y = (low - margin).tolist()
@@ -75,8 +87,9 @@ def _model() -> Any:
     return pose.Pose(static_image_mode=True, model_complexity=1)
 
 
-def _landmarks(model: Any, path: str | os.PathLike[str]) -> tuple[Array, Array, tuple[int, int]]:
-    pixels = read(path)
+def _landmarks(
+    model: Any, path: str | os.PathLike[str], pixels: NDArray[np.uint8]
+) -> tuple[Array, Array, tuple[int, int]]:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "SymbolDatabase.GetPrototype", UserWarning)  # between MediaPipe and protobuf
         result = model.process(pixels)

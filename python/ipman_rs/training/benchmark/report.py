@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..figures import Figures
 from .intervals import paired_over_seeds
-from .rows import BASELINE, CONTROL, OURS, settings
+from .rows import BASELINE, CONTROL, OURS
 from .run import Benchmark, Result
 
 Array = NDArray[np.floating]
@@ -43,7 +43,7 @@ def write(found: Found, run: Benchmark) -> Path:
             **run.task.tested_on(),
         },
         "plan": asdict(run.plan),
-        "rows": [asdict(row) for row in settings().rows],
+        "rows": [asdict(row) for row in run.rows],
         "blocks": [_record(tilt, results) for tilt, results in found.items()],
     }
     (run.folder / f"{name}.json").write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from ipman_rs import BodyTemplate
 
@@ -35,20 +34,18 @@ class Row:
 
 @dataclass(frozen=True)
 class Settings:
-    """plans: of each task, by its name."""
+    """Of one task."""
 
-    plans: Mapping[str, Plan]
+    plan: Plan
     rows: tuple[Row, ...]
 
 
 @cache
-def settings() -> Settings:
+def settings(task: str) -> Settings:
     import yaml
 
     told = yaml.safe_load((Path(__file__).parent / "settings.yaml").read_text())
-    plans = {name: _plan(**plan) for name, plan in told["plans"].items()}
-    return Settings(plans, tuple(Row(**row) for row in told["rows"]))
-
-
-def _plan(base: dict[str, Any], fine: dict[str, Any], first: dict[str, Any] | None = None) -> Plan:
-    return Plan(Drill(**first) if first else None, Drill(**base), Drill(**fine))
+    stages = {name: Drill(**stage) for name, stage in told["plans"][task].items()}
+    own = told["weights"][task]  # of presets
+    rows = (Row(**{**row, "weights": own.get(row.get("preset"), {}) | row.get("weights", {})}) for row in told["rows"])
+    return Settings(Plan(**stages), tuple(rows))

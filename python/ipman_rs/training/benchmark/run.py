@@ -65,18 +65,21 @@ class Benchmark:
         self.task.make()
         first = [Job(seed) for seed in range(self.seeds)] if self.plan.first else []
         base = [Job(seed, tilt) for tilt in tilts for seed in range(self.seeds)]
-        fine = [replace(job, row=row) for job in base for row in settings().rows]
+        fine = [replace(job, row=row) for job in base for row in self.rows]
         jobs = [*first, *base, *fine]
         for done, _ in enumerate(self._all(jobs, workers), 1):
             if progress is not None:
                 progress(done, len(jobs))
-        return {tilt: [self._result(tilt, row) for row in settings().rows] for tilt in tilts}
+        return {tilt: [self._result(tilt, row) for row in self.rows] for tilt in tilts}
 
     @cached_property
     def plan(self) -> Plan:
-        told = settings().plans[self.task.name]
-        first = told.first and self._shortened(told.first)
-        return Plan(first, self._shortened(told.base), self._shortened(told.fine))
+        told = settings(self.task.name).plan
+        return Plan(self._shortened(told.base), self._shortened(told.fine), told.first and self._shortened(told.first))
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        return settings(self.task.name).rows
 
     def _shortened(self, plan: Drill) -> Drill:
         return replace(plan, steps=max(1, round(plan.steps * self.part)))

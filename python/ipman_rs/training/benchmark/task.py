@@ -24,9 +24,9 @@ class Plan:
     """first: learning to see keypoints, once for each seed; None for none. base: training without physics, once for
     each seed and tilt. fine: what each row goes on with."""
 
-    first: Drill | None
     base: Drill
     fine: Drill
+    first: Drill | None = None
 
 
 class Task(Protocol):
