@@ -42,8 +42,8 @@ PRESETS: dict[str, Preset] = {
             weights={"stability": 0.01, "pull": 0.01, "push": 0.1},
         ),
         # A push ten times the pull makes uncertain predictions hover: hence about five times.
-        # The λ stand, as paper-r's, inside SPIN's bracket that is multiplied by 60: the balance cost counts 0.75 times.
-        Preset("balanced", beta1=2.5, stability="balance", weights={"balance": 0.0125, "pull": 0.06, "push": 0.13}),
+        # The λ stand, as paper-r's, inside SPIN's bracket that is multiplied by 60: the balance cost counts 0.9 times.
+        Preset("balanced", beta1=2.5, stability="balance", weights={"balance": 0.015, "pull": 0.15, "push": 0.33}),
     )
 }
 

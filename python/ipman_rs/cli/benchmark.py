@@ -69,7 +69,7 @@ def fit(output: Path, bodies: int, controls: int, iterations: int, split: str, o
     help="Take figures of the images in this folder instead.",
 )  # fmt: skip
 @click.option(
-    "-n", "--bodies", type=click.IntRange(2), default=700, show_default=True,
+    "-n", "--bodies", type=click.IntRange(2), default=2100, show_default=True,
     help="Whose figures are taken, from keypoints.",
 )  # fmt: skip
 @click.option(
