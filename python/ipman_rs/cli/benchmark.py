@@ -113,7 +113,7 @@ def train(
 
     \b
     ipman benchmark train -o out/keypoints
-    ipman data render -o out/images -n 10000 --size 128
+    ipman data render -o out/images -n 30000 --size 128
     ipman benchmark train --images out/images -o out/ablation
     """
     from concurrent.futures.process import BrokenProcessPool
