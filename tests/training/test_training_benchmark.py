@@ -119,6 +119,7 @@ def test_command(tmp_path):
     assert np.mean(ours) == pytest.approx(named["mean"]["PVE"], abs=1e-3)
     page = (tmp_path / "training_benchmark.md").read_text()
     assert "## Labels that lean by 8°" in page
+    assert "`ipman benchmark train --tilt 0 --tilt 8 -o out`" in page
     kept = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir() if path.suffix in (".npz", ".pt")}
     assert len(kept) == 2 + 4 + 4 * len(rows)
     again = CliRunner().invoke(main, arguments)
@@ -144,7 +145,9 @@ def test_command_on_images(tmp_path):
     assert standing is not None
     assert [block["bodies"] for block in record["blocks"]] == [standing.sum()] * 2
     assert [block["tilt"] for block in record["blocks"]] == [0, 8]
-    assert "small" in (tmp_path / "out/training_benchmark_images.md").read_text()
+    page = (tmp_path / "out/training_benchmark_images.md").read_text()
+    assert "small" in page
+    assert "--tilt" not in page  # as by default
     kept = Pictures(tmp_path / "out", tmp_path / "images")
     assert len(kept.training()) == 2 * 8
     # Crops as they are kept, with their colours as they are, are those of the trainer, turned.

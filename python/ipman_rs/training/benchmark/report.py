@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..figures import Figures
 from .intervals import paired_over_seeds
 from .rows import BASELINE, CONTROL, OURS
-from .run import Benchmark, Result
+from .run import TILTS, Benchmark, Result
 
 Array = NDArray[np.floating]
 Found = Mapping[float, Sequence[Result]]
@@ -54,10 +54,12 @@ def write(found: Found, run: Benchmark) -> Path:
         keep_trailing_newline=True,
     )  # fmt: skip
     environment.filters |= {"interval": _interval, "signed": _signed}
+    tilts = "" if tuple(found) == TILTS[run.task.name] else "".join(f" --tilt {tilt:g}" for tilt in found)
+    judged = verdicts(record["blocks"])
     page = run.folder / f"{name}.md"
     page.write_text(
         environment.get_template(TEMPLATE).render(
-            record, name=name, verdicts=verdicts(record["blocks"]), columns=COLUMNS, differences=DIFFERENCES
+            record, name=name, tilts=tilts, verdicts=judged, columns=COLUMNS, differences=DIFFERENCES
         )
     )
     return page
