@@ -38,15 +38,15 @@ def drill(model: nn.Module, loss: Callable[[Batch], Tensor], data: Batch, noisy:
         batch = noisy(data[rows], generator)
         optimizer.zero_grad()
         loss(batch).backward()
-        clip_gradient(model)
+        clip_gradient(model, LARGEST)
         optimizer.step()
         schedule.step()
 
 
-def clip_gradient(model: nn.Module) -> None:
-    """To LARGEST. One that is not finite, of a projection that passed through infinity, is dropped: no optimizer moves
-    weights without a gradient, and with it they would all be NaN."""
-    if not torch.nn.utils.clip_grad_norm_(model.parameters(), LARGEST).isfinite():
+def clip_gradient(model: nn.Module, largest: float) -> None:
+    """To a norm of `largest`. One that is not finite, of a projection that passed through infinity, is dropped: no
+    optimizer moves weights without a gradient, and with it they would all be NaN."""
+    if not torch.nn.utils.clip_grad_norm_(model.parameters(), largest).isfinite():
         model.zero_grad(set_to_none=True)
 
 

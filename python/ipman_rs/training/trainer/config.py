@@ -56,8 +56,10 @@ class Model:
 @dataclass(frozen=True)
 class Config:
     """batch: of each process. rate: of Adam; schedule: "constant", or "cosine", which lets it fall to a tenth along
-    half a cosine until the last step. devices, nodes, accelerator, precision: Lightning's. workers: processes
-    that load data. validate, save, log: every so many steps; validate: 0 for never."""
+    half a cosine until the last step. clip: the largest norm of a gradient; usual ones are about a hundred, a larger
+    one, of a camera whose scale passes zero, moves Adam's weights for thirty steps. devices, nodes, accelerator,
+    precision: Lightning's. workers: processes that load data. validate, save, log: every so many steps; validate: 0
+    for never."""
 
     data: tuple[DataSet, ...]
     validation: tuple[DataSet, ...] = ()
@@ -70,6 +72,7 @@ class Config:
     batch: int = 64
     rate: float = 5e-5
     schedule: str = "constant"
+    clip: float = 500.0
     seed: int = 0
     validate: int = 1000
     save: int = 500
@@ -117,6 +120,8 @@ def config(content: Mapping[str, Any]) -> Config:
         raise ValueError(f"schedule: expected one of {', '.join(SCHEDULES)}, got {made.schedule!r}")
     if made.model.start and (made.model.spin or made.model.pretrained):
         raise ValueError("model.start: has all weights; leave out model.spin and model.pretrained")
+    if not made.clip > 0:
+        raise ValueError(f"clip: expected more than 0, got {made.clip}")
     for name in ("steps", "batch", "save", "log"):
         if getattr(made, name) < 1:
             raise ValueError(f"{name}: expected at least 1, got {getattr(made, name)}")

@@ -68,7 +68,7 @@ class Training(lightning.LightningModule):
         return {"loss": total, "terms": terms}
 
     def configure_gradient_clipping(self, optimizer: Any, *_: Any, **__: Any) -> None:
-        clip_gradient(self)
+        clip_gradient(self, self.settings.clip)
 
     def on_validation_epoch_start(self) -> None:
         self._sums = torch.zeros(len(self.settings.validation), len(COLUMNS), 2, dtype=torch.float64)
