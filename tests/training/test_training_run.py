@@ -114,6 +114,16 @@ def test_a_gradient_is_clipped_and_one_that_is_infinite_dropped(settings):
     assert all(weights.grad is None for weights in module.parameters())
 
 
+def test_the_last_step_is_saved_and_gone_on_with(settings, tmp_path, whole):
+    """Seven steps, saved every five, then on to twelve: nothing is lost or done twice."""
+    for steps in (7, 12):
+        told = ["train", str(settings), "-o", str(tmp_path / "out"), f"steps={steps}", "save=5", "validate=0"]
+        done = CliRunner().invoke(main, told)
+        assert done.exit_code == 0, done.output
+        assert torch.load(tmp_path / "out/last.ckpt", weights_only=True)["global_step"] == steps
+    assert curve(tmp_path / "out") == curve(whole)[:12]
+
+
 def test_the_rate_falls_along_half_a_cosine(settings):
     told = Training(config.load(settings, ["schedule=cosine"])).configure_optimizers()
     assert isinstance(told, dict)

@@ -1,4 +1,4 @@
-"""Checkpoints that are whole or not there: written beside their place and then moved."""
+"""Checkpoints that are whole or not there: written beside their place and then moved; the last step has one, too."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+import lightning
 import torch
 from lightning.pytorch.plugins.io import TorchCheckpointIO
 
@@ -20,3 +21,14 @@ class WholeFiles(TorchCheckpointIO):
             file.flush()
             os.fsync(file.fileno())
         os.replace(beside, place)
+
+
+class AtEnd(lightning.Callback):
+    """Saves the last step, which may be no multiple of those that are saved."""
+
+    def __init__(self, place: Path, every: int) -> None:
+        self.place, self.every = place, every
+
+    def on_train_batch_end(self, trainer: lightning.Trainer, *_: Any, **__: Any) -> None:
+        if trainer.global_step == trainer.max_steps and trainer.global_step % self.every:
+            trainer.save_checkpoint(self.place)

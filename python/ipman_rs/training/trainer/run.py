@@ -11,7 +11,7 @@ import lightning
 from lightning.pytorch.callbacks import ModelCheckpoint
 from lightning.pytorch.loggers import TensorBoardLogger
 
-from .checkpoints import WholeFiles
+from .checkpoints import AtEnd, WholeFiles
 from .config import Config, config, plain
 from .curve import Curve
 from .module import Training
@@ -85,7 +85,7 @@ def _callbacks(settings: Config, folder: Path) -> list[lightning.Callback]:
         folder, LAST.removesuffix(".ckpt"), every_n_train_steps=settings.save, save_top_k=1, monitor=None,
         enable_version_counter=False, save_on_train_epoch_end=False,
     )  # fmt: skip
-    found: list[lightning.Callback] = [Curve(folder), last]
+    found: list[lightning.Callback] = [Curve(folder), last, AtEnd(folder / LAST, settings.save)]
     if settings.validation and settings.validate:
         found.append(ModelCheckpoint(folder, BEST, monitor="PVE", mode="min", enable_version_counter=False))
     return found
