@@ -56,10 +56,9 @@ class Model:
 @dataclass(frozen=True)
 class Config:
     """batch: of each process. rate: of Adam; schedule: "constant", or "cosine", which lets it fall to a tenth along
-    half a cosine until the last step. clip: the largest norm of a gradient; usual ones are about a hundred, a larger
-    one, of a camera whose scale passes zero, moves Adam's weights for thirty steps. devices, nodes, accelerator,
-    precision: Lightning's. workers: processes that load data. validate, save, log: every so many steps; validate: 0
-    for never."""
+    half a cosine until the last step. clip: the largest norm of a gradient; usual ones are about a hundred, and one of
+    2,500 was seen to throw a run off for good. devices, nodes, accelerator, precision: Lightning's. workers: processes
+    that load data. validate, save, log: every so many steps; validate: 0 for never."""
 
     data: tuple[DataSet, ...]
     validation: tuple[DataSet, ...] = ()
