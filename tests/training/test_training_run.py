@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import csv
 import math
 import os
@@ -100,14 +101,20 @@ def test_a_killed_run_goes_on_as_if_nothing_had_been(whole, settings, tmp_path):
     assert again[:24] == straight  # to the last digit
 
 
-def test_a_gradient_is_clipped_and_one_that_is_infinite_dropped(settings):
+def test_a_gradient_is_clipped_and_one_that_is_infinite_dropped(settings, tmp_path):
     module = Training(config.load(settings, ["clip=12.5"]))
+    before = copy.deepcopy(module.state_dict())
+    # So small that nothing is left of a gradient in single precision.
+    told = ["train", str(settings), "-o", str(tmp_path / "out"), "steps=2", "save=1", "validate=0", "clip=1.0e-45"]
+    done = CliRunner().invoke(main, told)
+    assert done.exit_code == 0, done.output
+    after = torch.load(tmp_path / "out/last.ckpt", weights_only=True)["state_dict"]
+    assert all(torch.equal(after[name], before[name]) for name in before)
     first, *others = module.model.parameters()
     first.grad, others[0].grad = torch.full_like(first, 1e4), torch.full_like(others[0], -1e3)
     module.configure_gradient_clipping(None)
-    assert torch.cat([first.grad.flatten(), others[0].grad.flatten()]).norm() == pytest.approx(
-        12.5, rel=1e-4
-    )  # sums in single precision
+    norm = torch.cat([first.grad.flatten(), others[0].grad.flatten()]).norm()
+    assert norm == pytest.approx(12.5, rel=1e-4)  # sums in single precision
     assert first.grad.unique() == pytest.approx(-10 * others[0].grad.unique())
     first.grad, others[0].grad = torch.full_like(first, math.inf), torch.ones_like(others[0])
     module.configure_gradient_clipping(None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,18 +87,20 @@ def predict(
     paths = [found for path in images for found in (_inside(path, IMAGES) if path.is_dir() else [path])]
     studies: list[Study] = []
     failures: list[tuple[str, str]] = []
-    try:
-        with _boxes(seen["box"], seen["whole"]) as box, console.progress("looking", len(paths)) as step:
-            for number, path in enumerate(paths):
-                try:
-                    studies.append(_predicted(trained, path, box, output, number < pictures, seen))
-                except FileError as error:
-                    failures.append((str(path), error.what))
-                    console.error(str(error))
-                step.one()
-    except ImportError as error:
-        console.error(f"{error}; or give --box or --whole")
-        sys.exit(1)
+    with ExitStack() as opened:
+        try:
+            box = opened.enter_context(_boxes(seen["box"], seen["whole"]))
+        except ImportError as error:
+            console.error(f"{error}; or give --box or --whole")
+            sys.exit(1)
+        step = opened.enter_context(console.progress("looking", len(paths)))
+        for number, path in enumerate(paths):
+            try:
+                studies.append(_predicted(trained, path, box, output, number < pictures, seen))
+            except FileError as error:
+                failures.append((str(path), error.what))
+                console.error(str(error))
+            step.one()
     if studies:
         from .commands import write
 
