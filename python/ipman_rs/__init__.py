@@ -13,7 +13,7 @@ from ipman_rs.losses import balance_cost, ground_loss, stability_loss
 from ipman_rs.mass import center_of_mass
 from ipman_rs.pressure import center_of_pressure, pressure
 from ipman_rs.sampling import sample_surface
-from ipman_rs.self_contact import SelfPenetration, self_contact_loss, self_penetration
+from ipman_rs.self_contact import SelfPenetration, self_contact_distance, self_contact_loss, self_penetration
 from ipman_rs.status import Status, UnitsWarning, body_status
 from ipman_rs.support import BaseOfSupport, base_of_support, bose, support_margin
 from ipman_rs.template import BodyTemplate
@@ -47,6 +47,7 @@ __all__ = [
     "pressure",
     "sample_surface",
     "self_contact_loss",
+    "self_contact_distance",
     "self_penetration",
     "set_num_threads",
     "stability_loss",

@@ -62,6 +62,10 @@ class Collision:
     def depths(self, vertices: NDArray[_Float]) -> NDArray[_Float]:
         """How deep each vertex is inside another part of its body, m, 0 outside: (B, V, 3) -> (B, V)."""
 
+    def distances(self, vertices: NDArray[_Float], near: float) -> NDArray[_Float]:
+        """Distance to the nearest opposite surface, m, negative inside another part, infinite from `near` on: (B, V, 3)
+        -> (B, V)."""
+
     def self_contact(
         self, vertices: NDArray[_Float], options: Sequence[float]
     ) -> tuple[NDArray[_Float], NDArray[_Float]]:

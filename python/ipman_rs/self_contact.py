@@ -50,6 +50,26 @@ def self_penetration(vertices: ArrayLike, template: BodyTemplate, geodesic: floa
     return SelfPenetration(depth, inside, inside.sum(axis=-1), depth.max(axis=-1))
 
 
+def self_contact_distance(
+    vertices: ArrayLike, template: BodyTemplate, near: float = 0.02, geodesic: float = 0.3
+) -> NDArray[Any]:
+    """The distance (..., V) m of each vertex to the nearest opposite surface of the same body; vertices (..., V, 3) m.
+
+    Negative where the vertex is inside another part, infinite where no opposite surface is nearer than `near`, NaN in a
+    body that is not finite. `isfinite` of it is what SMPLify-XMC calls the vertices in contact.
+
+    Args:
+        near: m, from where on surfaces do not touch.
+        geodesic: as in `self_penetration`.
+
+    Raises:
+        ValueError: wrong shapes, or a negative or infinite distance.
+    """
+    bodies = Bodies(vertices, template)
+    tables = collision(bodies.template, not_negative("geodesic", geodesic))
+    return bodies.unfold(tables.distances(bodies.vertices, not_negative("near", near)), template.num_vertices)
+
+
 def self_contact_loss(
     vertices: ArrayLike,
     template: BodyTemplate,

@@ -30,9 +30,7 @@ class JointRegressor:
     def joints(self, vertices: NDArray[np.floating]) -> NDArray[np.float64]:
         """Joints (..., K, 3) m of vertices (..., V, 3) m. ValueError for a mesh with another number of vertices."""
         if vertices.shape[-2] != self.weights.shape[1]:
-            raise ValueError(
-                f"regressor: is for {self.weights.shape[1]} vertices, but a body has {vertices.shape[-2]}"
-            )
+            raise ValueError(f"regressor: is for {self.weights.shape[1]} vertices, but a body has {vertices.shape[-2]}")
         # einsum sums in one order whatever the number of bodies; a matrix product does not.
         return np.einsum("kv,...vc->...kc", self.weights, vertices.astype(np.float64))
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import PRESETS
+from .options import PRESETS, Setting
 
 if TYPE_CHECKING:
     from ..evaluation.tables.job import Job, Shard
@@ -30,22 +30,6 @@ class ShardOf(click.ParamType):
         if len(words) != 2 or not all(word.isdecimal() for word in words) or not 1 <= int(words[0]) <= int(words[1]):
             self.fail(f"{value!r} is no shard such as 2/7, the second of seven", param, ctx)
         return int(words[0]), int(words[1])
-
-
-class Setting(click.ParamType):
-    name = "name=value"
-
-    def convert(self, value, param, ctx):
-        """A name and a word or number."""
-        if isinstance(value, tuple):
-            return value
-        name, equals, word = value.partition("=")
-        if not name or not equals:
-            self.fail(f"{value!r} is no option such as frame=camera", param, ctx)
-        try:
-            return name, float(word)
-        except ValueError:
-            return name, word
 
 
 @click.command()

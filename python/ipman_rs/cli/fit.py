@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import FileError
-from .options import FLOOR, SIZE, of_unknown_camera
+from .options import FLOOR, SIZE, UP, Setting, of_unknown_camera
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -20,15 +20,17 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("inputs", nargs=-1, required=True, metavar="INPUT...", type=click.Path(path_type=Path))
+@click.argument("inputs", nargs=-1, metavar="[INPUT...]", type=click.Path(path_type=Path))
 @click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Output folder.")
 @click.option(
-    "--preset", default="fast", show_default=True, metavar="NAME|FILE",
-    help="fast, balanced, ipman-o, ipman-o-star, smplify-x, smplify-xmc, or a YAML file of your own.",
+    "--preset", metavar="NAME|FILE",
+    help="fast, balanced, ipman-o, ipman-o-star, smplify-x, smplify-xmc, or a YAML file of your own. Default: fast; "
+    "with --data the paper's of that data set.",
 )  # fmt: skip
 @click.option(
-    "--body", "model", default="anny-lite", show_default=True, metavar="NAME|PATH",
-    help="Body model: anny-lite, anny, or an SMPL, SMPL+H or SMPL-X file (.pkl, .npz).",
+    "--body", "model", metavar="NAME|PATH",
+    help="Body model: anny-lite, anny, or an SMPL, SMPL+H or SMPL-X file (.pkl, .npz). Default: anny-lite; with --data "
+    "the data set's, out of --models.",
 )  # fmt: skip
 @of_unknown_camera
 @click.option(
@@ -42,7 +44,22 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option("--height", type=float, metavar="M", help="Height of the person, where a preset weighs measured_shape.")
 @click.option("--mass", type=float, metavar="KG", help="Mass of the person, where a preset weighs measured_shape.")
-@click.option("--pose", metavar="NAME", help="The pose that was imitated: a named pose of `ipman demo`, such as tree.")
+@click.option(
+    "--pose", metavar="NAME|FILE",
+    help="The pose that was imitated: a named one of `ipman demo`, such as tree, or an .npz or .pkl with a pose of "
+    "SMPL, SMPL-X or the built-in body, and with ground and contact where it knows them.",
+)  # fmt: skip
+@click.option(
+    "--pose-frame", type=click.IntRange(0), metavar="N", help="Which pose of that file, where it has several."
+)
+@click.option(
+    "--pose-up", type=UP, metavar="AXIS", help="What points up in that file. Default: y; z for AMASS and MoYo."
+)
+@click.option(
+    "--contact", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+    help="The vertices that touch in that pose: a JSON list, or contact in an .npz or .pkl. Default: the pose file's, "
+    "or those that the self-contact engine finds on the presented body.",
+)  # fmt: skip
 @click.option("--image", type=click.Path(path_type=Path), metavar="PHOTO", help="Photo to draw under a keypoint file.")
 @click.option("--image-size", type=SIZE, metavar="WxH", help="Pixels of the image, where a keypoint file does not say.")
 @click.option("--person", type=int, metavar="N", help="Which person of a file, from 0. Default: the most visible.")
@@ -56,6 +73,27 @@ if TYPE_CHECKING:
     "--every", type=click.IntRange(1), default=1, show_default=True, help="Fit each n-th frame of recordings."
 )
 @click.option("--resume", is_flag=True, help="Skip items that were finished with the same input and options.")
+@click.option(
+    "--data", metavar="NAME", help="Instead of inputs: a data set of `ipman data list`, such as moyo or rich."
+)
+@click.option("--path", type=click.Path(path_type=Path), help="With --data: where it is.")
+@click.option("--split", metavar="NAME", help="With --data: which part of it. Default: all.")
+@click.option(
+    "--option", "settings", type=Setting(), multiple=True, help="With --data: of its reader, such as camera=1."
+)
+@click.option(
+    "--models", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
+    help="With --data: body models, SMPLX_FEMALE.npz and so on, anywhere below it.",
+)  # fmt: skip
+@click.option(
+    "--keypoints", type=click.Path(file_okay=False, exists=True, path_type=Path), metavar="FOLDER",
+    help="With --data: a keypoint file for each frame, FRAME.json or FRAME_keypoints.json. Default: the data set's own "
+    "keypoints, or MediaPipe's in its images.",
+)  # fmt: skip
+@click.option(
+    "--image-folder", type=click.Path(file_okay=False, path_type=Path), default=Path(),
+    help="With --data: where the paths of its images begin.",
+)  # fmt: skip
 def fit(
     inputs: tuple[Path, ...],
     output: Path,
@@ -65,6 +103,13 @@ def fit(
     sequence: bool,
     fps: float,
     every: int,
+    data: str | None,
+    path: Path | None,
+    split: str | None,
+    settings: tuple[tuple[str, str | float], ...],
+    models: Path | None,
+    keypoints: Path | None,
+    image_folder: Path,
     **options: Any,
 ) -> None:
     """Fit a body to each photo, set of keypoints or marker recording, with intuitive physics.
@@ -75,34 +120,49 @@ def fit(
     folder with its parameters (.npz, for `ipman analyze`), mesh (.glb), fit.json and pictures; report.html and
     report.json tell of all.
 
+    With --data the people of a data set are fitted, a frame each, with its keypoints (or MediaPipe's), cameras and
+    ground. A preset that imitates a pose is presented the recorded one, unless --pose says another. OUTPUT gets
+    predictions.npz, as `ipman evaluate` reads it, and fits.json; interrupted, the same command goes on where it was.
+
     \b
     ipman fit photo.jpg -o out
     ipman fit keypoints/ -o out --image-size 1920x1080 --resume
     ipman fit person.json --image photo.png -o out --focal 1100 --camera-pitch 8
     ipman fit yoga.json -o out --preset balanced --pose tree --height 1.7
+    ipman fit yoga.json -o out --preset ipman-o --pose shown.npz --height 1.7 --mass 62
     ipman fit frames/ -o out --sequence --fps 25    one person over time, with one shape
     ipman fit squats.trc -o out --every 5           optical markers, by the preset markers
+    ipman fit --data moyo --path MOYO/ --split val --option camera=1 --models models/ -o out/ipman-o
+    ipman fit --data rich --path RICH/ --split ipman-test --models models/ -o out/ipman-o-star
 
     Exit code: 0 when every item has a body, 1 when one has none (the others have), 2 for wrong usage.
     """
+    if bool(inputs) == (data is not None) or (data is None) != (path is None):
+        raise click.UsageError("expected INPUT..., or --data with --path")
     needs("torch", "roma", "yaml")
     warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
     from . import console
     from .fit_inputs import Reading
 
+    if data is not None:
+        from .fit_data import fit_data
+
+        where = {"name": data, "path": str(path), "split": split, "options": settings}
+        sys.exit(fit_data(where, output, models, keypoints, image_folder, every, options))
+    options["preset"], options["model"] = options["preset"] or "fast", options["model"] or "anny-lite"
     reading = Reading(options.pop("person"), options.pop("image_size"), image)
     items, tracks, failures = _items(inputs, reading)
-    settings = _settings(options)
+    chosen = _settings(options)
     if fps <= 0:
         raise click.UsageError(f"--fps: expected more than 0, got {fps}")
-    studies, failed = _recordings(tracks, items if sequence else [], settings, (every, fps), output, resume)
+    studies, failed = _recordings(tracks, items if sequence else [], chosen, (every, fps), output, resume)
     failures += failed
     items = [] if sequence else items
     records: dict[str, dict[str, Any]] = {}
     if items:
-        records = _run(items, settings, output, resume)
+        records = _run(items, chosen, output, resume)
         failures += [(item.source, item.failure) for item in items if item.failure is not None]
-        studies += _studies(items, records, settings, output, pictures)
+        studies += _studies(items, records, chosen, output, pictures)
     for source, what in failures:
         console.error(f"{source}: {what}")
     if studies:

@@ -107,12 +107,21 @@ def notes(record: dict[str, Any]) -> list[str]:
     """What the report says under a body's name."""
     said = "converged" if record["converged"] else f"did not converge ({record['reason']})"
     lines = [f"fit: preset {record['preset']}, {said} after {record['iterations']} iterations"]
+    if "presented" in record:
+        lines.append(_presented(record["presented"]))
     errors = record["reprojection"]
     lines += [f"reprojection: median {errors['median_px']:.1f} px, {errors['median_percent']:.1f} % of the height"]
     for stage in record["stages"]:
         terms = ", ".join(f"{name} {cost:.4g}" for name, cost in stage["terms"].items() if cost is not None)
         lines.append(f"stage {stage['name']}, {stage['iterations']} iterations: {terms}")
     return [*lines, *(f"look: {flag}" for flag in record["flags"]), *record["notes"]]
+
+
+def _presented(shown: dict[str, Any]) -> str:
+    by = {"mesh": "found on it", "file": "by its file", "given": "as given"}[shown["contact_from"]]
+    height, above = shown["body_height_m"], 1000 * shown["lowest_above_floor_m"]
+    said = f"presented pose: {shown['source']}, {height:.2f} m tall, its lowest point {above:.0f} mm above its floor"
+    return f"{said}; {shown['contact_vertices']} vertices touch ({by})"
 
 
 def npz(arrays: dict[str, np.ndarray]) -> bytes:

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
-
-import torch
 
 import ipman_rs as ip
 import ipman_rs.torch as ipt
 
-from ..fitting import detected, start
+from ..body import BodyModel
+from ..fitting import detected, presented, start
 from ..fitting.camera_file import KnownCamera
 from ..fitting.config import Config, weighs
 from ..fitting.detections import Detections, join
 from ..fitting.fit import fit, on_the_ground
-from ..fitting.problem import Presented, Problem
+from ..fitting.presented import PresentedBody
+from ..fitting.problem import Problem
 from ..fitting.result import Result, results
 from . import console
 from .errors import FileError
@@ -41,10 +42,21 @@ class Settings:
     height: float | None = None
     mass: float | None = None
     pose: str | None = None
+    pose_frame: int | None = None
+    pose_up: tuple[float, float, float] | None = None
+    contact: Path | None = None
     obj: bool = False
 
     def identity(self) -> str:
-        return json.dumps([ip.__version__, asdict(self)], default=str, sort_keys=True)
+        files = [path for path in (self.pose, self.contact) if path is not None and Path(path).is_file()]
+        content = [hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in files]
+        return json.dumps([ip.__version__, asdict(self), content], default=str, sort_keys=True)
+
+    def presented(self, body: BodyModel) -> PresentedBody | None:
+        """The pose that `--pose` names, if it names one. Raises ValueError."""
+        if self.pose is None:
+            return None
+        return presented.load(self.pose, body, contact=self.contact, frame=self.pose_frame, up=self.pose_up)
 
 
 def run(items: list[Item], settings: Settings, output: Path, resume: bool) -> dict[str, dict[str, Any]]:
@@ -54,6 +66,7 @@ def run(items: list[Item], settings: Settings, output: Path, resume: bool) -> di
     """
     _check(settings)
     body = ipt.BodyModel(settings.model)
+    imitated = settings.presented(body.body)
     options = settings.identity()
     records: dict[str, dict[str, Any]] = {}
     hashes = {item.name: identity(item, options) for item in items}
@@ -62,8 +75,11 @@ def run(items: list[Item], settings: Settings, output: Path, resume: bool) -> di
         records = {name: record for name, record in found.items() if record is not None}
     waiting = [item for item in items if item.name not in records]
     for batch in _batches(waiting):
-        for item, result in _fitted(batch, settings, body):
+        for item, result in _fitted(batch, settings, body, imitated):
             told = {**result.record(), "preset": settings.config.name, "model": body.body.name}
+            if imitated is not None:
+                told["presented"] = imitated.record(body.body)
+                item.notes += imitated.notes
             told |= {"flags": item.flags, "notes": item.notes, "identity": hashes[item.name]}
             write_item(item, result, body.body, output / item.name, told, settings.obj)
             records[item.name] = {"name": item.name, "source": item.source, **told}
@@ -73,7 +89,9 @@ def run(items: list[Item], settings: Settings, output: Path, resume: bool) -> di
 def _check(settings: Settings) -> None:
     config = settings.config
     if settings.pose is None and weighs(config, "presented_pose", "presented_contact"):
-        raise ValueError(f"preset {config.name} imitates a pose: name it with --pose")
+        raise ValueError(f"preset {config.name} imitates a pose: give its name or file with --pose")
+    if settings.pose is None and (settings.contact or settings.pose_frame is not None or settings.pose_up):
+        raise ValueError("--contact, --pose-frame and --pose-up say more of a --pose: give that, too")
     if settings.height is None and settings.mass is None and weighs(config, "measured_shape"):
         raise ValueError(f"preset {config.name} knows the person's size: give --height or --mass, or both")
 
@@ -97,11 +115,13 @@ def _batches(items: Iterable[Item]) -> Iterator[list[Item]]:
             yield group[first : first + BATCH]
 
 
-def _fitted(batch: list[Item], settings: Settings, body: ipt.BodyModel) -> Iterator[tuple[Item, Result]]:
+def _fitted(
+    batch: list[Item], settings: Settings, body: ipt.BodyModel, imitated: PresentedBody | None
+) -> Iterator[tuple[Item, Result]]:
     kept = [item for item in batch if not _refused(item, body)]
     if not kept:
         return
-    problem = problem_of(body, join([item.seen for item in kept if item.seen is not None]), settings)
+    problem = problem_of(body, join([item.seen for item in kept if item.seen is not None]), settings, imitated)
     config = settings.config
     with console.progress(f"fitting {len(kept)}", len(kept) * len(config.stages)) as step:
         problem, variables = _started(problem, config)
@@ -115,12 +135,15 @@ def _fitted(batch: list[Item], settings: Settings, body: ipt.BodyModel) -> Itera
         yield item, result
 
 
-def problem_of(body: ipt.BodyModel, seen: Detections, settings: Settings) -> Problem:
-    """What is known of each person that was seen."""
+def problem_of(
+    body: ipt.BodyModel, seen: Detections, settings: Settings, imitated: PresentedBody | None = None
+) -> Problem:
+    """What is known of each person that was seen, who imitates a pose, or none."""
     where = {"focal": settings.focal, "pitch": settings.pitch, "ground": settings.ground}
     where |= {} if settings.camera is None else {"camera": settings.camera}
     problem = detected.problem(body, seen, **where, height=settings.height, mass=settings.mass)
-    return _presented(problem, settings)
+    stays = settings.config.start.get("search") == "camera"
+    return problem if imitated is None else presented.present(problem, [imitated], stays)
 
 
 def _refused(item: Item, body: ipt.BodyModel) -> bool:
@@ -134,14 +157,6 @@ def _refused(item: Item, body: ipt.BodyModel) -> bool:
     assert seen.image_size is not None
     item.flags += detected.oddities(names, seen.points[0], seen.confidence[0], seen.image_size[0])
     return False
-
-
-def _presented(problem: Problem, settings: Settings) -> Problem:
-    """The problem with the pose that `--pose` names, if it names one."""
-    if settings.pose is None:
-        return problem
-    pose = torch.as_tensor(ip.body.poses.pose_of(problem.body.body, settings.pose), dtype=torch.float64)
-    return replace(problem, presented=Presented(pose[1:].expand(problem.num_bodies, -1, -1).clone()))
 
 
 def _started(problem: Problem, config: Config) -> tuple[Problem, dict[str, Any]]:

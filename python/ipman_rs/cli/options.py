@@ -86,6 +86,24 @@ class Times(click.ParamType):
         return times
 
 
+class Setting(click.ParamType):
+    name = "name=value"
+
+    def convert(self, value, param, ctx):
+        """A name and a word or number."""
+        if isinstance(value, tuple):
+            return value
+        name, equals, word = value.partition("=")
+        if not name or not equals:
+            self.fail(f"{value!r} is no option such as frame=camera", param, ctx)
+        for number in (int, float):
+            try:
+                return name, number(word)
+            except ValueError:
+                continue
+        return name, word
+
+
 TIMES = Times()
 UP, GROUND, FLOOR, SIZE = UpAxis(), GroundHeight("auto"), GroundHeight("found"), ImageSize()
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..body import safe_npz
-from ..body.joints import BODY, LEFT_HAND, RIGHT_HAND, SMPL, SMPLH, SMPLX
+from ..body import pose_arrays, safe_npz
+from ..body.joints import LEFT_HAND, RIGHT_HAND
 from ..body.sequence import Index, PosedSequence, rows_of
 from .errors import FileError
 from .meshes import join_seams
@@ -20,22 +20,6 @@ _EXPECTED = (
     "pose/betas/transl"
 )
 _FRAME_RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
-# Arrays that hold a piece of the pose, and the joints of that piece by its number of columns / 3.
-_PIECES: dict[str, tuple[tuple[str, ...], ...]] = {
-    "global_orient": (BODY[:1],),
-    "root_orient": (BODY[:1],),
-    "body_pose": (BODY[1:], SMPL[1:]),
-    "pose_body": (BODY[1:], SMPL[1:]),
-    "left_hand_pose": (LEFT_HAND,),
-    "right_hand_pose": (RIGHT_HAND,),
-    "pose_hand": ((*LEFT_HAND, *RIGHT_HAND),),
-    "jaw_pose": (("jaw",),),
-    "pose_jaw": (("jaw",),),
-    "leye_pose": (SMPLX[23:24],),
-    "reye_pose": (SMPLX[24:25],),
-    "pose_eye": (SMPLX[23:25],),
-}
-_WHOLE = (BODY, SMPL, SMPLH, SMPLX)
 
 
 class _Npz:
@@ -69,7 +53,7 @@ def read_npz(path: Path, model: str | None) -> Recording:
         model = model or stored.model()
         if stored.names & {"vertices", "verts", "v"}:
             return _read_vertices(stored, model)
-        if stored.names & {"poses", "pose", "fullpose", *_PIECES}:
+        if stored.names & {*pose_arrays.NAMES}:
             return _read_parameters(stored, model)
     except ValueError as error:
         raise FileError(path, str(error)) from error
@@ -109,7 +93,7 @@ def _read_parameters(stored: _Npz, model: str) -> Recording:
     amass = "poses" in stored.names or "root_orient" in stored.names
     # AMASS stores absolute hand angles, the smplx package angles relative to the mean hand.
     body = ip.load_body(model, flat_hand_mean=True) if amass else ip.load_body(model)
-    pose = _Pose(_pose(stored), body)
+    pose = _Pose(pose_arrays.read(stored.first), body)
     trans = stored.first("trans", "transl")
     if trans is not None and (trans.shape[-1:] != (3,) or trans.reshape(-1, 3).shape[0] not in (1, len(pose))):
         raise FileError(stored.path, f"trans has shape {trans.shape}; expected ({len(pose)}, 3)")
@@ -133,41 +117,10 @@ def _singles(rows: np.ndarray | None, index: Index) -> np.ndarray | None:
     return None if rows is None else rows_of(rows, index).astype(np.float32)
 
 
-def _pose(stored: _Npz) -> list[tuple[np.ndarray, tuple[str, ...]]]:
-    """The axis-angle arrays (T or 1, j, 3) of the file, each with the names of its joints."""
-    whole = stored.first("poses", "fullpose", "pose")
-    if whole is not None:
-        by_columns = {3 * len(names): names for names in _WHOLE}
-        by_columns[72] = SMPL
-        if whole.ndim >= 2 and whole.shape[-1] == 3 and 3 * whole.shape[-2] in by_columns:
-            whole = whole.reshape(*whole.shape[:-2], -1)
-        if whole.ndim not in (1, 2) or whole.shape[-1] not in by_columns or whole.size == 0:
-            counts = ", ".join(str(count) for count in sorted(by_columns))
-            raise FileError(stored.path, f"the pose has shape {whole.shape}; expected (T, n) with n of {counts}")
-        names = by_columns[whole.shape[-1]]
-        return [(whole.reshape(-1, len(names), 3), names)]
-    pieces: list[tuple[np.ndarray, tuple[str, ...]]] = []
-    for key, choices in _PIECES.items():
-        piece = stored.first(key)
-        if piece is None:
-            continue
-        if piece.ndim >= 2 and piece.shape[-1] == 3 and piece.shape[-2] in {len(choice) for choice in choices}:
-            piece = piece.reshape(*piece.shape[:-2], -1)
-        joints = next((choice for choice in choices if piece.shape[-1:] == (3 * len(choice),)), None)
-        if joints is None or piece.ndim > 2 or piece.size == 0:
-            counts = " or ".join(str(3 * len(choice)) for choice in choices)
-            raise FileError(stored.path, f"{key} has shape {piece.shape}; expected (T, {counts}) axis-angle")
-        pieces.append((piece.reshape(-1, len(joints), 3), joints))
-    counts = {len(piece) for piece, _ in pieces}
-    if len(counts - {1}) > 1:
-        raise FileError(stored.path, f"pose arrays have {sorted(counts)} frames; expected equal numbers")
-    return pieces
-
-
 class _Pose:
     """The poses of a file, put on the joints that a body has when they are asked for."""
 
-    def __init__(self, pieces: list[tuple[np.ndarray, tuple[str, ...]]], body: Any) -> None:
+    def __init__(self, pieces: list[pose_arrays.Piece], body: Any) -> None:
         self._pieces, self._body = pieces, body
         self._length = max(len(piece) for piece, _ in pieces)
         self.names = tuple(name for _, names in pieces for name in names)

@@ -41,6 +41,13 @@ def landmarks(path: str | os.PathLike[str]) -> tuple[Array, Array, tuple[int, in
 
 
 @contextmanager
+def detector() -> Iterator[Callable[[str | os.PathLike[str]], Detections]]:
+    """Gives a function that finds the person in one image after the other, a row; both raise as `detect`."""
+    with _model() as model:
+        yield lambda path: _detections(path, *_landmarks(model, path, read(path)))
+
+
+@contextmanager
 def boxes() -> Iterator[Callable[[str | os.PathLike[str], NDArray[np.uint8]], Box]]:
     """Gives a function of an image's name and pixels: the person's box in it, around MediaPipe's landmarks.
 

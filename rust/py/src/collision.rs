@@ -44,6 +44,22 @@ impl Collision {
         }
     }
 
+    /// How far each vertex is from the nearest opposite surface, m, negative inside another part, infinite where none is
+    /// less than `near` away: (B, V, 3) -> (B, V).
+    fn distances<'py>(&self, py: Python<'py>, vertices: Vertices<'py>, near: f64) -> PyResult<Bound<'py, PyAny>> {
+        if !(near >= 0.0 && near.is_finite()) {
+            return Err(PyValueError::new_err(format!("near: expected zero metres or more, got {near}")));
+        }
+        match vertices {
+            Vertices::Single(vertices) => self.of_vertices(py, &vertices, |collision, numbers, out, interrupted| {
+                collision.distances_into(near, numbers, out, interrupted)
+            }),
+            Vertices::Double(vertices) => self.of_vertices(py, &vertices, |collision, numbers, out, interrupted| {
+                collision.distances_into(near, numbers, out, interrupted)
+            }),
+        }
+    }
+
     /// push and pull (B, 2), and their gradients (B, 2, V, 3). options: push_width, pull_width, pull_weight, near.
     fn self_contact<'py>(
         &self,

@@ -44,7 +44,7 @@ class Models:
         key = (kind, gender, betas)
         if key not in self._loaded:
             # The hands of frames are rotations, not offsets from a mean hand.
-            self._loaded[key] = ip.load_body(self._file(kind, gender), num_betas=betas, flat_hand_mean=True)
+            self._loaded[key] = ip.load_body(self.file(kind, gender), num_betas=betas, flat_hand_mean=True)
         return self._loaded[key]
 
     def template_of(self, kind: str) -> BodyModel:
@@ -98,7 +98,7 @@ class Models:
             vertices[rows], joints[rows] = posed.vertices, posed.joints
         return vertices, joints
 
-    def _file(self, kind: str, gender: str) -> Path:
+    def file(self, kind: str, gender: str) -> Path:
         found = self._found(kind, gender)
         if found is not None:
             return found

@@ -107,6 +107,24 @@ impl Collision {
         })
     }
 
+    /// The distance of each vertex to the nearest opposite surface, B·V metres: negative inside another part, infinite
+    /// where there is none less than `near` away; NaN for bodies that are not finite.
+    pub fn distances_into<T: Data>(
+        &self,
+        near: f64,
+        vertices: &[T],
+        out: &mut [T],
+        interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<()> {
+        self.each(vertices, [(out, self.num_vertices)], interrupted, |body, [out]| {
+            out.fill(T::of(f64::INFINITY));
+            for touch in body.touches(near) {
+                let distance = touch.nearest.squared_distance.sqrt();
+                out[touch.vertex as usize] = T::of(if touch.inside { -distance } else { distance });
+            }
+        })
+    }
+
     /// push and pull of each body, B·2 numbers, and their gradients, B·2·V·3. NaN and zero for bodies that are not finite.
     pub fn self_contact_into<T: Data>(
         &self,

@@ -1,0 +1,391 @@
+"""Fits of a data set's people, a frame each, in pieces that are done once and kept: predictions for `ipman evaluate`.
+
+Keypoints are the data set's, or those of files, or MediaPipe's in its images; cameras and ground are the data set's. A
+preset that imitates a pose is presented the frame's recorded pose (as in the paper), or one pose for all.
+
+A piece is a file of some frames. It is named by its number, appears when it is whole, and says what it was made of: a
+fit that was killed goes on where it was, to the same bits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+import ipman_rs as ip
+import ipman_rs.torch as ipt
+from ipman_rs.body import BodyModel, embedded, safe_npz
+from ipman_rs.data.frames import DataSet, Frames
+from ipman_rs.evaluation.tables.job import Source
+from ipman_rs.evaluation.tables.models import Models
+from ipman_rs.evaluation.tables.predictions import fingerprint
+from ipman_rs.evaluation.tables.rows import being_written
+
+from . import data_frames, keypoints, photo, presented, start
+from .config import Config, weighs
+from .data_frames import World
+from .detected import too_little
+from .detections import Detections, join
+from .fit import fit
+from .landmarks import known
+from .problem import Problem
+from .result import Result, parameters, results
+
+PIECE = 64  # frames: fitted side by side
+PREDICTIONS, RECORD = "predictions.npz", "fits.json"
+PRESETS = {"moyo": "ipman-o", "rich": "ipman-o-star", "rich-ipman": "ipman-o-star"}  # of the paper
+DENSITY = 985.0  # kg/m³
+_COLUMNS = ("names", "pose", "betas", "transl", "genders", "ground")
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A frame with what a detector saw of its person, and its world."""
+
+    frame: Frames
+    detections: Detections
+    gender: str
+
+
+@dataclass(frozen=True)
+class DataFit:
+    """The fits of one data set by one preset.
+
+    folder: of the results. models: folder of model files. body: an embedded body or a model file; None: the data set's
+    own. keypoints: folder of keypoint files, named as the frames. images: where the paths of images begin. every: fit
+    each n-th frame. pose: a presented pose for all, by name or file; None: the recorded ones. height, mass: of the
+    person; None: of the data set's body.
+    """
+
+    source: Source
+    config: Config
+    folder: Path
+    models: Path | None = None
+    body: str | None = None
+    keypoints: Path | None = None
+    images: Path = Path()
+    every: int = 1
+    pose: str | None = None
+    height: float | None = None
+    mass: float | None = None
+    piece: int = PIECE
+
+    @cached_property
+    def data(self) -> DataSet:
+        return self.source.open(self.folder / "unpacked")
+
+    @cached_property
+    def bodies(self) -> Models:
+        return Models(self.models)
+
+    @cached_property
+    def rows(self) -> NDArray[np.int64]:
+        """The frames that are fitted."""
+        return np.arange(0, len(self.data), self.every)
+
+    @property
+    def pieces(self) -> int:
+        return -(-len(self.rows) // self.piece)
+
+    @cached_property
+    def imitates(self) -> bool:
+        return weighs(self.config, "presented_pose", "presented_contact")
+
+    @property
+    def stays(self) -> bool:
+        """Whether the body stays in the presented frame, and the camera moves."""
+        return self.config.start.get("search") == "camera"
+
+    def begin(self) -> None:
+        """Makes the folder. ValueError where it holds other fits, or something that all frames need is missing."""
+        first = self.data[slice(0, 1)]
+        if self.body is None and first.body is None:
+            raise ValueError(f"{self.source.name}: has no body model of its own; name one with --body")
+        body = self.model(self._gender(first))
+        if self.imitates and self.pose is None and first.pose is None:
+            raise ValueError(f"{self.source.name}: has no poses to present; give one with --pose")
+        if first.cameras is None and not self.stays:
+            raise ValueError(f"{self.source.name}: has no cameras here; {_camera_advice(self.source.name)}")
+        if self.pose is not None:
+            presented.load(self.pose, body)
+        if weighs(self.config, "measured_shape") and self.height is None and self.mass is None:
+            self.sizes([first], [self._gender(first)])
+        self.folder.mkdir(parents=True, exist_ok=True)
+        file = self.folder / "made_of.json"
+        if file.exists():
+            stored = json.loads(file.read_text())
+            other = [name for name, value in self.made_of.items() if stored.get(name) != value]
+            if other:
+                raise ValueError(
+                    f"{self.folder}: holds fits of other options ({', '.join(other)} differ); choose another folder "
+                    "with -o, or delete this one"
+                )
+        with being_written(file) as out:
+            out.write((json.dumps(self.made_of, indent=1) + "\n").encode())
+
+    @cached_property
+    def made_of(self) -> dict[str, Any]:
+        """All that decides the fits, as plain values; no paths, for a folder may be moved."""
+        files = [] if self.models is None else self.bodies.files(str(self.data[slice(0, 1)].body))
+        files += [Path(path) for path in (self.body, self.pose) if path is not None and Path(path).is_file()]
+        listed = [] if self.keypoints is None else sorted(self.keypoints.rglob("*.json"))
+        content = hashlib.sha256()
+        for path in listed:
+            content.update(str(path.relative_to(self.keypoints or path)).encode() + path.read_bytes())
+        return {
+            "data": self.source.name,
+            "split": self.source.split,
+            "options": [list(each) for each in self.source.options],
+            "frames": len(self.data),
+            "first": hashlib.sha256(repr(self.data[slice(0, 1)].names.tolist()).encode()).hexdigest(),
+            "every": self.every,
+            "preset": json.loads(json.dumps(asdict(self.config), default=str)),
+            "body": None if self.body is None else Path(self.body).name,
+            "pose": None if self.pose is None else Path(self.pose).name,
+            "files": {path.name: fingerprint(path) for path in sorted(files)},
+            "keypoints": None if self.keypoints is None else content.hexdigest(),
+            "height": self.height,
+            "mass": self.mass,
+            "piece": self.piece,
+            "version": ip.__version__,
+        }
+
+    @cached_property
+    def key(self) -> str:
+        return hashlib.sha256(json.dumps(self.made_of, sort_keys=True).encode()).hexdigest()
+
+    def model(self, gender: str) -> BodyModel:
+        """The body that is fitted to people of a gender; its hands are relative to its mean hand."""
+        if gender not in self._models:
+            kind = self.body or str(self.data[slice(0, 1)].body)
+            is_named = self.body is not None or kind in embedded.NAMES
+            self._models[gender] = ip.load_body(kind if is_named else self.bodies.file(kind, gender))
+        return self._models[gender]
+
+    @cached_property
+    def _models(self) -> dict[str, BodyModel]:
+        return {}
+
+    def _gender(self, frame: Frames) -> str:
+        return "neutral" if frame.genders is None or self.body is not None else str(frame.genders[0])
+
+    def file(self, number: int) -> Path:
+        return self.folder / "pieces" / f"{number:06d}.npz"
+
+    def done(self, number: int) -> bool:
+        """Whether a piece is there, whole, and of these fits."""
+        try:
+            return self.file(number).exists() and str(safe_npz.read(self.file(number), "key")) == self.key
+        except ValueError:
+            return False
+
+    def run(self, progress: Progress = lambda done: None) -> dict[str, Any]:
+        """Does the pieces that are not there yet and writes the predictions; gives the record of all fits.
+
+        `progress` is told how many frames are done. ValueError where no frame has a body.
+        """
+        (self.folder / "pieces").mkdir(exist_ok=True)
+        for number in range(self.pieces):
+            if not self.done(number):
+                found = self._piece(number)
+                with being_written(self.file(number)) as out:
+                    np.savez(out, allow_pickle=False, key=np.str_(self.key), **found)
+            progress(min((number + 1) * self.piece, len(self.rows)))
+        return self._finish()
+
+    def _piece(self, number: int) -> dict[str, Any]:
+        rows = self.rows[number * self.piece : (number + 1) * self.piece]
+        frames = self.data[rows]
+        seen, left_out = self._seen([frames[slice(k, k + 1)] for k in range(len(frames))])
+        found: list[dict[str, Any]] = [{}] * len(seen)
+        for gender in sorted({each.gender for each in seen}):
+            index = [k for k, each in enumerate(seen) if each.gender == gender]
+            for k, row in zip(index, self._fitted([seen[k] for k in index], gender), strict=True):
+                found[k] = row
+        bad = {row["names"]: "the fit found no finite body" for row in found if not row["finite"]}
+        kept = [row for row in found if row["finite"]]
+        lost = {**left_out, **bad}
+        columns = {name: np.array([row[name] for row in kept]) for name in (kept[0] if kept else ())}
+        return {**columns, "left_out": np.array([*lost], np.str_), "why": np.array([*lost.values()], np.str_)}
+
+    def _seen(self, frames: Sequence[Frames]) -> tuple[list[Seen], dict[str, str]]:
+        """The frames with keypoints, and why others are left out."""
+        seen: list[Seen] = []
+        left_out: dict[str, str] = {}
+        with ExitStack() as opened:
+            detect: Callable[[Path], Detections] | None = None
+            for frame in frames:
+                name = str(frame.names[0])
+                try:
+                    _check_camera(frame, self.stays)
+                    found = self._keypoints(frame)
+                    if found is None:
+                        if frame.images is None or not str(frame.images[0]):
+                            raise ValueError("has no keypoints and no image")
+                        detect = detect or opened.enter_context(photo.detector())
+                        found = detect(self.images / str(frame.images[0]))
+                    there = known(self.model(self._gender(frame)))
+                    shared = [name for name in found.names if name in there]
+                    why = too_little(shared, found.select(shared).confidence[0])
+                    if why is not None or found.image_size is None:
+                        raise ValueError(why or "the size of its image is not known")
+                except ValueError as error:
+                    left_out[name] = str(error)
+                    continue
+                seen.append(Seen(frame, found, self._gender(frame)))
+        return seen, left_out
+
+    def _keypoints(self, frame: Frames) -> Detections | None:
+        """Of the folder of keypoint files, or else those that the data set ships."""
+        if self.keypoints is None:
+            return data_frames.detections_of(frame)
+        name = str(frame.names[0])
+        places = [self.keypoints / f"{name}{ending}" for ending in (".json", "_keypoints.json")]
+        if frame.images is not None:
+            stem = Path(str(frame.images[0])).stem
+            places += [self.keypoints / f"{stem}{ending}" for ending in (".json", "_keypoints.json")]
+        place = next((place for place in places if place.is_file()), None)
+        if place is None:
+            raise ValueError(f"no keypoint file {places[0]}")
+        size = data_frames.image_size(frame)
+        given = None if size is None else (float(size[0]), float(size[1]))
+        return keypoints.read(place, image_size=given)
+
+    def _fitted(self, seen: Sequence[Seen], gender: str) -> Iterator[dict[str, Any]]:
+        body = self.model(gender)
+        frames = [each.frame for each in seen]
+        shown, worlds = self._presented(frames, body)
+        sizes = self.sizes(frames, [gender] * len(frames)) if weighs(self.config, "measured_shape") else None
+        model = ipt.BodyModel(body)
+        problem = data_frames.problem_of(model, frames, join([each.detections for each in seen]), worlds, sizes)
+        if shown is not None:
+            problem = presented.present(problem, shown, self.stays)
+        problem, variables = start.begin(problem, self.config.start)
+        found = fit(problem, variables, self.config)
+        for row, result in enumerate(results(found, self.config, variables)):
+            contacts = len(shown[row].contact) if shown is not None else 0
+            yield self._row(result, problem, worlds[row], seen[row], contacts)
+
+    def _presented(
+        self, frames: Sequence[Frames], body: BodyModel
+    ) -> tuple[list[presented.PresentedBody] | None, list[World]]:
+        """The presented pose of each frame, if the preset imitates one, and the worlds of the fits."""
+        whole = [World.of(frame) for frame in frames]
+        if self.pose is not None:
+            shown = presented.load(self.pose, body)
+            return [shown] * len(frames), [_on_floor(world, frame, shown.floor(body), self.stays)
+                                           for world, frame in zip(whole, frames, strict=True)]  # fmt: skip
+        if not self.imitates:
+            return None, whole
+        found = [data_frames.presented_of(frame, self.bodies.posed(frame), body) for frame in frames]
+        worlds = [world for _, world in found]
+        return [each for each, _ in found], worlds if self.stays else whole
+
+    def sizes(self, frames: Sequence[Frames], genders: Sequence[str]) -> list[tuple[float, float]]:
+        """Height, m, and mass, kg, of each person: as given, or of the data set's own body in its zero pose."""
+        return [self._size(frame) for frame, _ in zip(frames, genders, strict=True)]
+
+    def _size(self, frame: Frames) -> tuple[float, float]:
+        if self.height is not None and self.mass is not None:
+            return self.height, self.mass
+        if frame.pose is None or frame.body is None:
+            raise ValueError(f"{self.source.name}: does not know how tall its people are: give --height and --mass")
+        body = self.bodies.get(frame.body, str("neutral" if frame.genders is None else frame.genders[0]))
+        betas = None if frame.betas is None else np.asarray(frame.betas, float)[0, : body.num_betas]
+        resting = np.asarray(body(betas=betas).vertices)
+        volume = float(np.asarray(ip.part_volumes(resting, body.template)).sum())
+        height = float(np.ptp(resting[:, 1])) if self.height is None else self.height
+        return height, DENSITY * volume if self.mass is None else self.mass
+
+    def _row(self, result: Result, problem: Problem, world: World, seen: Seen, contacts: int) -> dict[str, Any]:
+        body = problem.body.body
+        variables = result.candidate.variables
+        full = torch.cat([variables["orient"][:, None], variables["pose"]], dim=1).numpy()
+        arrays = {**parameters(body, variables), "full_pose": full}
+        errors = result.reprojection()
+        row = {
+            "names": str(seen.frame.names[0]),
+            "genders": seen.gender,
+            **data_frames.prediction(arrays, world, body),
+            "finite": result.finite,
+            "converged": result.converged,
+            "median_px": errors["median_px"],
+            "median_percent": errors["median_percent"],
+            "contact_vertices": contacts,
+        }
+        ground = result.candidate.problem.ground
+        if seen.frame.ground is None and ground is not None:
+            row["ground"] = world.ground(float(ground.height.reshape(-1)[0]))
+        return row
+
+    def _finish(self) -> dict[str, Any]:
+        """Writes predictions and record, made of all pieces."""
+        pieces = [self._read(number) for number in range(self.pieces)]
+        filled = [piece for piece in pieces if "names" in piece]
+        left_out = [
+            {"frame": str(name), "why": str(why)}
+            for piece in pieces
+            for name, why in zip(piece["left_out"], piece["why"], strict=True)
+        ]
+        if not filled:
+            why = left_out[0]["why"] if left_out else "there are no frames"
+            raise ValueError(f"{self.source.name}: no frame has a body; the first: {why}")
+        arrays = {
+            name: np.concatenate([piece[name] for piece in filled])
+            for name in filled[0]
+            if name not in ("key", "left_out", "why")
+        }
+        kind = embedded.kind_of(self.model(str(arrays["genders"][0])))
+        columns = {name: arrays[name] for name in _COLUMNS if name in arrays}
+        with being_written(self.folder / PREDICTIONS) as out:
+            np.savez(out, allow_pickle=False, body=np.array(kind), **columns)
+        record = {
+            "data": self.source.name,
+            "split": self.source.split,
+            "preset": self.config.name,
+            "body": kind,
+            "frames": len(self.rows),
+            "fitted": len(arrays["names"]),
+            "converged": int(arrays["converged"].sum()),
+            "median_reprojection_px": float(np.median(arrays["median_px"])),
+            "median_reprojection_percent": float(np.median(arrays["median_percent"])),
+            "with_presented_contact": int((arrays["contact_vertices"] > 0).sum()) if self.imitates else None,
+            "presented": None if not self.imitates else self.pose or "the recorded pose of each frame",
+            "left_out": left_out,
+        }
+        with being_written(self.folder / RECORD) as out:
+            out.write((json.dumps(record, indent=1, ensure_ascii=False) + "\n").encode())
+        return record
+
+    def _read(self, number: int) -> dict[str, NDArray[Any]]:
+        return {name: safe_npz.read(self.file(number), name) for name in sorted(safe_npz.names(self.file(number)))}
+
+
+def _on_floor(world: World, frame: Frames, floor: float, stays: bool) -> World:
+    """The world moved up or down, so that a presented body that stays stands on the data set's floor."""
+    height = world.floor(frame)
+    return world if height is None or not stays else World(world.turn, np.array([0.0, height - floor, 0.0]))
+
+
+def _check_camera(frame: Frames, stays: bool) -> None:
+    """ValueError where the body could not be put into the world."""
+    if frame.cameras is None or stays:
+        return
+    if not np.isfinite(np.asarray(frame.cameras.translation[0], float)).all():
+        raise ValueError("the place of its camera is not known")
+
+
+def _camera_advice(name: str) -> str:
+    return "give --option camera=1" if name == "moyo" else "the preset needs them"

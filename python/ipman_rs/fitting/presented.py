@@ -1,0 +1,361 @@
+"""The presented pose (SMPLify-XMC): the pose that a person was shown and imitates, by its name or from a file.
+
+A file (.npz, .pkl) has the pose of one body under the names of AMASS, the smplx package or MoYo (`body.pose_arrays`)
+and, where it knows them,
+
+    betas (n,), transl or trans (3,)      shape, and place in the file's world
+    ground (4,)                           the normal and the height of its floor; or ground_normal, ground_height
+    contact                               the vertices that touch: indices, pairs of them, or a flag for each vertex
+    model, body                           what the parameters are of, where the joints do not say
+
+Ground and contact belong to one body model: they count if that is the one which is fitted. Otherwise the floor lies
+under the presented body, and contact is found on it: vertices within `NEAR` of opposite surface.
+
+The fit's world has y up and its origin where the body's parameters have theirs, so IPMAN-O's R^b = I and t^b = 0 mean
+the body as presented: the root keeps its rotation, but for the turn that brings the file's up to y.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+import ipman_rs as ip
+import ipman_rs.torch as ipt
+from ipman_rs.body import BodyModel, embedded, pose_arrays, poses, safe_npz, safe_pickle
+from ipman_rs.ground import Ground
+
+from .problem import Presented, Problem
+
+Array = NDArray[Any]
+Axis = tuple[float, float, float]
+
+NEAR, GEODESIC = 0.02, 0.3  # m: to touch, and from where on along the surface two places are different ones
+ENDINGS = (".npz", ".pkl")
+_Z_UP = ("poses", "fullpose", "root_orient")  # arrays of AMASS and MoYo, whose worlds have z up
+_ABSOLUTE = ("poses", "fullpose", "pose_hand")  # whose fingers are not relative to the mean hand
+
+
+@dataclass(frozen=True, eq=False)
+class PresentedBody:
+    """A presented pose on one body model, in a world with y up.
+
+    pose (J, 3): rotation vectors, the root first. height: m, of the floor above the world's origin; None: under the
+    body. contact (n,): the vertices that touch. contact_from: "file", "mesh", or "given".
+    """
+
+    source: str
+    pose: NDArray[np.float64]
+    contact: NDArray[np.int64]
+    contact_from: str
+    height: float | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def fingerprint(self) -> str:
+        """A hash of all that a fit depends on."""
+        digest = hashlib.sha256(repr((self.source, self.height)).encode())
+        for array in (self.pose, self.contact):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()
+
+    def vertices(self, body: BodyModel) -> NDArray[np.float64]:
+        """The mean body (V, 3) m in this pose, where the fit's world has it."""
+        return np.asarray(body(self.pose).vertices)
+
+    def floor(self, body: BodyModel) -> float:
+        """Height of the floor in the fit's world, m."""
+        return float(self.vertices(body)[:, 1].min()) if self.height is None else self.height
+
+    def record(self, body: BodyModel) -> dict[str, Any]:
+        """Plain values for JSON."""
+        up = self.vertices(body)[:, 1]
+        return {
+            "source": self.source,
+            "body_height_m": float(np.ptp(up)),
+            "lowest_above_floor_m": float(up.min() - self.floor(body)),
+            "contact_vertices": len(self.contact),
+            "contact_from": self.contact_from,
+        }
+
+
+def load(
+    name: str | Path,
+    body: BodyModel,
+    *,
+    contact: str | Path | None = None,
+    frame: int | None = None,
+    up: Axis | None = None,
+) -> PresentedBody:
+    """The presented pose of a name (`body.poses`), or of a file, for a body model.
+
+    contact: a file (.json, .npz, .pkl) of vertices of that body, instead of the pose's own. frame: which of a file's
+    bodies, where it has several. up: of the file's world; None: y, and z for AMASS's and MoYo's arrays.
+
+    Raises:
+        ValueError: no pose of that name, or a file that is missing, damaged, or holds several bodies or none.
+    """
+    if str(name) in poses.NAMES:
+        return of_pose(str(name), poses.pose_of(body, str(name)), body, _given(contact, body))
+    path = Path(name)
+    if path.suffix.lower() not in ENDINGS:
+        listed = ", ".join(poses.NAMES)
+        raise ValueError(f"no pose {str(name)!r}; there are {listed}, or a file ending in {' '.join(ENDINGS)}")
+    return _of_file(_Stored.open(path), body, _given(contact, body), frame, up)
+
+
+def of_pose(
+    source: str,
+    pose: NDArray[np.floating],
+    body: BodyModel,
+    contact: NDArray[np.int64] | None = None,
+    height: float | None = None,
+    notes: Sequence[str] = (),
+) -> PresentedBody:
+    """A pose (J, 3) in a world with y up; contact is found on the mean body where it is not given."""
+    contact_from = "given"
+    if contact is None:
+        contact, contact_from = touching(body, pose), "mesh"
+    notes = [*notes]
+    if not len(contact):
+        notes.append(f"pose {source}: nothing touches in it, so presented_contact is left out")
+    return PresentedBody(source, np.asarray(pose, float), contact, contact_from, height, tuple(notes))
+
+
+def touching(body: BodyModel, pose: NDArray[np.floating], betas: Array | None = None) -> NDArray[np.int64]:
+    """The vertices that touch another part of the same body in a pose, found by the self-contact engine."""
+    vertices = np.asarray(body(pose, betas).vertices, float)
+    return np.flatnonzero(np.isfinite(ip.self_contact_distance(vertices, body.template, NEAR, GEODESIC)))
+
+
+def present(problem: Problem, bodies: Sequence[PresentedBody], stays: bool) -> Problem:
+    """The problem whose people imitate these poses, one for all or one each.
+
+    stays: the body stays in the frame in which it is presented, and the camera moves around it: its floor is then that
+    of the presented pose, unless the problem knows one.
+    """
+    count, body = problem.num_bodies, problem.body.body
+    bodies = [*bodies] * (count if len(bodies) == 1 else 1)
+    pose = torch.from_numpy(np.stack([each.pose for each in bodies]))
+    touching = torch.zeros(count, body.num_vertices, dtype=torch.bool)
+    for row, each in enumerate(bodies):
+        touching[row, torch.from_numpy(each.contact)] = True
+    ground = problem.ground
+    if ground is None and stays:
+        up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(count, 3)
+        ground = ipt.Ground(up, torch.tensor([each.floor(body) for each in bodies], dtype=torch.float64))
+    return replace(problem, presented=Presented(pose[:, 1:], touching, pose[:, 0]), ground=ground)
+
+
+def y_up(normal: Array) -> Rotation:
+    """The smallest turn that brings a direction (3,) to y."""
+    normal = np.asarray(normal, float) / np.linalg.norm(normal)
+    axis, cosine = np.cross(normal, [0.0, 1.0, 0.0]), float(normal[1])
+    sine = float(np.linalg.norm(axis))
+    if sine == 0.0:
+        return Rotation.from_rotvec([0.0, 0.0, 0.0 if cosine > 0 else np.pi])
+    return Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine))
+
+
+class _Stored:
+    """The numbers of a file by name; nothing in it is executed."""
+
+    def __init__(self, path: Path, names: set[str], read: Callable[[str], Any]) -> None:
+        self.path, self.names, self._read = path, names, read
+
+    @classmethod
+    def open(cls, path: Path) -> _Stored:
+        if not path.is_file():
+            raise ValueError(f"{path}: no such file")
+        if path.suffix.lower() == ".npz":
+            return cls(path, safe_npz.names(path), lambda name: safe_npz.read(path, name))
+        content = safe_pickle.read(path, "presented pose", "a pose of SMPL, SMPL-X or MoYo", tolerant=True)
+        names = {name for name in content if isinstance(name, str)}
+        return cls(path, names, lambda name: _plain(content[name], f"{path}: {name}"))
+
+    def first(self, *names: str) -> Array | None:
+        """The first of these that is there, as numbers."""
+        for name in names:
+            if name in self.names:
+                array = np.asarray(self._read(name))
+                if array.dtype.kind not in "fiub":
+                    raise ValueError(f"{self.path}: {name} holds {array.dtype}, not numbers; save plain numbers")
+                return array
+        return None
+
+    def word(self, *names: str) -> str | None:
+        for name in names:
+            if name in self.names:
+                return str(self._read(name))
+        return None
+
+
+def _plain(value: Any, place: str) -> Any:
+    if isinstance(value, (str, int, float, bool)):
+        return value
+    if isinstance(value, (list, tuple)):
+        try:
+            return np.array(value)
+        except ValueError as error:
+            raise ValueError(f"{place}: {error}") from None
+    try:
+        return safe_pickle.as_array(value)
+    except ValueError as error:
+        raise ValueError(f"{place}: {error}") from error
+
+
+def _of_file(
+    stored: _Stored, body: BodyModel, contact: NDArray[np.int64] | None, frame: int | None, up: Axis | None
+) -> PresentedBody:
+    try:
+        pieces = pose_arrays.read(_without_weights(stored, body))
+    except ValueError as error:
+        raise ValueError(f"{stored.path}: {error}") from None
+    if not pieces:
+        listed = ", ".join(sorted(stored.names))[:120] or "nothing"
+        raise ValueError(
+            f"{stored.path}: holds {listed}; expected a pose such as global_orient with body_pose, or pose"
+        )
+    length = max(len(piece.rotations) for piece in pieces)
+    row = _row(stored, length, frame)
+    pose = pose_arrays.place(pieces, body.joint_names, length)[row]
+    if not np.isfinite(pose).all():
+        raise ValueError(f"{stored.path}: the pose is not finite")
+    if stored.names & {*_ABSOLUTE}:
+        pose = pose - body.pose_mean
+    weights = [stored.first(f"{side}_hand_pose") for side in ("left", "right")]
+    if body.hands is not None and _are_weights(weights):
+        pose[-30:] = body.hands.from_components(*(each.reshape(-1, each.shape[-1])[0] for each in weights))  # type: ignore[union-attr]
+    own = _kind(stored, pieces) == embedded.kind_of(body)
+    notes = [] if own else [f"{stored.path}: is of another body than {body.name}: its floor and contact are not used"]
+    normal, height = _ground(stored) if own else (None, None)
+    default = (0.0, 0.0, 1.0) if stored.names & {*_Z_UP} else (0.0, 1.0, 0.0)
+    normal = np.asarray(up or default, float) if normal is None else normal
+    turn = y_up(normal)
+    pose[0] = (turn * Rotation.from_rotvec(pose[0])).as_rotvec()
+    if height is not None:
+        height = _pelvis(body)[1] - (float(normal @ _place(stored, body, row)) - height)
+    contact_from = "given"
+    if contact is None and own and "contact" in stored.names:
+        contact, contact_from = _indices(stored.first("contact"), f"{stored.path}: contact", body), "file"
+    found = of_pose(str(stored.path), pose, body, contact, height, notes)
+    return replace(found, contact_from=contact_from) if contact_from == "file" else found
+
+
+def _without_weights(stored: _Stored, body: BodyModel) -> Callable[..., Array | None]:
+    """`first` of a file, but for hands that are weights of components instead of rotations."""
+
+    def first(*names: str) -> Array | None:
+        found = stored.first(*names)
+        is_hand = len(names) == 1 and names[0] in ("left_hand_pose", "right_hand_pose")
+        return None if is_hand and _are_weights([found]) else found
+
+    return first
+
+
+def _are_weights(hands: Sequence[Array | None]) -> bool:
+    """Whether hands are weights of principal components: upstream stores 12 a hand, and RICH, too."""
+    return all(hand is not None and hand.ndim > 0 and hand.shape[-1] not in (3, 45) for hand in hands)
+
+
+def _row(stored: _Stored, length: int, frame: int | None) -> int:
+    if frame is None and length > 1:
+        raise ValueError(f"{stored.path}: holds {length} poses; say which is presented (--pose-frame, from 0)")
+    if not 0 <= (frame or 0) < length:
+        raise ValueError(f"{stored.path}: frame: expected 0 to {length - 1}, got {frame}")
+    return frame or 0
+
+
+def _kind(stored: _Stored, pieces: Sequence[pose_arrays.Piece]) -> str:
+    """What the parameters are of: what the file says, or what its joints tell."""
+    told = stored.word("model", "body", "model_type")
+    if told is not None and told.lower() in (*embedded.NAMES, "smpl", "smplh", "smplx"):
+        return told.lower()
+    joints = {name for piece in pieces for name in piece.joints}
+    if "left_hand" in joints:
+        return "smpl"
+    return "smplh" if "left_index1" in joints and "jaw" not in joints else "smplx"
+
+
+def _ground(stored: _Stored) -> tuple[Array | None, float | None]:
+    """Normal and height of the file's floor, or neither."""
+    plane = stored.first("ground")
+    if plane is None and {"ground_normal", "ground_height"} <= stored.names:
+        parts = (stored.first("ground_normal"), stored.first("ground_height"))
+        plane = np.concatenate([np.ravel(part) for part in parts if part is not None])
+    if plane is None:
+        return None, None
+    plane = np.ravel(plane).astype(float)
+    if plane.shape != (4,) or not np.isfinite(plane).all():
+        raise ValueError(f"{stored.path}: ground: expected a normal and a height (4,), got shape {plane.shape}")
+    ground = Ground(plane[:3], plane[3])
+    return np.asarray(ground.normal, float), float(ground.height)
+
+
+def _place(stored: _Stored, body: BodyModel, row: int) -> Array:
+    """Where the pelvis is in the file's world (3,) m."""
+    transl, betas = stored.first("transl", "trans"), stored.first("betas")
+    pelvis = _pelvis(body, None if betas is None else betas.reshape(-1, betas.shape[-1]), row)
+    if transl is None:
+        return pelvis
+    if transl.shape[-1:] != (3,):
+        raise ValueError(f"{stored.path}: transl: expected (3,) or (T, 3), got {transl.shape}")
+    rows = transl.reshape(-1, 3).astype(float)
+    return pelvis + rows[row if len(rows) > row else 0]
+
+
+def _pelvis(body: BodyModel, betas: Array | None = None, row: int = 0) -> Array:
+    """The root joint (3,) m, about which a body turns, of the mean shape or of betas (n or 1, b)."""
+    if betas is None:
+        return body.J_template[0]
+    count = min(betas.shape[1], body.num_betas)
+    return body.J_template[0] + body.J_shapedirs[0, :, :count] @ betas[row if len(betas) > row else 0, :count]
+
+
+def _given(path: str | Path | None, body: BodyModel) -> NDArray[np.int64] | None:
+    """The vertices of a contact file."""
+    if path is None:
+        return None
+    path = Path(path)
+    if path.suffix.lower() in ENDINGS:
+        stored = _Stored.open(path)
+        found = stored.first("contact")
+        if found is None:
+            listed = ", ".join(sorted(stored.names))[:120]
+            raise ValueError(f"{path}: expected an array contact, it has {listed or 'nothing'}")
+        return _indices(found, f"{path}: contact", body)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        found = np.array(content["contact"] if isinstance(content, dict) else content)
+    except (OSError, ValueError, KeyError) as error:
+        raise ValueError(f"{path}: expected a list of vertices (.json), or contact in .npz or .pkl: {error}") from None
+    return _indices(found, f"{path}: contact", body)
+
+
+def _indices(found: Array | None, place: str, body: BodyModel) -> NDArray[np.int64]:
+    """Vertices as ascending indices, from indices, pairs of them, or a flag for each vertex."""
+    found = np.zeros(0, int) if found is None else np.asarray(found)
+    if found.size == 0:
+        return np.zeros(0, np.int64)
+    count = body.num_vertices
+    if found.dtype.kind == "b" or (found.shape == (count,) and np.isin(found, (0, 1)).all()):
+        if found.shape != (count,):
+            raise ValueError(f"{place}: expected a flag for each of {count} vertices, got shape {found.shape}")
+        return np.flatnonzero(found)
+    if found.dtype.kind not in "iuf" or not np.equal(found, np.round(found)).all():
+        raise ValueError(f"{place}: expected indices of vertices, got {found.dtype}")
+    vertices = np.unique(found).astype(np.int64)
+    if vertices[0] < 0 or vertices[-1] >= count:
+        raise ValueError(
+            f"{place}: expected vertices 0 to {count - 1} of {body.name}, got {vertices[0]} to {vertices[-1]}"
+        )
+    return vertices
