@@ -11,7 +11,9 @@ import torch
 from torch import Tensor
 
 import ipman_rs.torch as ipt
-from ipman_rs.body import joints
+from ipman_rs.body import BodyModel as NumpyBody
+from ipman_rs.body import joints, load_body
+from ipman_rs.body.hands import Hands
 from ipman_rs.fitting.camera import Camera
 from ipman_rs.fitting.candidate import Candidate
 from ipman_rs.fitting.problem import Presented, Problem
@@ -32,7 +34,7 @@ class JointLandmarks:
     body: ipt.BodyModel
     names: tuple[str, ...] = ("pelvis", "head", "left_wrist", "right_ankle", "left_foot")
 
-    def __call__(self, pose: Tensor, betas: Tensor, transl: Tensor) -> Tensor:
+    def __call__(self, pose: Tensor, betas: Tensor, transl: Tensor, expression: Tensor | None = None) -> Tensor:
         return self.body(pose, betas, transl).joints[:, [joints.SMPL.index(name) for name in self.names]]
 
 
@@ -48,7 +50,7 @@ def variables(
 ) -> dict[str, Tensor]:
     generator = torch.Generator().manual_seed(seed)
     sizes = {"orient": (3,), "pose": (23, 3), "betas": (body_model().body.num_betas,), "transl": (3,)}
-    sizes |= {"camera_orient": (3,), "camera_transl": (3,), "log_focal": (2,)}
+    sizes |= {"camera_orient": (3,), "camera_transl": (3,), "log_focal": (2,), "face": (0, 3), "expression": (0,)}
     return {
         name: (scale * torch.randn(batch, *size, generator=generator, dtype=torch.float64)).to(dtype)
         for name, size in sizes.items()
@@ -79,7 +81,8 @@ def row_of(problem: Problem, row: int) -> Problem:
     part = {name: getattr(problem, name)[row : row + 1] for name in PER_BODY if getattr(problem, name) is not None}
     presented = problem.presented
     if presented is not None and len(presented.pose) > 1:
-        part["presented"] = replace(presented, pose=presented.pose[row : row + 1])
+        orient = None if presented.orient is None else presented.orient[row : row + 1]
+        part["presented"] = replace(presented, pose=presented.pose[row : row + 1], orient=orient)
     return replace(problem, **part)
 
 
@@ -130,6 +133,87 @@ def save_vposer(path: Path, prefix: str = "vp_model.") -> tuple[torch.nn.Sequent
     state |= {f"{prefix}encoder_net.8.mu.{name}": value for name, value in mean.state_dict().items()}
     torch.save({"state_dict": state}, path)
     return body, mean
+
+
+@functools.cache
+def smplx_body() -> ipt.BodyModel:
+    """The light embedded body with SMPL-X's joints, float64: fingers and a jaw that move skin, four expressions, a mean
+    hand, and components of the hands that are neither orthogonal nor of length 1."""
+    body, rng = load_body("anny-lite"), np.random.default_rng(8)
+    rest = body()
+    vertices, head = rest.vertices, rest.joints[joints.SMPL.index("head")]
+    places = {name: rest.joints[row] for row, name in enumerate(joints.SMPL)}
+    weights = np.zeros((body.num_vertices, 55))
+    for row, name in enumerate(body.joint_names):
+        weights[:, joints.SMPLX.index(name.replace("hand", "index1"))] += body.weights[:, row]
+    in_front = vertices - head
+    places |= {"jaw": head + [0, 0.0, 0.05]}
+    places |= {f"{side}_eye_smplhf": head + [sign * 0.03, 0.08, 0.1] for side, sign in (("left", 1), ("right", -1))}
+    of_head = body.weights[:, joints.SMPL.index("head")] > 0.5
+    weights[of_head & (in_front[:, 1] < 0.03) & (in_front[:, 2] > 0.05)] = np.eye(55)[joints.SMPLX.index("jaw")]
+    fingers = {"index": 0.03, "middle": 0.01, "pinky": -0.03, "ring": -0.01, "thumb": 0.05}
+    for side, sign in (("left", 1), ("right", -1)):
+        hand = places[f"{side}_hand"]
+        for finger, z in fingers.items():
+            places |= {f"{side}_{finger}{i}": hand + [sign * 0.02 * i, 0, z] for i in (1, 2, 3)}
+            tip = sign * (vertices[:, 0] - hand[0]) > 0.05
+            near = tip & (abs(vertices[:, 2] - hand[2] - z) < 0.01)
+            weights[near] = np.eye(55)[joints.SMPLX.index(f"{side}_{finger}3")]
+    joint_places = np.array([places[name] for name in joints.SMPLX])
+    ones = np.eye(body.num_betas)
+    moved = [body(betas=one) for one in ones]
+    shapes = np.stack([each.vertices - vertices for each in moved], axis=-1)
+    joint_shapes = np.zeros((55, 3, body.num_betas))
+    joint_shapes[:22] = np.stack([each.joints - rest.joints for each in moved], axis=-1)[:22]
+    joint_shapes[22:25], joint_shapes[25:40], joint_shapes[40:] = joint_shapes[15], joint_shapes[20], joint_shapes[21]
+    expressions = 3e-3 * rng.normal(size=(body.num_vertices, 3, 4)) * of_head[:, None, None]
+    joint_expressions = 1e-3 * rng.normal(size=(55, 3, 4)) * np.isin(np.arange(55), [22, 23, 24])[:, None, None]
+    mixed = rng.normal(size=(2, 45, 45)) * 0.2
+    hands = Hands(0.1 * rng.normal(size=(30, 3)), *mixed)
+    parents = np.array([-1, *joints.SMPL_PARENTS[1:22], 15, 15, 15, *_finger_parents(20, 25), *_finger_parents(21, 40)])
+    model = NumpyBody(
+        name="like SMPL-X",
+        v_template=vertices,
+        shapedirs=shapes,
+        expressiondirs=expressions,
+        posedirs=1e-4 * rng.normal(size=(body.num_vertices, 3, 9 * 54)),
+        J_template=joint_places,
+        J_shapedirs=joint_shapes,
+        J_expressiondirs=joint_expressions,
+        rest_rotation=np.tile(np.eye(3), (55, 1, 1)),
+        weights=weights,
+        faces=body.faces,
+        parents=parents,
+        joint_names=joints.SMPLX,
+        hands=hands,
+    )
+    return ipt.BodyModel(model, torch.float64)
+
+
+def _finger_parents(wrist: int, first: int) -> list[int]:
+    return [parent for finger in range(5) for parent in (wrist, first + 3 * finger, first + 3 * finger + 1)]
+
+
+def smplx_observed(batch: int, seed: int = 6) -> tuple[Problem, dict[str, Tensor]]:
+    """As `observed`, of the body like SMPL-X with all its landmarks; the camera looks along −z as in a photo."""
+    from ipman_rs.fitting import start
+    from ipman_rs.fitting.landmarks import Landmarks
+
+    generator = torch.Generator().manual_seed(seed)
+    body = smplx_body()
+    landmarks = Landmarks(body)
+    size = torch.full((batch, 2), 640.0, dtype=torch.float64)
+    level, here = start.level_camera().expand(batch, 3, 3).clone(), torch.zeros(batch, 3, dtype=torch.float64)
+    camera = Camera(1.3 * size, size / 2, level, here)
+    known = Problem(body, landmarks, camera, image_size=size)
+    given = start.neutral(known)
+    noise = {name: torch.randn(value.shape, generator=generator, dtype=torch.float64) for name, value in given.items()}
+    given |= {name: given[name] + 0.1 * noise[name] for name in ("orient", "pose", "face", "betas")}
+    given["expression"] = noise["expression"]
+    given["transl"] = given["transl"] + torch.tensor([0.0, -0.9, -4.0], dtype=torch.float64)
+    points = Candidate(known, given).projected
+    confidence = torch.ones_like(points[..., 0])
+    return replace(known, points=points, confidence=confidence), given
 
 
 def presented(batch: int = 1, dtype: torch.dtype = torch.float64, contact: Tensor | None = None) -> Presented:

@@ -16,10 +16,11 @@ import ipman_rs as ip
 import ipman_rs.torch as ipt
 from ipman_rs.body import joints, poses
 from ipman_rs.fitting import switch
+from ipman_rs.fitting.geodesics import Geodesics, geodesics
 from ipman_rs.fitting.terms import physics
 from ipman_rs.fitting.terms.measured_shape import CAP, MeasuredShape, exponential
 from ipman_rs.fitting.terms.physics import Balance, Ground, Stability
-from ipman_rs.fitting.terms.presented_contact import PresentedContact, far_apart
+from ipman_rs.fitting.terms.presented_contact import PresentedContact
 
 
 def hands_and_thighs() -> torch.Tensor:
@@ -36,14 +37,14 @@ def contact_problem(batch: int = 2, dtype: torch.dtype = torch.float64):
     return cases.problem(batch, dtype, presented=cases.presented(1, dtype, hands_and_thighs()))
 
 
-def test_contact_against_all_pairs():
+def test_contact_against_all_vertices():
     problem = contact_problem(3)
     body = cases.candidate(problem, **cases.variables(3))
     template = problem.body.template
     contact = np.unique(hands_and_thighs().numpy())
-    far = far_apart(template, contact, 0.3)
+    far = geodesics(template, 0.3).rows(contact)
     for row, actual in zip(body.vertices.numpy(), PresentedContact(problem).cost(body).tolist(), strict=True):
-        distances = np.linalg.norm(row[contact][:, None] - row[contact], axis=-1)
+        distances = np.linalg.norm(row[contact][:, None] - row, axis=-1)
         nearest = np.where(far, distances, np.inf).min(axis=1)
         assert actual == pytest.approx(np.tanh(nearest).mean(), rel=1e-13)
 
@@ -55,8 +56,10 @@ def test_geodesics_are_shortest_paths():
     corners = np.arange(len(mesh.vertices))
     x = template.vertices[:, 0]
     expected = np.abs(x[:, None] - x) > 0.5
-    assert np.array_equal(far_apart(template, corners, 0.5), expected)
-    assert not far_apart(template, corners, 3.0).any()
+    found = Geodesics(template, 0.5)
+    assert np.array_equal(found.far(corners, corners[::-1]), expected[corners, corners[::-1]])
+    assert np.array_equal(found.rows(corners[::-1]), expected[::-1])
+    assert not Geodesics(template, 3.0).rows(corners).any()
 
 
 def test_touching_surfaces_cost_nothing_and_have_no_nan():
@@ -89,13 +92,34 @@ def test_contact_rows_are_alone(dtype):
 
 
 def test_contact_that_cannot_be_is_refused():
-    with pytest.raises(ValueError, match="expected the vertices that touch"):
-        PresentedContact(cases.problem(presented=cases.presented()))
     with pytest.raises(ValueError, match="expected indices of vertices, 0 to"):
         PresentedContact(cases.problem(presented=cases.presented(contact=torch.tensor([0, 100_000]))))
-    near = hands_and_thighs()[:6]
-    with pytest.raises(ValueError, match="no two of the 6 contact vertices are more than 0.3 m apart"):
-        PresentedContact(cases.problem(presented=cases.presented(contact=near)))
+    with pytest.raises(ValueError, match=r"expected indices \(n,\) of vertices, .* float64 of shape \(2,\)"):
+        PresentedContact(cases.problem(presented=cases.presented(contact=torch.zeros(2).double())))
+
+
+@pytest.mark.parametrize("contact", [None, torch.zeros(0, dtype=torch.int64), torch.zeros(3, 1229, dtype=torch.bool)])
+def test_no_contact_costs_nothing(contact):
+    """Upstream leaves the term out: `if len(presented_contact) > 0`."""
+    problem = cases.problem(3, presented=cases.presented(3, contact=contact))
+    cost = PresentedContact(problem).cost(cases.candidate(problem, **cases.variables(3)))
+    assert torch.equal(cost, torch.zeros(3, dtype=torch.float64))
+
+
+def test_contact_of_each_body_s_own():
+    """A mask a body and vertex is the lists of each body by itself, in a batch and after it was picked from one."""
+    every, values = hands_and_thighs(), cases.variables(3)
+    lists = [every[:6], every[3:14], every[:0]]
+    masks = torch.zeros(3, 1229, dtype=torch.bool)
+    for row, contact in enumerate(lists):
+        masks[row, contact] = True
+    problem = cases.problem(3, presented=cases.presented(3, contact=masks))
+    together = PresentedContact(problem).cost(cases.candidate(problem, **values))
+    for row, contact in enumerate(lists):
+        alone = cases.problem(1, presented=cases.presented(1, contact=contact))
+        body = {name: value[row : row + 1] for name, value in values.items()}
+        assert torch.equal(PresentedContact(alone).cost(cases.candidate(alone, **body))[0], together[row])
+    assert torch.equal(problem.rows(torch.tensor([1])).presented.contact, masks[1:2])
 
 
 def measured(batch: int, dtype: torch.dtype = torch.float64):

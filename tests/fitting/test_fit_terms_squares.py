@@ -169,10 +169,10 @@ def test_what_is_missing_is_named():
 
 
 def test_models_with_fingers_and_face(tmp_path):
-    """SMPL-X: hands are 30 joints, jaw and eyes belong to no prior here, the mixture's hand joints count as 0."""
+    """SMPL-X: hands are 30 joints, jaw and eyes are another block, the mixture's hand joints count as 0."""
     template = torch.zeros(3, 3, dtype=torch.float64)
-    body = SimpleNamespace(body=SimpleNamespace(joint_names=joints.SMPLX), v_template=template)
-    pose = torch.randn(2, 54, 3, generator=torch.Generator().manual_seed(5), dtype=torch.float64)
+    body = SimpleNamespace(body=SimpleNamespace(joint_names=joints.SMPLX, hands=None), v_template=template)
+    pose = torch.randn(2, 51, 3, generator=torch.Generator().manual_seed(5), dtype=torch.float64)
     shown = torch.zeros(2, 54, 3, dtype=torch.float64)
     problem = replace(cases.problem(2), body=body, presented=Presented(shown))
     smpl = cases.problem(2)
@@ -182,7 +182,7 @@ def test_models_with_fingers_and_face(tmp_path):
     def cost(make):
         return make(problem).cost(given)
 
-    torch.testing.assert_close(cost(HandPrior), pose[:, 24:].square().sum((1, 2)))
+    torch.testing.assert_close(cost(HandPrior), pose[:, 21:].square().sum((1, 2)))
     torch.testing.assert_close(cost(PresentedPose), pose[:, :21].square().sum((1, 2)))
     assert JointLimits(problem).residuals(given).shape == (2, 21 * 3)
     for make in (JointLimits, PosePrior):

@@ -14,7 +14,7 @@ from ipman_rs.torch.body import BodyOutput
 from .camera import Camera
 from .problem import Problem
 from .rotations import matrix
-from .variables import Variables
+from .variables import Variables, full_pose, pose_blocks
 
 
 class Candidate:
@@ -28,14 +28,20 @@ class Candidate:
     @cached_property
     def full_pose(self) -> Tensor:
         """(B, J, 3), the root first."""
-        return torch.cat([self.variables["orient"][:, None], self.variables["pose"]], dim=1)
+        return full_pose(self.variables, self.problem.body.body)
+
+    @property
+    def expression(self) -> Tensor | None:
+        """(B, E), None for bodies without a face that moves."""
+        expression = self.variables["expression"]
+        return expression if expression.shape[1] else None
 
     @cached_property
     def posed(self) -> BodyOutput:
         """The whole mesh, in the body's own precision: dearer than `landmarks`, which look at a few points of it."""
         dtype = self.problem.body.dtype
-        given = (self.full_pose, self.variables["betas"], self.variables["transl"])
-        return self.problem.body(*(value.to(dtype) for value in given))
+        given = (self.full_pose, self.variables["betas"], self.variables["transl"], self.expression)
+        return self.problem.body(*(None if value is None else value.to(dtype) for value in given))
 
     @property
     def vertices(self) -> Tensor:
@@ -45,16 +51,20 @@ class Candidate:
     @cached_property
     def landmarks(self) -> Tensor:
         """(B, K, 3) m, in the world."""
-        return self.problem.landmarks(self.full_pose, self.variables["betas"], self.variables["transl"])
+        variables = self.variables
+        return self.problem.landmarks(self.full_pose, variables["betas"], variables["transl"], self.expression)
 
     def landmark_slopes(self, free: Sequence[str]) -> Tensor:
         """The landmarks' derivatives (B, P, K, 3) by the free blocks; 0 by those of the camera."""
-        variables, points = self.variables, self.landmarks
+        variables, points, body = self.variables, self.landmarks, self.problem.body.body
         zero = points.new_zeros(())
-        by_body = self.problem.landmarks.jacobian(self.full_pose, variables["betas"])
-        by_pose, by_betas = by_body.split([self.full_pose[0].numel(), variables["betas"].shape[1]], dim=1)
+        by_body = self.problem.landmarks.jacobian(self.full_pose, variables["betas"], self.expression)
+        sizes = [self.full_pose[0].numel(), variables["betas"].shape[1], variables["expression"].shape[1]]
+        by_pose, by_betas, by_expression = by_body.split(sizes, dim=1)
+        by_joint = pose_blocks(by_pose.unflatten(1, (-1, 3)), body)  # (B, joints, 3, K, 3), the root's (B, 3, K, 3)
+        known = {"orient": by_joint["orient"]} | {name: by_joint[name].flatten(1, 2) for name in ("pose", "face")}
         by_transl = torch.eye(3, dtype=points.dtype)[:, None].expand(len(points), 3, points.shape[1], 3)
-        known = {"orient": by_pose[:, :3], "pose": by_pose[:, 3:], "betas": by_betas, "transl": by_transl}
+        known |= {"betas": by_betas, "expression": by_expression, "transl": by_transl}
         still = {name: zero.expand(len(points), variables[name][0].numel(), *points.shape[1:]) for name in free}
         return torch.cat([known.get(name, still[name]) for name in free], dim=1)
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from .solvers import SOLVERS, Options
+from .start import search
 from .terms import TERMS
 from .variables import BLOCKS
 
@@ -25,6 +27,11 @@ class Stage:
     solver: str
     options: Options
     find_ground: bool = False  # lay the ground under the body before it, unless the ground is given
+    terms: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # options that differ from the file's
+
+    def term_options(self, terms: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+        """The options of each term in this stage, where the file has `terms`."""
+        return {name: {**terms.get(name, {}), **self.terms.get(name, {})} for name in {**terms, **self.terms}}
 
 
 @dataclass(frozen=True)
@@ -63,8 +70,8 @@ def load(name: str | Path) -> Config:
 
 def _config(name: str, content: Any) -> Config:
     _known("the file", content, ("description", "solver", "start", "stages", "terms", "tolerance"))
-    terms = content.get("terms") or {}
-    _known("terms", terms, TERMS)
+    terms = _terms("terms", content.get("terms"))
+    search(content.get("start") or {})
     stages = tuple(_stage(number, stage, content) for number, stage in enumerate(content.get("stages") or ()))
     if not stages:
         raise ValueError("stages: expected at least one, got none")
@@ -73,7 +80,7 @@ def _config(name: str, content: Any) -> Config:
 
 def _stage(number: int, stage: Any, content: Mapping[str, Any]) -> Stage:
     place = f"stage {number}"
-    _known(place, stage, ("name", "free", "weights", "solver", "iterations", "find_ground"))
+    _known(place, stage, ("name", "free", "weights", "solver", "iterations", "find_ground", "terms"))
     _known(f"{place}, weights", stage.get("weights") or {}, TERMS)
     _known(f"{place}, free", dict.fromkeys(stage.get("free") or ()), BLOCKS)
     solver = stage.get("solver", content.get("solver", "levenberg"))
@@ -85,7 +92,30 @@ def _stage(number: int, stage: Any, content: Mapping[str, Any]) -> Stage:
         weights[term] = float(weight)
     options = Options(**{"iterations": int(stage.get("iterations", 100)), **(content.get("tolerance") or {})})
     find_ground = bool(stage.get("find_ground", False))
-    return Stage(str(stage.get("name", number)), tuple(stage["free"]), weights, solver, options, find_ground)
+    terms = _terms(f"{place}, terms", stage.get("terms"))
+    return Stage(str(stage.get("name", number)), tuple(stage["free"]), weights, solver, options, find_ground, terms)
+
+
+def _terms(place: str, given: Any) -> dict[str, Mapping[str, Any]]:
+    """Options of terms by their names."""
+    given = given or {}
+    _known(place, given, TERMS)
+    for name, options in given.items():
+        _known(f"{place}, {name}", options, _options(TERMS[name]))
+    return given
+
+
+def _options(term: type) -> list[str]:
+    """What a term can be told: the arguments of its class after the problem, and those that it hands on."""
+    names: list[str] = []
+    for each in inspect.getmro(term):
+        if "__init__" not in vars(each):
+            continue
+        arguments = list(inspect.signature(each.__init__).parameters.values())[2:]
+        names += [argument.name for argument in arguments if argument.kind != argument.VAR_KEYWORD]
+        if all(argument.kind != argument.VAR_KEYWORD for argument in arguments):
+            break
+    return names
 
 
 def _known(place: str, given: Any, known: Any) -> None:

@@ -119,7 +119,7 @@ def run_stage(
     progress: Callable[[str, int], None] | None = None,
     trace: bool = False,
 ) -> tuple[dict[str, torch.Tensor], StageReport]:
-    objective = Objective(problem, variables, stage.free, stage.weights, terms)
+    objective = Objective(problem, variables, stage.free, stage.weights, stage.term_options(terms))
     starts = pack(variables, stage.free).numpy()
     outcomes: list[Outcome] = []
     traces: list[dict[str, np.ndarray]] = []

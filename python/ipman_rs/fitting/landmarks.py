@@ -19,9 +19,13 @@ from torch import Tensor
 import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel
 
-from .surface import skin_points
+from .surface import FINGERTIPS, SIDES, skin_points
 
 MIDPOINTS = {"mid_hip": ("left_hip", "right_hip"), "mid_shoulder": ("left_shoulder", "right_shoulder")}
+# Joints of fingers, their tips, and the knuckles of `surface`.
+HAND_POINTS = frozenset(
+    f"{side}_{finger}{end}" for side in SIDES for finger in FINGERTIPS for end in ("", "1", "2", "3", "_tip")
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,25 +61,44 @@ class Landmarks:
             listed = ", ".join(known(full, sites))
             raise ValueError(f"names: the body {full.name!r} has no landmark {unknown[0]!r}; it has {listed}")
         device = body.v_template.device
+        self.num_betas = full.num_betas
         self.points = ipt.BodyModel(_cut(full, [skin[name] for name in used] or [Site(0)]), body.dtype).to(device)
         self.ends = [torch.tensor([rows[pair[end]] for pair in ends], device=device) for end in (0, 1)]
 
-    def __call__(self, full_pose: Tensor, betas: Tensor | None = None, transl: Tensor | None = None) -> Tensor:
-        """The points (B, K, 3) m of bodies with `full_pose` (B, J, 3), `betas` (B, b), `transl` (B, 3)."""
-        posed = self.points(full_pose, betas, transl)
+    def __call__(
+        self,
+        full_pose: Tensor,
+        betas: Tensor | None = None,
+        transl: Tensor | None = None,
+        expression: Tensor | None = None,
+    ) -> Tensor:
+        """The points (B, K, 3) m of bodies with `full_pose` (B, J, 3), `betas` (B, b), `transl` (B, 3) and `expression`
+        (B, E)."""
+        posed = self.points(full_pose, self._shape(betas, expression), transl)
         points = torch.cat([posed.vertices, posed.joints], dim=-2)
         return 0.5 * (points.index_select(-2, self.ends[0]) + points.index_select(-2, self.ends[1]))
 
-    def jacobian(self, full_pose: Tensor, betas: Tensor) -> Tensor:
-        """The points' derivatives (B, P, K, 3) by the rotation vectors (3 J) and the betas; no gradient. That by the
-        translation is the identity."""
-        body = self.points.body
-        bodies, size = len(full_pose), full_pose[0].numel() + betas.shape[1]
-        jacobian = full_pose.new_empty(bodies, size, body.num_vertices + body.num_joints, 3)
+    def jacobian(self, full_pose: Tensor, betas: Tensor, expression: Tensor | None = None) -> Tensor:
+        """The points' derivatives (B, P, K, 3) by the rotation vectors (3 J), the betas and the expression; no
+        gradient. That by the translation is the identity."""
+        body, shape = self.points.body, self._shape(betas, expression)
+        assert shape is not None
+        bodies, angles = len(full_pose), full_pose[0].numel()
+        jacobian = full_pose.new_empty(bodies, angles + shape.shape[1], body.num_vertices + body.num_joints, 3)
         skin = body._skin(np.float32 if full_pose.dtype == torch.float32 else np.float64)
-        pose, betas = full_pose.detach().contiguous(), betas.detach().contiguous()
-        skin.jacobian(bodies, (pose.numpy(), betas.numpy(), None, None), jacobian.numpy())
+        pose, shape = full_pose.detach().contiguous(), shape.detach().contiguous()
+        skin.jacobian(bodies, (pose.numpy(), shape.numpy(), None, None), jacobian.numpy())
+        if expression is not None:
+            asked = [jacobian[:, : angles + betas.shape[1]], jacobian[:, angles + self.num_betas :]]
+            jacobian = torch.cat(asked, dim=1)
         return 0.5 * (jacobian.index_select(-2, self.ends[0]) + jacobian.index_select(-2, self.ends[1]))
+
+    def _shape(self, betas: Tensor | None, expression: Tensor | None) -> Tensor | None:
+        """What moves the cut body's shape: the betas, all of them where expressions follow."""
+        if expression is None:
+            return betas
+        betas = expression.new_zeros(len(expression), 0) if betas is None else betas
+        return torch.cat([betas, betas.new_zeros(len(betas), self.num_betas - betas.shape[1]), expression], dim=1)
 
 
 def known(body: BodyModel, sites: Iterable[str] = ()) -> tuple[str, ...]:
@@ -91,15 +114,17 @@ def _ends(name: str, sites: Mapping[str, Site | str]) -> tuple[str, str]:
 
 
 def _cut(body: BodyModel, sites: list[Site]) -> BodyModel:
-    """The body with these points for vertices, and no faces."""
+    """The body with these points for vertices, and no faces; its expressions are further betas."""
     rows = np.array([site.vertex for site in sites])
     return dataclasses.replace(
         body,
         name=f"{body.name}, {len(rows)} points",
         v_template=body.v_template[rows] + np.array([site.shift for site in sites]),
-        shapedirs=body.shapedirs[rows],
-        expressiondirs=body.expressiondirs[rows],
+        shapedirs=np.concatenate([body.shapedirs[rows], body.expressiondirs[rows]], axis=-1),
+        expressiondirs=body.expressiondirs[rows][..., :0],
         posedirs=None if body.posedirs is None else body.posedirs[rows],
+        J_shapedirs=np.concatenate([body.J_shapedirs, body.J_expressiondirs], axis=-1),
+        J_expressiondirs=body.J_expressiondirs[..., :0],
         weights=body.weights[rows],
         faces=np.zeros((0, 3), np.int64),
     )

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Presented:
-    """A pose that the person was shown and imitates: pose (B, J − 1, 3), the vertices (n,) that touch in it, and the
-    root's rotation vector (B, 3) in the presented frame, none if None."""
+    """A pose that the person was shown and imitates: pose (B, J − 1, 3), and the root's rotation vector (B, 3) in the
+    presented frame, none if None. contact: the vertices (n,) that touch in it, or whether each does, (B, V), where
+    bodies are shown different poses; None where nothing touches."""
 
     pose: Tensor
     contact: Tensor | None = None
@@ -62,5 +63,9 @@ def _rows(value: Any, index: Tensor) -> Any:
             ipt.Ground.of_unit(value.normal.expand(-1, 3)[index], value.height[index]) if value.height.ndim else value
         )
     if isinstance(value, Presented):
-        return replace(value, pose=value.pose[index], orient=None if value.orient is None else value.orient[index])
+        orient = None if value.orient is None else value.orient[index]
+        own = value.contact is not None and value.contact.ndim == 2
+        return replace(
+            value, pose=value.pose[index], orient=orient, contact=value.contact[index] if own else value.contact
+        )
     return value

@@ -19,7 +19,7 @@ from .config import Config
 from .fit import Fit, StageReport
 from .solvers.outcome import CONVERGED
 from .start import SEEN
-from .variables import BLOCKS, Variables
+from .variables import BLOCKS, Variables, full_pose
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -55,9 +55,9 @@ class Result:
     def arrays(self) -> Arrays:
         """What a parameter file holds, each with a leading axis of 1, but for names:
 
-        global_orient (1, 3), body_pose (1, 3n), betas (1, b), transl (1, 3) and hands, jaw and eyes where the body has
-        them; camera_rotation (1, 3, 3), camera_translation (1, 3), focal (1, 2), center (1, 2), image_size (1, 2);
-        ground_normal (1, 3), ground_height (1,); keypoints (1, K, 3), projected (1, K, 2), keypoint_names (K,);
+        global_orient (1, 3), body_pose (1, 3n), betas (1, b), transl (1, 3) and hands, jaw, eyes and expression where
+        the body has them; camera_rotation (1, 3, 3), camera_translation (1, 3), focal (1, 2), center (1, 2), image_size
+        (1, 2); ground_normal (1, 3), ground_height (1,); keypoints (1, K, 3), projected (1, K, 2), keypoint_names (K,);
         model (). Parameters before the physics terms are named before_global_orient and so on.
         """
         problem, camera, body = self.candidate.problem, self.candidate.camera, self.candidate.problem.body.body
@@ -142,9 +142,11 @@ def results(fit: Fit, config: Config, start: Variables) -> list[Result]:
 
 
 def parameters(body: BodyModel, variables: Variables) -> Arrays:
-    """SMPL's names for the pose, shape and place of bodies, a row each."""
-    pose = _array(torch.cat([variables["orient"][:, None], variables["pose"]], dim=1))
+    """SMPL's names for the pose, shape and place of bodies, and the expression where they have one, a row each."""
+    pose = _array(full_pose(variables, body))
     found: Arrays = {name: pose[:, columns].reshape(len(pose), -1) for name, columns in joints_of(body).items()}
+    if body.num_expressions:
+        found["expression"] = _array(variables["expression"])
     return {**found, "betas": _array(variables["betas"]), "transl": _array(variables["transl"])}
 
 

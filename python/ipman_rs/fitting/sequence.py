@@ -161,7 +161,7 @@ class Together:
         own = [name for name in stage.free if name not in SHARED]
         self.free = (*own, *(name for name in stage.free if name in SHARED))
         self.frames, self.size = problem.num_bodies, pack(variables, own).shape[1] if own else 0
-        self.objective = Objective(problem, variables, self.free, stage.weights, config.terms)
+        self.objective = Objective(problem, variables, self.free, stage.weights, stage.term_options(config.terms))
         chunks = [range(first, min(first + CHUNK, self.frames)) for first in range(0, self.frames, CHUNK)]
         self.parts = [(chunk, self.objective.rows(chunk)) for chunk in chunks]
         rows = pack(variables, self.free).numpy()

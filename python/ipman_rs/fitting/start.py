@@ -1,9 +1,13 @@
-"""Where a fit starts: the mean body before the camera, as far away as its size in the image tells, turned the way that
-explains the points best.
+"""Where a fit starts, by the `search` of its preset:
 
-SMPLify-X estimates the depth by similar triangles and tries a turn by 180°; SMPLify-XMC searches over yaws. Here both,
-and without a presented pose over the named ones: the most promising are fitted for a few iterations, and the lowest
-cost wins.
+body     the mean shape before the camera, as far away as its size in the image tells, in the presented pose, or in the
+         one of the named poses that explains the points best, turned the way that does
+mean     the same in the mean pose alone, or the presented one
+camera   the camera around the presented body, which stays in its own frame with its ground
+points   the mean shape on points in the world, in the named pose that comes nearest
+
+SMPLify-X estimates the depth by similar triangles and tries a turn by 180°; SMPLify-XMC searches over yaws. Here both:
+the most promising are fitted for a few iterations, and the lowest cost wins.
 """
 
 from __future__ import annotations
@@ -22,7 +26,7 @@ from .camera import NEAREST
 from .problem import Problem
 from .rotations import matrix, nearest, vector
 from .solvers import Options
-from .variables import Variables, pack
+from .variables import COMPONENTS, Variables, full_pose, pack, pose_blocks
 
 # Far joints of the trunk, whose lengths change least with the pose, and then those of the legs and arms.
 SPANS = (
@@ -39,6 +43,31 @@ SEEN = 0.1  # confidence from which a point counts as seen
 WEIGHTS = {"reprojection": 4.0, "pose_prior": 40.0, "joint_limits": 200.0, "shape_prior": 50.0}
 DEEPEST = 100.0  # m
 TRIED = 8  # placed poses that are fitted for a few iterations
+SEARCHES = ("body", "mean", "camera", "points")
+
+
+def begin(problem: Problem, start: Mapping[str, Any]) -> tuple[Problem, dict[str, Tensor]]:
+    """Where a fit by a preset with this `start` begins: the problem, its ground known where the camera moves around the
+    body, and the variables. ValueError for an unknown option."""
+    how, given = search(start), options(start)
+    if how == "points":
+        return problem, at_points(problem)
+    if how == "camera":
+        from .fit import on_the_ground
+
+        if problem.ground is None:
+            problem = on_the_ground(problem, neutral(problem))
+        return problem, camera_around(problem, **given)
+    return problem, (mean_before_camera if how == "mean" else before_camera)(problem, **given)
+
+
+def search(start: Mapping[str, Any]) -> str:
+    """What a preset's `start` looks for. ValueError for what is not known."""
+    options(start)
+    how = start.get("search", "body")
+    if how not in SEARCHES:
+        raise ValueError(f"start, search: expected one of {', '.join(SEARCHES)}, got {how!r}")
+    return how
 
 
 def level_camera(pitch: float | Tensor = 0.0) -> Tensor:
@@ -65,9 +94,9 @@ def neutral(problem: Problem) -> dict[str, Tensor]:
         standing = torch.as_tensor(pose_of(model, "standing"))[1:]
         pose = standing.expand(bodies, -1, -1).clone()
     return {
-        "orient": orient,
-        "pose": pose,
-        "betas": zeros(min(model.num_betas, 10)),
+        **pose_blocks(torch.cat([orient[:, None], pose], dim=1), model),
+        "betas": zeros(min(model.num_betas, COMPONENTS)),
+        "expression": zeros(min(model.num_expressions, COMPONENTS)),
         "transl": zeros(3),
         "camera_orient": vector(problem.camera.rotation),
         "camera_transl": problem.camera.translation.clone(),
@@ -80,15 +109,29 @@ def before_camera(problem: Problem, yaws: int = 4, iterations: int = 12) -> dict
     poses of `ipman_rs.body.poses` that explains the points best. Needs points in an image."""
     poses = [neutral(problem)]
     if problem.presented is None:
-        poses += [_posed(poses[0], problem, name) for name in NAMES]
+        poses += [_posed(poses[0], problem, _named(problem, name)) for name in NAMES]
     return _best(problem, poses, yaws, ("orient", "transl"), iterations, moves_camera=False)
 
 
-def _posed(variables: Variables, problem: Problem, name: str) -> dict[str, Tensor]:
-    """The body in a named pose, its pelvis turned as there."""
-    pose = torch.as_tensor(pose_of(problem.body.body, name))
-    own = {"orient": pose[0], "pose": pose[1:]}
+def mean_before_camera(problem: Problem, yaws: int = 2, iterations: int = 12) -> dict[str, Tensor]:
+    """Variables with the mean body before the camera, in the mean of `terms.pose_prior` or the presented pose."""
+    variables = neutral(problem)
+    if problem.presented is None:
+        from .terms.pose_prior import mean_pose
+
+        variables = _posed(variables, problem, mean_pose(problem.body.body))
+    return _best(problem, [variables], yaws, ("orient", "transl"), iterations, moves_camera=False)
+
+
+def _posed(variables: Variables, problem: Problem, pose: Tensor) -> dict[str, Tensor]:
+    """All bodies in one pose (J, 3), their pelvis turned as there."""
+    own = pose_blocks(pose[None], problem.body.body)
     return {**variables, **{key: value.expand_as(variables[key]).clone() for key, value in own.items()}}
+
+
+def _named(problem: Problem, name: str) -> Tensor:
+    """(J, 3)."""
+    return torch.as_tensor(pose_of(problem.body.body, name))
 
 
 def camera_around(problem: Problem, yaws: int = 12, iterations: int = 12) -> dict[str, Tensor]:
@@ -105,8 +148,8 @@ def at_points(problem: Problem) -> dict[str, Tensor]:
     variables = neutral(problem)
     best, nearest_yet = _onto_points(problem, variables)
     for name in NAMES if problem.presented is None else ():
-        pose = torch.as_tensor(pose_of(problem.body.body, name))[1:].expand_as(variables["pose"])
-        found, away = _onto_points(problem, {**variables, "pose": pose})
+        posed = _posed(variables, problem, _named(problem, name))
+        found, away = _onto_points(problem, {**posed, "orient": variables["orient"]})
         nearer = away < nearest_yet
         best = {key: torch.where(nearer.reshape(-1, *[1] * (a.ndim - 1)), found[key], a) for key, a in best.items()}
         nearest_yet = torch.where(nearer, away, nearest_yet)
@@ -116,7 +159,7 @@ def at_points(problem: Problem) -> dict[str, Tensor]:
 def _onto_points(problem: Problem, variables: Variables) -> tuple[dict[str, Tensor], Tensor]:
     """The body moved and turned as a whole onto its points, and the mean squared distance (B,) that is left."""
     assert problem.points_3d is not None
-    pose = torch.cat([variables["orient"][:, None], variables["pose"]], dim=1)
+    pose = full_pose(variables, problem.body.body)
     body = problem.landmarks(pose, variables["betas"], variables["transl"])
     points = problem.points_3d.nan_to_num()
     weight = problem.points_3d.isfinite().all(dim=-1).double()
@@ -185,7 +228,7 @@ def _placed(
         tilt = matrix(torch.stack([zero, zero, roll], dim=-1))  # about the camera's line of sight
         upright = rotation.transpose(1, 2) @ tilt @ rotation
         variables = {**variables, "orient": vector(upright @ turn @ matrix(variables["orient"]))}
-    pose = torch.cat([variables["orient"][:, None], variables["pose"]], dim=1)
+    pose = full_pose(variables, problem.body.body)
     points = problem.landmarks(pose, variables["betas"], variables["transl"])
     seen = (rotation[:, None] * points[:, :, None]).sum(dim=-1)  # turned into the camera's axes
     depth = _depth(problem, points)

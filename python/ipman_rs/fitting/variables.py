@@ -1,8 +1,10 @@
 """What a fit may move: named blocks of numbers, a row a body, and the vector of the free ones that a solver sees.
 
 orient (B, 3)          the root's rotation vector, in the world
-pose (B, J − 1, 3)     rotation vectors of the other joints, each relative to its parent
+pose (B, P, 3)         rotation vectors of the joints of body and hands, each relative to its parent
+face (B, F, 3)         those of jaw and eyes; F is 0 for bodies without them
 betas (B, b)           shape
+expression (B, E)      of the face, E ≤ 10; E is 0 for bodies without one
 transl (B, 3)          m, added to the posed body, in the world
 camera_orient (B, 3)   rotation vector of the camera's extrinsics R, world to camera
 camera_transl (B, 3)   m, their t: X_c = R X_w + t
@@ -17,8 +19,46 @@ from collections.abc import Mapping, Sequence
 import torch
 from torch import Tensor
 
-BLOCKS = ("orient", "pose", "betas", "transl", "camera_orient", "camera_transl", "log_focal")
+from ipman_rs.body import BodyModel
+
+BLOCKS = (
+    "orient", "pose", "face", "betas", "expression", "transl", "camera_orient", "camera_transl", "log_focal"
+)  # fmt: skip
+FACE = ("jaw", "left_eye_smplhf", "right_eye_smplhf")
+COMPONENTS = 10  # betas and expressions at most
 Variables = Mapping[str, Tensor]
+
+
+def pose_joints(body: BodyModel) -> tuple[str, ...]:
+    """The joints of the block `pose`, in its order."""
+    return tuple(name for name in body.joint_names[1:] if name not in FACE)
+
+
+def face_joints(body: BodyModel) -> tuple[str, ...]:
+    """The joints of the block `face`, in its order."""
+    return tuple(name for name in body.joint_names[1:] if name in FACE)
+
+
+def full_pose(variables: Variables, body: BodyModel) -> Tensor:
+    """All joints (B, J, 3) in the body's order, the root first."""
+    parts = [variables["orient"][:, None], variables["pose"]]
+    if not face_joints(body):
+        return torch.cat(parts, dim=1)
+    order = (body.joint_names[0], *pose_joints(body), *face_joints(body))
+    places = torch.tensor([order.index(name) for name in body.joint_names])
+    return torch.cat([*parts, variables["face"]], dim=1).index_select(1, places)
+
+
+def pose_blocks(pose: Tensor, body: BodyModel) -> dict[str, Tensor]:
+    """The blocks orient, pose and face of all joints (B, J, ...)."""
+    if not face_joints(body):
+        return {"orient": pose[:, 0], "pose": pose[:, 1:], "face": pose[:, :0]}
+    rows = {name: row for row, name in enumerate(body.joint_names)}
+    return {
+        "orient": pose[:, 0],
+        "pose": pose[:, [rows[name] for name in pose_joints(body)]],
+        "face": pose[:, [rows[name] for name in face_joints(body)]],
+    }
 
 
 def pack(variables: Variables, free: Sequence[str]) -> Tensor:
@@ -30,7 +70,7 @@ def unpack(rows: Tensor, free: Sequence[str], rest: Variables) -> dict[str, Tens
     """All blocks: the free ones from their rows (B, P), the others from `rest`."""
     sizes = [math.prod(rest[name].shape[1:]) for name in free]
     parts = zip(free, rows.split(sizes, dim=1), strict=True)
-    return {**rest, **{name: part.reshape(-1, *rest[name].shape[1:]) for name, part in parts}}
+    return {**rest, **{name: part.reshape(len(part), *rest[name].shape[1:]) for name, part in parts}}
 
 
 def diagonal(weights: Tensor, block: str, variables: Variables, free: Sequence[str]) -> Tensor:

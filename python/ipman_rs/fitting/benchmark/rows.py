@@ -36,8 +36,6 @@ def rows(literal: str, with_physics: str, ours: str) -> list[Row]:
 
 CALIBRATED = rows("smplify-x", "ipman-o-star", "fast")
 PRESENTED = rows("smplify-xmc", "ipman-o", "balanced")
-# Terms that cannot be given here: nobody says which vertices touch.
-NOT_GIVEN = ("presented_contact",)
 
 
 def config(row: Row, iterations: int) -> Config:
@@ -46,7 +44,7 @@ def config(row: Row, iterations: int) -> Config:
     stages = tuple(
         replace(
             stage,
-            weights=_less(stage.weights, (*row.without, *NOT_GIVEN)),
+            weights=_less(stage.weights, row.without),
             options=replace(stage.options, iterations=min(stage.options.iterations, iterations)),
         )
         for stage in preset.stages

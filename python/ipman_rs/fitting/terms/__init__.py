@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from .bending import Bending
+from .contact_normals import ContactNormals
+from .expression_prior import ExpressionPrior
 from .gmm_prior import GaussianMixture
 from .hand_prior import HandPrior
+from .jaw_prior import JawPrior
 from .joint_limits import JointLimits
 from .measured_shape import MeasuredShape
 from .physics import Balance, Ground, Stability
 from .points_3d import Points3D
 from .pose_prior import PosePrior
 from .presented_contact import PresentedContact
+from .presented_orient import PresentedOrient
 from .presented_pose import PresentedPose
 from .reprojection import Reprojection
 from .self_contact import SelfContact, SelfPenetration
@@ -26,16 +30,20 @@ TERMS: dict[str, type[Term]] = {
     "gmm_prior": GaussianMixture,
     "vposer": VPoser,
     "presented_pose": PresentedPose,
+    "presented_orient": PresentedOrient,
     "presented_contact": PresentedContact,
     "shape_prior": ShapePrior,
     "measured_shape": MeasuredShape,
     "bending": Bending,
     "hand_prior": HandPrior,
+    "jaw_prior": JawPrior,
+    "expression_prior": ExpressionPrior,
     "stability": Stability,
     "ground": Ground,
     "balance": Balance,
     "self_contact": SelfContact,
     "self_penetration": SelfPenetration,
+    "contact_normals": ContactNormals,
 }
 
 __all__ = ["TERMS", "LeastSquares", "Term"]

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from ..candidate import Candidate
 from ..problem import Problem
+from ..variables import pose_joints
 from .term import LeastSquares
 
 HINGES = {  # joint: axis, the sign of overextension
@@ -24,11 +25,11 @@ HINGES = {  # joint: axis, the sign of overextension
 class Bending(LeastSquares):
     def __init__(self, problem: Problem):
         super().__init__(problem)
-        names = problem.body.body.joint_names
+        names = pose_joints(problem.body.body)
         missing = [joint for joint in HINGES if joint not in names]
         if missing:
             raise ValueError(f"bending: expected a body with knees and elbows, this one has no {', '.join(missing)}")
-        self.joints = [names.index(joint) - 1 for joint in HINGES]  # the root is not in the pose
+        self.joints = [names.index(joint) for joint in HINGES]
         self.axes = [axis for axis, _ in HINGES.values()]
         self.signs = problem.body.v_template.new_tensor([sign for _, sign in HINGES.values()])
 

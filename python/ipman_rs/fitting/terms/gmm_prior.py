@@ -21,6 +21,7 @@ from ipman_rs.body import joints, safe_npz, safe_pickle
 
 from ..candidate import Candidate
 from ..problem import Problem
+from ..variables import pose_joints
 from .term import Term
 
 JOINTS = joints.SMPL[1:]
@@ -31,7 +32,7 @@ class GaussianMixture(Term):
 
     def __init__(self, problem: Problem, path: str | os.PathLike[str]):
         super().__init__(problem)
-        names = problem.body.body.joint_names[1:]
+        names = pose_joints(problem.body.body)
         self.joints = [names.index(name) for name in JOINTS if name in names]
         missing = [name for name in joints.BODY[1:] if name not in names]
         if missing:

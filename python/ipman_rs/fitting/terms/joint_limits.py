@@ -31,6 +31,7 @@ from ipman_rs.checks import not_negative
 from ..candidate import Candidate
 from ..problem import Problem
 from ..rotations import quaternion
+from ..variables import pose_joints
 from .term import LeastSquares
 
 Range = tuple[float, float]
@@ -77,10 +78,11 @@ class JointLimits(LeastSquares):
         super().__init__(problem)
         margin = not_negative("margin", margin)
         like = problem.body.v_template
-        names = [name for name in problem.body.body.joint_names[1:] if name in joints.SMPL]
+        there = pose_joints(problem.body.body)
+        names = [name for name in there if name in joints.SMPL]
         if not names:
             raise ValueError("joint_limits: expected a body with SMPL's joints, this one has none of them")
-        self.joints = [problem.body.body.joint_names.index(name) - 1 for name in names]
+        self.joints = [there.index(name) for name in names]
         self.bones = torch.tensor([0 if name.partition("_")[2] in ARM else 1 for name in names], device=like.device)
         ranges = like.new_tensor([range_of(name) for name in names])  # (J, 3, 2)
         self.middle = ranges.mean(dim=-1).deg2rad()

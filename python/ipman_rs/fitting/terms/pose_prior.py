@@ -12,12 +12,12 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from ipman_rs.body import joints
+from ipman_rs.body import BodyModel, joints
 from ipman_rs.checks import positive
 
 from ..candidate import Candidate
 from ..problem import Problem
-from ..variables import diagonal
+from ..variables import diagonal, pose_joints
 from .joint_limits import range_of
 from .term import LeastSquares
 
@@ -32,10 +32,11 @@ class PosePrior(LeastSquares):
     def __init__(self, problem: Problem, width: float = 1.0):
         super().__init__(problem)
         width = positive("width", width, "numbers")
-        names = [name for name in problem.body.body.joint_names[1:] if name in joints.SMPL]
+        there = pose_joints(problem.body.body)
+        names = [name for name in there if name in joints.SMPL]
         if not names:
             raise ValueError("pose_prior: expected a body with SMPL's joints, this one has none of them")
-        self.joints = [problem.body.body.joint_names.index(name) - 1 for name in names]
+        self.joints = [there.index(name) for name in names]
         like = problem.body.v_template
         ranges = like.new_tensor([range_of(name) for name in names])
         self.mean = like.new_tensor([mean_of(name) for name in names]).deg2rad()
@@ -51,6 +52,12 @@ class PosePrior(LeastSquares):
         everywhere = diagonal(weights.flatten(1), "pose", candidate.variables, free)
         numbers = [3 * joint + axis for joint in self.joints for axis in range(3)]
         return residuals, everywhere[..., numbers]
+
+
+def mean_pose(body: BodyModel) -> Tensor:
+    """The mean (J, 3), radians, of all joints of a body; 0 for those without a prior."""
+    rows = [mean_of(name) if name in joints.SMPL[1:] else (0.0, 0.0, 0.0) for name in body.joint_names]
+    return torch.tensor(rows, dtype=torch.float64).deg2rad()
 
 
 def mean_of(name: str) -> tuple[float, float, float]:

@@ -1,9 +1,9 @@
-"""Presented contact (SMPLify-XMC): surfaces that touch in the presented pose touch again,
+"""Presented contact (SMPLify-XMC): what touches in the presented pose touches again,
 
     mean over i of tanh(min_j |v_i − v_j|)     metres
 
-over the presented contact vertices i, j that are more than 0.3 m apart along the surface. Distances along the surface
-are shortest paths over the template's edges.
+over the presented contact vertices i, where j is any vertex that is more than 0.3 m away from i along the surface
+(`geodesics`). A pose in which nothing touches costs 0.
 """
 
 from __future__ import annotations
@@ -11,14 +11,12 @@ from __future__ import annotations
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 from torch import Tensor
 
-from ipman_rs import BodyTemplate
 from ipman_rs.checks import positive
 
 from ..candidate import Candidate
+from ..geodesics import geodesics
 from ..problem import Problem
 from .term import Term
 
@@ -30,43 +28,51 @@ class PresentedContact(Term):
 
     def __init__(self, problem: Problem, geodesic: float = 0.3):
         super().__init__(problem)
-        if problem.presented is None or problem.presented.contact is None:
-            raise ValueError("presented_contact: expected the vertices that touch in the presented pose, got none")
-        contact = np.unique(problem.presented.contact.numpy(force=True))
-        count = problem.body.template.num_vertices
-        if contact.dtype.kind not in "iu" or contact.size == 0 or contact[0] < 0 or contact[-1] >= count:
-            raise ValueError(f"presented_contact: expected indices of vertices, 0 to {count - 1}, one at least")
-        far = far_apart(problem.body.template, contact, positive("geodesic", geodesic))
-        partnered = far.any(axis=1)
-        if not partnered.any():
-            raise ValueError(
-                f"presented_contact: no two of the {len(contact)} contact vertices are more than {geodesic} m apart "
-                "along the surface; give both surfaces that touch"
-            )
-        # far is symmetric: a vertex without a partner is nobody's partner
-        self.contact = torch.from_numpy(contact[partnered])
-        self.near = torch.from_numpy(~far[np.ix_(partnered, partnered)])
+        geodesic, count = positive("geodesic", geodesic), problem.body.template.num_vertices
+        self.pairs: list[tuple[Tensor, Tensor]] = []  # of each body, or one for all: contact (n,), too near (n, V)
+        for contact in _given(problem):
+            if contact.size and not 0 <= contact.min() <= contact.max() < count:
+                raise ValueError(f"presented_contact: expected indices of vertices, 0 to {count - 1}")
+            far = geodesics(problem.body.template, geodesic).rows(contact)
+            partnered = far.any(axis=1)
+            self.pairs.append((torch.from_numpy(contact[partnered]), torch.from_numpy(~far[partnered])))
 
     def cost(self, candidate: Candidate) -> Tensor:
-        points = candidate.vertices[:, self.contact]
-        partners = torch.stack([self._partners(body) for body in points.detach()])
-        offset = points - points.gather(1, partners[..., None].expand(-1, -1, 3))
-        x, y, z = offset.unbind(-1)
-        squared = x * x + y * y + z * z
-        apart = squared > 0
-        distance = torch.where(apart, torch.where(apart, squared, 1).sqrt(), 0)  # no gradient where they coincide
-        return distance.tanh().mean(dim=-1)
-
-    def _partners(self, points: Tensor) -> Tensor:
-        """(n,) which of the points (n, 3) of one body is the nearest far one of each."""
-        squared = sum((axis[:, None] - axis).square() for axis in points.T)
-        return torch.as_tensor(squared).masked_fill(self.near, torch.inf).argmin(dim=1)
+        bodies = candidate.variables["transl"]
+        if not any(len(contact) for contact, _ in self.pairs):
+            return bodies.new_zeros(len(bodies))
+        pairs = self.pairs * (len(bodies) if len(self.pairs) == 1 else 1)
+        return torch.stack([_mean(body, *pair) for body, pair in zip(candidate.vertices, pairs, strict=True)])
 
 
-def far_apart(template: BodyTemplate, vertices: NDArray[np.integer], geodesic: float) -> NDArray[np.bool_]:
-    """(n, n) which of the vertices (n,) are more than `geodesic` metres apart along the template's edges."""
-    edges = np.concatenate([template.faces[:, [i, (i + 1) % 3]] for i in range(3)])
-    edges = np.unique(np.sort(edges, axis=1), axis=0)
-    lengths = np.linalg.norm(template.vertices[edges[:, 0]] - template.vertices[edges[:, 1]], axis=1)
-    graph = csr_array((lengths, edges.T), shape=(template.num_vertices,) * 2)
-    return np.isinf(dijkstra(graph, directed=False, indices=vertices, limit=geodesic))[:, vertices]
+def _given(problem: Problem) -> list[NDArray[np.int64]]:
+    """The contact vertices of each body, or those of all in one."""
+    if problem.presented is None or problem.presented.contact is None:
+        return []
+    given = problem.presented.contact.numpy(force=True)
+    if given.dtype == bool and given.ndim == 2:
+        return [np.flatnonzero(row) for row in given]
+    if given.ndim != 1 or (given.size and given.dtype.kind not in "iu"):
+        raise ValueError(
+            "presented_contact: expected indices (n,) of vertices, or one bool a body and vertex, got "
+            f"{given.dtype} of shape {given.shape}"
+        )
+    return [np.unique(given).astype(np.int64)]
+
+
+def _mean(vertices: Tensor, contact: Tensor, near: Tensor) -> Tensor:
+    """The cost of one body (V, 3)."""
+    if not len(contact):
+        return vertices.new_zeros(())
+    offset = vertices[contact] - vertices[_nearest(vertices.detach(), contact, near)]
+    x, y, z = offset.unbind(-1)
+    squared = x * x + y * y + z * z
+    apart = squared > 0
+    distance = torch.where(apart, torch.where(apart, squared, 1).sqrt(), 0)  # no gradient where they coincide
+    return distance.tanh().mean()
+
+
+def _nearest(vertices: Tensor, contact: Tensor, near: Tensor) -> Tensor:
+    """(n,) which of the vertices (V, 3) of one body is the nearest far one of each contact vertex."""
+    squared = sum((own[:, None] - axis).square() for own, axis in zip(vertices[contact].T, vertices.T, strict=True))
+    return torch.as_tensor(squared).masked_fill(near, torch.inf).argmin(dim=1)

@@ -11,6 +11,7 @@ from ipman_rs.body import joints
 
 from ..candidate import Candidate
 from ..problem import Problem
+from ..variables import pose_joints
 from .term import LeastSquares
 
 
@@ -26,8 +27,10 @@ class PresentedPose(LeastSquares):
                 f"presented_pose: expected (B, {len(names)}, 3), a row a joint without the root, "
                 f"got {tuple(pose.shape)}"
             )
-        self.joints = [index for index, name in enumerate(names) if name in joints.BODY]
-        self.pose = pose[..., self.joints, :]
+        moved = pose_joints(problem.body.body)
+        shown = [name for name in moved if name in joints.BODY]
+        self.joints = [moved.index(name) for name in shown]
+        self.pose = pose[..., [names.index(name) for name in shown], :]
 
     def residuals(self, candidate: Candidate) -> Tensor:
         return (candidate.variables["pose"][:, self.joints] - self.pose).flatten(1)

@@ -14,6 +14,7 @@ from torch import Tensor
 
 from ..camera import NEAREST
 from ..candidate import Candidate
+from ..landmarks import HAND_POINTS
 from ..problem import Problem
 from ..rotations import left_jacobian
 from .term import LeastSquares
@@ -22,9 +23,12 @@ HEIGHT = 500.0
 
 
 class Reprojection(LeastSquares):
-    """rho: pixels of an image 500 pixels high. weights: of landmarks by name, 1 where nothing is said."""
+    """rho: pixels of an image 500 pixels high. weights: of landmarks by name, 1 where nothing is said. hands: that of
+    the points of the hands (`landmarks.HAND_POINTS`), the wrists not among them."""
 
-    def __init__(self, problem: Problem, rho: float = 100.0, weights: Mapping[str, float] | None = None):
+    def __init__(
+        self, problem: Problem, rho: float = 100.0, weights: Mapping[str, float] | None = None, hands: float = 1.0
+    ):
         super().__init__(problem)
         if problem.points is None or problem.confidence is None or problem.image_size is None:
             raise ValueError("reprojection: expected points in an image, got none")
@@ -32,7 +36,8 @@ class Reprojection(LeastSquares):
         names = problem.landmarks.names
         self.points = problem.points
         self.scale = (HEIGHT / problem.image_size[:, 1])[:, None, None]
-        weight = torch.tensor([(weights or {}).get(name, 1.0) for name in names], dtype=self.points.dtype)
+        usual = {**dict.fromkeys(HAND_POINTS, hands), **(weights or {})}
+        weight = torch.tensor([usual.get(name, 1.0) for name in names], dtype=self.points.dtype)
         self.weight = (weight * problem.confidence)[..., None]
 
     def residuals(self, candidate: Candidate) -> Tensor:

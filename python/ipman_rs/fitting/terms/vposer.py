@@ -24,6 +24,7 @@ from ipman_rs.body import joints
 
 from ..candidate import Candidate
 from ..problem import Problem
+from ..variables import pose_joints
 from .term import LeastSquares
 
 JOINTS = joints.BODY[1:]
@@ -36,7 +37,7 @@ class VPoser(LeastSquares):
 
     def __init__(self, problem: Problem, path: str | os.PathLike[str]):
         super().__init__(problem)
-        names = problem.body.body.joint_names[1:]
+        names = pose_joints(problem.body.body)
         missing = [name for name in JOINTS if name not in names]
         if missing:
             raise ValueError(f"vposer: expected a body with SMPL's joints, this one has no {', '.join(missing)}")
