@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     help="Body model: anny-lite, anny, or an SMPL, SMPL+H or SMPL-X file (.pkl, .npz). Default: anny-lite; with --data "
     "the data set's, out of --models.",
 )  # fmt: skip
+@click.option(
+    "--iterations", type=click.IntRange(1), metavar="N",
+    help="End each stage after N iterations at most: for a quick look. Default: as the preset says.",
+)  # fmt: skip
 @of_unknown_camera
 @click.option(
     "--camera", type=click.Path(path_type=Path), metavar="FILE",
@@ -239,7 +243,8 @@ def _settings(options: dict[str, Any]) -> Settings:
 
     try:
         options["camera"] = None if options["camera"] is None else camera_file.read(options["camera"])
-        return Settings(config=config.load(options.pop("preset")), **options)
+        chosen, most = config.load(options.pop("preset")), options.pop("iterations")
+        return Settings(config=chosen if most is None else config.capped(chosen, most), **options)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
 

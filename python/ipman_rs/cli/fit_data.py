@@ -34,6 +34,8 @@ def fit_data(
         chosen = config.load(preset)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
+    if options["iterations"] is not None:
+        chosen = config.capped(chosen, options["iterations"])
     of_person = {name: options[name] for name in ("height", "mass", "pose")}
     job = DataFit(Source(**source), chosen, output, models, options["model"], keypoints, images, every, **of_person)
     try:

@@ -17,7 +17,7 @@ from ..fitting import detected, presented, start
 from ..fitting.camera_file import KnownCamera
 from ..fitting.config import Config, weighs
 from ..fitting.detections import Detections, join
-from ..fitting.fit import fit, on_the_ground
+from ..fitting.fit import fit
 from ..fitting.presented import PresentedBody
 from ..fitting.problem import Problem
 from ..fitting.result import Result, results
@@ -124,7 +124,7 @@ def _fitted(
     problem = problem_of(body, join([item.seen for item in kept if item.seen is not None]), settings, imitated)
     config = settings.config
     with console.progress(f"fitting {len(kept)}", len(kept) * len(config.stages)) as step:
-        problem, variables = _started(problem, config)
+        problem, variables = start.begin(problem, config.start)
         done = {stage.name: number * len(kept) for number, stage in enumerate(config.stages)}
         found = fit(problem, variables, config, lambda stage, ended: step.to(done[stage] + ended), trace=True)
     for item, result in zip(kept, results(found, config, variables), strict=True):
@@ -157,13 +157,3 @@ def _refused(item: Item, body: ipt.BodyModel) -> bool:
     assert seen.image_size is not None
     item.flags += detected.oddities(names, seen.points[0], seen.confidence[0], seen.image_size[0])
     return False
-
-
-def _started(problem: Problem, config: Config) -> tuple[Problem, dict[str, Any]]:
-    """The problem, its ground known where the camera moves around the body, and where the fit starts."""
-    options = start.options(config.start)
-    if config.start.get("search") == "camera":
-        if problem.ground is None:
-            problem = on_the_ground(problem, start.neutral(problem))
-        return problem, start.camera_around(problem, **options)
-    return problem, start.before_camera(problem, **options)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +47,15 @@ class Config:
 def weighs(config: Config, *terms: str) -> bool:
     """Whether any stage has a weight for any of these terms."""
     return any(stage.weights.get(name, 0) > 0 for stage in config.stages for name in terms)
+
+
+def capped(config: Config, iterations: int) -> Config:
+    """The same with stages that end after so many iterations at most."""
+    stages = (
+        replace(stage, options=replace(stage.options, iterations=min(stage.options.iterations, iterations)))
+        for stage in config.stages
+    )
+    return replace(config, stages=tuple(stages))
 
 
 def load(name: str | Path) -> Config:

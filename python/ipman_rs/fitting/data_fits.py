@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 import ipman_rs as ip
@@ -40,6 +39,7 @@ from .fit import fit
 from .landmarks import known
 from .problem import Problem
 from .result import Result, parameters, results
+from .variables import full_pose
 
 PIECE = 64  # frames: fitted side by side
 PREDICTIONS, RECORD = "predictions.npz", "fits.json"
@@ -312,8 +312,7 @@ class DataFit:
     def _row(self, result: Result, problem: Problem, world: World, seen: Seen, contacts: int) -> dict[str, Any]:
         body = problem.body.body
         variables = result.candidate.variables
-        full = torch.cat([variables["orient"][:, None], variables["pose"]], dim=1).numpy()
-        arrays = {**parameters(body, variables), "full_pose": full}
+        arrays = {**parameters(body, variables), "full_pose": full_pose(variables, body).numpy()}
         errors = result.reprojection()
         row = {
             "names": str(seen.frame.names[0]),

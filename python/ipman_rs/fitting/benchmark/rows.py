@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
-from ..config import Config, load
+from ..config import Config, capped, load
 
 PHYSICS = ("stability", "balance", "ground")
 
@@ -40,16 +40,9 @@ PRESENTED = rows("smplify-xmc", "ipman-o", "balanced")
 
 def config(row: Row, iterations: int) -> Config:
     """The preset of a row; stages that would run longer end after `iterations`."""
-    preset = load(row.preset)
-    stages = tuple(
-        replace(
-            stage,
-            weights=_less(stage.weights, row.without),
-            options=replace(stage.options, iterations=min(stage.options.iterations, iterations)),
-        )
-        for stage in preset.stages
-    )
-    return replace(preset, stages=stages)
+    preset = capped(load(row.preset), iterations)
+    stages = (replace(stage, weights=_less(stage.weights, row.without)) for stage in preset.stages)
+    return replace(preset, stages=tuple(stages))
 
 
 def _less(weights: Mapping[str, float], names: Collection[str]) -> dict[str, float]:
