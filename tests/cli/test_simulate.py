@@ -140,6 +140,8 @@ def test_two_methods(run, poses, lite_body, tmp_path):
         assert (np.abs(picture - color).max(axis=-1) < 10).sum() > 300, "a line for either method"
     assert "moved in 2 s, mm" in (output / "comparison.svg").read_text()
 
+    early = run("simulate", tmp_path / "steady.npz", "--against", path, "--times", "0.41667")
+    assert "stable, %: no verdict before 2 s" in early.out
     early = run("simulate", tmp_path / "steady.npz", "--against", path, "--times", "0.41667", "--json")
     found = strict(early.out)["comparison"]
     assert found["stable"] is None

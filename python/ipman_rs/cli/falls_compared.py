@@ -11,7 +11,7 @@ import numpy as np
 
 from ..evaluation.bootstrap import Interval
 from ..plain import plain
-from ..simulation import Comparison, Means, Simulation, compare
+from ..simulation import VERDICT, Comparison, Means, Simulation, compare
 from ..simulation.comparison import MORE_STABLE_IN_THE_PAPER
 from .errors import FileError
 from .falls import Fall
@@ -92,11 +92,10 @@ def _percent(ratio: Interval) -> list[float]:
 def comparison_table(found: Comparison) -> tuple[list[str], list[list[str]]]:
     """Head and lines."""
     head = ["", "A", "B", "A − B", "A / B"]
-    last = found.times[-1]
     if found.stable is None:
-        lines = [[f"stable after {last:.3g} s, %", *["–"] * 4]]
+        lines = [[f"stable, %: no verdict before {VERDICT:g} s", *["–"] * 4]]
     else:
-        lines = [[f"stable after {last:.3g} s, %", *_cells(found.stable, 100, 0, " points")]]
+        lines = [[f"stable after {found.times[-1]:.3g} s, %", *_cells(found.stable, 100, 0, " points")]]
     for seconds, value in zip(found.times, found.displacement, strict=True):
         lines.append([f"moved in {seconds:.3g} s, mean, mm", *_cells(value, 1e3, 1, " mm")])
     return head, lines
