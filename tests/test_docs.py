@@ -59,3 +59,53 @@ def test_guide_names_real_files():
     paths = re.findall(r"`((?:rust|python|tests)/[\w/.]+)`", guide)
     assert len(paths) > 8
     assert {path for path in paths if not (ROOT / path).exists()} == {"rust/core/src/losses/height.rs"}
+
+
+def paper() -> str:
+    return (ROOT / "docs" / "paper.md").read_text()
+
+
+FILE = re.compile(r"`((?:rust|python|tests|docs|examples|tools|benchmarks)/[\w/.-]+)`")
+
+
+def numbers_of(text: str) -> set[int]:
+    """The equations that a text names: Eq. 1, (Eq. 1), Eqs. 4, 6 and 7, Eqs. 5 to 7."""
+    named: set[int] = set()
+    for found in re.findall(r"Eqs?\.\s+(\d+(?:(?:, | and | to )\d+)*)", text):
+        if " to " in found:
+            first, last = map(int, found.split(" to "))
+            named |= set(range(first, last + 1))
+        else:
+            named |= set(map(int, re.findall(r"\d+", found)))
+    return named
+
+
+def test_paper_names_real_files():
+    """Every path in docs/paper.md is a file of this repository."""
+    paths = FILE.findall(paper())
+    assert len(set(paths)) > 60
+    assert [path for path in paths if not (ROOT / path).is_file()] == []
+
+
+def test_equations_stand_at_their_formulas():
+    """Each file that the page names for an equation has its number; Eqs. 1 to 7 have the core, numpy, torch and the
+    plain formula."""
+    rows = {int(n): line for n, line in re.findall(r"^\| \((\d+)\) (\|.*`(?:rust|python)/.*)$", paper(), re.MULTILINE)}
+    assert sorted(rows) == list(range(1, 11))
+    for number, line in rows.items():
+        paths = FILE.findall(line)
+        assert len(paths) >= (4 if number <= 7 else 1), number
+        assert [path for path in paths if number not in numbers_of((ROOT / path).read_text())] == [], number
+        if number <= 7:
+            for room in ("rust/core/src/", "python/ipman_rs/torch/", "python/ipman_rs/torch/reference/"):
+                assert any(path.startswith(room) for path in paths), (number, room)
+
+
+def test_symbols_name_their_equations():
+    """The column of conventions.md: the symbol of each equation, by its own."""
+    rows = dict(
+        re.findall(r"^\| (m̄|ρ, α, γ|s̄|L_stability|L_ground|BoSE) \| ([\d =+]+) \|", conventions(), re.MULTILINE)
+    )
+    assert rows == {
+        "m̄": "1", "ρ, α, γ": "2", "s̄": "3", "L_stability": "4", "L_ground": "5 = 6 + 7", "BoSE": "10",
+    }  # fmt: skip

@@ -26,7 +26,7 @@ def stability_loss(
     epsilon: float = 0.0,
     method: Method = "pcom",
 ) -> NDArray[Any]:
-    """L_stability = ‖g(m̄) − g(s̄)‖₂, (...,) m: centre of mass to centre of pressure, on the ground.
+    """L_stability = ‖g(m̄) − g(s̄)‖₂ (Eq. 4), (...,) m: centre of mass to centre of pressure, on the ground.
 
     vertices (..., V, 3) m; alpha, gamma, epsilon as in `center_of_pressure`; method as in `center_of_mass`.
     """
@@ -46,8 +46,8 @@ def ground_loss(
     points: Points = "samples",
     curve: Curve = "tanh_squared",
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """L_ground as (pull, push), each (...,): means over all points of α1 tanh(h/α2)² where h ≥ 0 and of β1 tanh(h/β2)²
-    where h < 0.
+    """L_ground (Eq. 5) as (pull, push), each (...,): means over all points of α1 tanh(h/α2)² where h ≥ 0 (Eq. 6) and of
+    β1 tanh(h/β2)² where h < 0 (Eq. 7).
 
     Args:
         vertices: (..., V, 3) m.

@@ -21,7 +21,7 @@ Solver = Literal["hull", "lp"]
 
 @dataclass(frozen=True, eq=False)
 class BaseOfSupport:
-    """The hull of the contact samples on the ground.
+    """The hull of the contact samples on the ground (paper, section 3.2).
 
     polygon: corners (K, 3) m on the ground, counter-clockwise seen from above, empty without contact; nested lists in
         the batch's shape for a batch.
@@ -94,7 +94,7 @@ def bose(
     com_method: Method = "pcom",
     contact: Contact = "paper",
 ) -> NDArray[np.bool_]:
-    """The paper's BoSE for each body, (...,) bool: does the centre of mass lie over the base of support?
+    """The paper's BoSE (Eq. 10) for each body, (...,) bool: does the centre of mass lie over the base of support?
 
     `hull` tests the convex hull; `lp` solves the paper's linear programme. They agree wherever |margin| > 1e-9 m.
     """

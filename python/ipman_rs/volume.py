@@ -29,7 +29,7 @@ class MassProperties:
 
 
 def part_volumes(vertices: ArrayLike, template: BodyTemplate) -> NDArray[Any]:
-    """vol^P, the volume of each closed part, (..., P) m³. vertices (..., V, 3) m."""
+    """vol^P, the volume of each closed part (paper, section 3.2), (..., P) m³. vertices (..., V, 3) m."""
     return Bodies(vertices, template).evaluate("part_volumes", [], _ANYWHERE, template.num_parts)
 
 

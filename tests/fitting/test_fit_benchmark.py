@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from click.testing import CliRunner
 import ipman_rs as ip
 from ipman_rs.body import load_body
 from ipman_rs.cli import main
-from ipman_rs.fitting.benchmark import measure, people, rows, run, scenes, settings, truth
+from ipman_rs.fitting.benchmark import measure, people, report, rows, run, scenes, settings, truth
 from ipman_rs.fitting.fit import Fit
 
 
@@ -137,6 +138,43 @@ def test_command(tmp_path):
     assert again.exit_code == 0
     assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.npz")} == fits  # nothing was done twice
     assert (tmp_path / "fitting_benchmark.md").read_text() == page
+
+
+def test_the_page_in_docs_is_that_of_its_record():
+    docs = Path(__file__).parents[2] / "docs"
+    record = json.loads((docs / "fitting_benchmark.json").read_text())
+    assert report.page(record) == (docs / "fitting_benchmark.md").read_text()
+
+
+def test_claims_of_the_paper():
+    """Both directions of each figure: the interval decides, not the mean; the paper's word is better or worse."""
+
+    def row(name, **against):
+        whole = {key: [0.0, -1.0, 1.0] for key in report.COMPARED} | against
+        mean = {key: value[0] for key, value in whole.items()}
+        return {"name": name, "preset": "ipman-o", "mean": mean, "against baseline": whole}
+
+    block = {
+        "name": "presented, 3°", "kind": "balanced", "told": 3.0,
+        "rows": [
+            row("baseline"),
+            row("+ ground", **{"PVE": [-1.0, -2.0, -0.5], "BoSE 10 cm": [2.0, 1.0, 3.0]}),
+            row("+ stability", **{"MPJPE": [3.0, 1.0, 5.0], "BoSE 10 cm": [2.0, 1.0, 3.0]}),
+            row("both", **{"PVE": [3.1, 1.6, 4.6], "MPJPE": [-0.5, None, None], "BoSE 10 cm": [4.0, -1.0, 9.0]}),
+        ],
+    }  # fmt: skip
+    said = {name: dict(zip(report.CLAIMED, cells, strict=True)) for _, name, _, cells in report.claims([block])}
+    assert said["+ ground against the baseline"]["PVE"] == "better? **yes**, −1.0 [−2.0, −0.5]"
+    assert said["+ ground against the baseline"]["BoSE 10 cm"] == "better? **yes**, +2 [+1, +3]"
+    assert said["+ stability against the baseline"]["MPJPE"] == "worse? **yes**, +3.0 [+1.0, +5.0]"
+    assert said["+ stability against the baseline"]["BoSE 10 cm"] == "worse? no, +2 [+1, +3]"
+    assert said["both against the baseline"]["PVE"] == "better? no, +3.1 [+1.6, +4.6]"
+    assert said["both against the baseline"]["BoSE 10 cm"] == "better? not shown, +4 [−1, +9]"
+    assert said["both against the baseline"]["MPJPE"] == "better? –, −0.5"
+    assert said["both the best of the four, by their means"]["PVE"] == "no, + ground"
+    assert said["both the best of the four, by their means"]["BoSE 10 cm"] == "**yes**"
+    printed = next(line[2] for line in report.claims([block]) if line[1] == "both against the baseline")
+    assert printed == "−3.4, −2.2, −5.4, +0.6"  # the paper's Table 2, in its parentheses; its +0.5 is rounded
 
 
 def test_unknown_block(tmp_path):

@@ -150,9 +150,23 @@ def test_bad_bodies_have_a_status_and_leave_the_others_alone(lite, engine):
     assert found.status[2] & Status.NO_VOLUME
     assert found.status[3] == Status.NO_CONTACT
     assert np.isnan(found.displacement[1:4]).all()
-    assert not found.fell()[1:4].any()
     alone = simulate(good, lite.template, FLOOR, (0.2,), engine=engine)
     np.testing.assert_array_equal(found.center[[0, 4]], np.stack([alone.center] * 2))
+
+
+def test_who_fell_is_judged_after_two_seconds(box):
+    """A box over its edge has moved by millimetres after 100 steps and tilted by hardly more: no verdict yet."""
+    vertices, template = box
+    bodies = np.stack([vertices, tilted(vertices, LIMIT + 0.02)])
+    early = simulate(bodies, template, FLOOR, (100 / 240,))
+    assert early.displacement[1, 0] > 10 * early.displacement[0, 0]
+    assert early.tilt.max() < fall.FALLEN
+    assert not early.has_verdict
+    with pytest.raises(ValueError, match=r"times: whether a body fell is judged at 2 s or later, got 0.417 s"):
+        early.fell()
+    late = simulate(bodies, template, FLOOR, (100 / 240, 2.0))
+    assert late.has_verdict
+    assert late.fell().tolist() == [False, True]
 
 
 def test_shapes_progress_and_nothing(lite):

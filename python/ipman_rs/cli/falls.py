@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +12,17 @@ import numpy as np
 from .. import view
 from ..analysis import PIECE
 from ..body.sequence import pieces
+from ..ground import Ground
 from ..plain import plain
-from ..simulation import FALLEN, Simulation, TipTest, simulate, tip_test
+from ..simulation import FALLEN, VERDICT, Simulation, TipTest, simulate, tip_test
 from ..status import Status, status_names
 from ..view.filmstrip import draw_filmstrip
 from ..view.report import safe_names
 from ..view.study import evenly
 from . import console
 from .errors import FileError
-from .measure import Request, on_ground
+from .fall_inputs import read_bodies
+from .measure import Request
 
 FRAMES = 6  # of a filmstrip
 
@@ -38,21 +40,37 @@ class Film:
 
 @dataclass(frozen=True)
 class Fall:
-    """The tip test of each of the bodies of a file, what became of them (None where that was not asked for), films."""
+    """The tip test of each of the T bodies of a file, what became of them (None where that was not asked for), films.
+
+    names: of the bodies, where the file names them.
+    """
 
     path: Path
     tip: TipTest
     run: Simulation | None
     notes: Sequence[str]
     films: Sequence[Film]
+    names: tuple[str, ...] | None = None
 
     @property
     def count(self) -> int:
         return len(self.tip.status)
 
-    def stands(self) -> np.ndarray:
-        """(T,) by the simulation, or by the roll where there is none."""
-        return self.tip.stands() if self.run is None else ~self.run.fell()
+    @property
+    def without_verdict(self) -> str:
+        """Why nothing is said about who stands; empty where it is."""
+        if self.run is None or self.run.has_verdict:
+            return ""
+        return (
+            f"no verdict at {self.run.times[-1]:.3g} s, displacement only: who stands is judged after {VERDICT:g} s "
+            f"or later (--times {self.run.times[-1]:.5g},{VERDICT:g})"
+        )
+
+    def stands(self) -> np.ndarray | None:
+        """(T,) by the simulation, or by the roll where there is none; None where the simulation ends too early."""
+        if self.run is None:
+            return self.tip.stands()
+        return ~self.run.fell() if self.run.has_verdict else None
 
     def status(self) -> np.ndarray:
         return self.tip.status if self.run is None else self.run.status
@@ -78,10 +96,11 @@ class Fall:
     def rows(self) -> Iterator[tuple[str, list[str], str | None]]:
         columns, stands, status = self._columns(), self.stands(), self.status()
         for frame in range(self.count):
-            name = self.path.name if self.count == 1 else f"{self.path.name} {frame}"
+            own = f" {frame}" if self.names is None else f" {self.names[frame]}"
+            name = self.path.name + ("" if self.count == 1 else own)
             unknown = status_names(status[frame] & _UNKNOWN)
-            said = ", ".join(unknown).lower() if unknown else ("yes" if stands[frame] else "no")
-            yield name, [_number(value) for value in columns[:, frame]], said
+            verdict = None if stands is None else ("yes" if stands[frame] else "no")
+            yield name, [_number(value) for value in columns[:, frame]], ", ".join(unknown).lower() or verdict
 
     def summary(self) -> tuple[str, list[str], str | None]:
         """Medians of those that are known."""
@@ -89,9 +108,10 @@ class Fall:
         if not known.any():
             return f"{self.path.name} ({self.count} frames)", ["–"] * len(self.titles()), None
         cells = [_number(value) for value in np.median(self._columns()[:, known], axis=1)]
-        share = f"{100 * self.stands()[known].mean():.0f} %"
+        stands = self.stands()
         left_out = "" if known.all() else f" of {known.sum()}"
-        return f"{self.path.name} ({self.count} frames)", cells, share + left_out
+        share = None if stands is None else f"{100 * stands[known].mean():.0f} %{left_out}"
+        return f"{self.path.name} ({self.count} frames)", cells, share
 
     def record(self) -> dict[str, Any]:
         """Plain numbers for JSON; of more than 10,000 frames evenly spaced ones."""
@@ -102,20 +122,25 @@ class Fall:
         listed = []
         for frame in frames:
             row: dict[str, Any] = {"frame": int(frame), "status": status_names(status[frame])}
-            row["stands"] = bool(stands[frame]) if known[frame] else None
+            if self.names is not None:
+                row["name"] = self.names[frame]
+            row["stands"] = bool(stands[frame]) if known[frame] and stands is not None else None
             row |= {name: plain(column[frame]) for name, column in tip.items()}
             if self.run is not None:
                 run = self.run
                 row["displacement"], row["simulated_tilt"] = plain(run.displacement[frame]), plain(run.tilt[frame])
             listed.append(row)
         told = {} if self.run is None else {"engine": self.run.engine, "times": plain(self.run.times)}
-        return {"file": str(self.path), "notes": list(self.notes), "fallen_tilt": FALLEN, **told, "frames": listed}
+        notes = [*self.notes, *([self.without_verdict] if self.without_verdict else [])]
+        return {"file": str(self.path), "notes": notes, "fallen_tilt": FALLEN, **told, "frames": listed}
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The columns of simulation.npz: those of `TipTest` as tip_…, and those of `Simulation`."""
         arrays = {f"tip_{field.name}": getattr(self.tip, field.name) for field in fields(TipTest)}
         if self.run is not None:
             arrays |= {field.name: np.asarray(getattr(self.run, field.name)) for field in fields(Simulation)}
+        if self.names is not None:
+            arrays["names"] = np.array(self.names)
         return arrays
 
 
@@ -139,25 +164,39 @@ def fall(
 ) -> Fall:
     """Test the bodies of a file and let them go, a piece of them at a time. Raises FileError."""
     try:
-        recording, template, ground, notes = on_ground(path, request)
+        bodies = read_bodies(path, request)
+        recording, template = bodies.recording, bodies.template
         options: dict[str, Any] = {"engine": engine, "shape": shape, "step": step, "friction": friction, "snap": snap}
         tips, runs, done = [], [], 0
         with console.progress(f"letting go {path.name}", len(recording.vertices)) as bar:
             for vertices in pieces(recording.vertices, PIECE):
+                ground = _grounds(bodies.ground, slice(done, done + len(vertices)))
                 tips.append(tip_test(vertices, template, ground))
                 if not tip_only:
                     told: dict[str, Any] = {**options, "progress": lambda here, done=done: bar.to(done + here)}
                     runs.append(simulate(vertices, template, ground, times, **told))
                 done += len(vertices)
                 bar.to(done)
-        result = Fall(path, _joined(tips), None if tip_only else _joined(runs), notes, ())
+        result = Fall(path, _joined(tips), None if tip_only else _joined(runs), bodies.notes, (), bodies.names)
         drawn = [] if tip_only else _to_draw(result, films)
-        made = [_film(result, recording.vertices[frame], frame, template, ground, options) for frame in drawn]
-        return Fall(path, result.tip, result.run, notes, made)
+        made = [
+            _film(result, recording.vertices[frame], frame, template, _grounds(bodies.ground, frame), options)
+            for frame in drawn
+        ]
+        return replace(result, films=made)
     except (ValueError, TypeError) as error:
         raise FileError(path, str(error)) from error
     except MemoryError as error:
         raise FileError(path, "needs more memory than there is; simulate fewer frames at once") from error
+
+
+def _grounds(ground: Ground, frames: slice | int) -> Ground:
+    """The ground of some bodies: the one of all, or theirs."""
+    if ground.height.ndim == 0 and ground.normal.ndim == 1:
+        return ground
+    count = max(ground.height.size, len(np.atleast_2d(ground.normal)))
+    normal = np.broadcast_to(ground.normal, (count, 3))
+    return Ground(normal[frames], np.broadcast_to(ground.height, count)[frames])
 
 
 def _joined(parts: Sequence[Any]) -> Any:

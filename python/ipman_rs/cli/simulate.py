@@ -21,6 +21,10 @@ MOST_ROWS = 40
 
 @click.command()
 @click.argument("bodies", nargs=-1, required=True, metavar="BODY...", type=click.Path(path_type=Path))
+@click.option(
+    "--against", type=click.Path(path_type=Path), metavar="OTHER",
+    help="Compare with the same people's bodies by another method.",
+)  # fmt: skip
 @click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), help="Folder for the results.")
 @click.option("--body", "model", metavar="NAME|PATH", help="Body model that parameters pose, as in `ipman analyze`.")
 @click.option("--up", type=UP, metavar="AXIS", default=None, help="What points up, as in `ipman analyze`.")
@@ -39,7 +43,7 @@ MOST_ROWS = 40
 )  # fmt: skip
 @click.option(
     "--times", type=TIMES, default="0.41667,2", show_default=True, metavar="SECONDS,...",
-    help="When to look; the first is the paper's 100 steps of 1/240 s.",
+    help="When to look; the first is the paper's 100 steps of 1/240 s. Who stands is judged at 2 s or later.",
 )  # fmt: skip
 @click.option("--step", type=click.FloatRange(1e-5, 0.1), default=1 / 240, show_default="1/240", help="Seconds.")
 @click.option("--friction", type=click.FloatRange(0.0, 100.0), default=1.0, show_default=True, help="Coulomb's.")
@@ -55,6 +59,7 @@ MOST_ROWS = 40
 @click.option("--json", "as_json", is_flag=True, help="Print simulation.json to stdout and nothing else there.")
 def simulate(
     bodies: tuple[Path, ...],
+    against: Path | None,
     output: Path | None,
     model: str | None,
     up: tuple[float, float, float] | None,
@@ -65,35 +70,46 @@ def simulate(
 ) -> None:
     """Let stiff bodies go on their ground: do they stand or fall?
 
-    BODY is a mesh or the parameters of a body model, one body or many, as in `ipman analyze`. Each body is a rigid one
-    with the mesh's exact mass, centre of mass and inertia. The table has for each
+    BODY is a mesh or the parameters of a body model, one body or many, as in `ipman analyze`; predictions, as in
+    `ipman evaluate` (.npz); or a folder of `ipman fit`, with all its bodies. Each body is a rigid one with the mesh's
+    exact mass, centre of mass and inertia. The table has for each
 
     \b
     margin    from the centre of mass to the edge of what it stands on, mm; negative outside
     barrier   what tips it over the nearest edge, J, and the least push, degrees a second
     roll      how far it tilts if nothing is quick, degrees; and after a nudge
     moved     how far its centre of mass has moved after each time, mm; tilt: of its up axis, degrees
+    stands    tilted by at most 15 degrees at the last time, if that is 2 s or later; else there is no verdict
 
-    With -o: simulation.json, simulation.npz (with each pose on the way) and a filmstrip PNG of each fall.
+    With --against: the share of stable bodies of both, and the difference and ratio of their displacements, with
+    intervals. Bodies are paired by name where both files have names (predictions, folders of fits), else in order.
+
+    With -o: simulation.json, simulation.npz (with each pose on the way) and a filmstrip PNG of each fall; with
+    --against also comparison.png and .svg.
 
     \b
     ipman simulate body.obj
     ipman simulate poses.npz -o out --times 0.41667,2,5
     ipman simulate *.obj -o out --engine mujoco
     ipman simulate million.npz -o out --tip-only
+    ipman simulate fits/ipman-o --against fits/smplify-xmc -o out --engine bullet --shape vhacd
 
     Exit code: 0 when all is well, 1 when a file could not be read (the others are), 2 for wrong usage.
     """
     from . import console
     from .falls import fall, write_falls
+    from .falls_compared import compare_falls, comparison_lines, comparison_record, comparison_table, write_comparison
     from .measure import Request
 
+    if against is not None and (len(bodies) != 1 or options["tip_only"]):
+        wrong = "--tip-only" if options["tip_only"] else f"{len(bodies)} files"
+        raise click.UsageError(f"--against compares the simulated bodies of one BODY with those of OTHER, got {wrong}")
     request = Request(model=model, up=up, ground=ground, parts=parts)
     films = options.pop("filmstrips")
     films = films if output is not None else 0
     falls: list[Fall] = []
     failures: list[tuple[str, str]] = []
-    for path in bodies:
+    for path in (*bodies, *(() if against is None else (against,))):
         try:
             falls.append(fall(path, request, films, **options))
         except FileError as error:
@@ -101,12 +117,23 @@ def simulate(
             console.error(str(error))
         except ImportError as error:
             raise click.ClickException(str(error)) from error
-    record = {"bodies": [one.record() for one in falls], "failures": [dict(zip(("file", "error"), failure, strict=True))
-                                                                     for failure in failures]}  # fmt: skip
+    compared = None
+    if against is not None and not failures:
+        try:
+            compared = compare_falls(*falls)
+        except FileError as error:
+            failures.append((error.path, error.what))
+            console.error(str(error))
+    record: dict[str, Any] = {"bodies": [one.record() for one in falls]}
+    if compared is not None:
+        record["comparison"] = comparison_record(compared[0], *falls)
+    record["failures"] = [dict(zip(("file", "error"), failure, strict=True)) for failure in failures]
     text = json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1)
     if output is not None and falls:
         try:
             write_falls(falls, output, text)
+            if compared is not None:
+                write_comparison(*compared[1:], output)
         except OSError as error:
             console.error(f"{output}: cannot be written ({error.strerror or error}); choose another folder")
             sys.exit(1)
@@ -114,6 +141,13 @@ def simulate(
         click.echo(text)
     elif falls:
         print_falls(falls)
+        for note in dict.fromkeys(one.without_verdict for one in falls if one.without_verdict):
+            console.say(note)
+        if compared is not None:
+            console.say("")
+            console.print_rows(*comparison_table(compared[0]))
+            for line in comparison_lines(compared[0], *falls):
+                console.say(one_line(line))
         if output is not None:
             console.say(f"results: {output.resolve()}")
     sys.exit(1 if failures else 0)

@@ -1,4 +1,7 @@
-"""BoSE: does the centre of mass lie over the base of support? As the paper, its code and a stricter reading have it."""
+"""BoSE (Eq. 10): does the centre of mass lie over the base of support?
+
+As the paper, its code and a stricter reading have it.
+"""
 
 from __future__ import annotations
 

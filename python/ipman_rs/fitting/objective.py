@@ -22,6 +22,8 @@ Weights = Mapping[str, float]
 class Objective:
     """Σ weight · term over the `free` blocks of the variables; the other blocks stay as they are in `variables`.
 
+    With the terms and weights of the preset `ipman-o` it is the paper's E_IPMAN-O (Eq. 9).
+
     Bodies are evaluated together and know nothing of each other. Raises ValueError for an unknown term.
     """
 

@@ -1,8 +1,23 @@
-"""Stiff bodies: how firmly they stand (`tip_test`), and what becomes of them when they are let go (`simulate`)."""
+"""Stiff bodies: how firmly they stand (`tip_test`), and what becomes of them when they are let go (`simulate`).
+
+`compare` says which of two methods has the more stable bodies.
+"""
 
 from __future__ import annotations
 
-from .fall import ENGINES, Simulation, simulate
+from .comparison import Comparison, Means, compare
+from .fall import ENGINES, VERDICT, Simulation, simulate
 from .tipping import FALLEN, TipTest, tip_test
 
-__all__ = ["ENGINES", "FALLEN", "Simulation", "TipTest", "simulate", "tip_test"]
+__all__ = [
+    "ENGINES",
+    "FALLEN",
+    "VERDICT",
+    "Comparison",
+    "Means",
+    "Simulation",
+    "TipTest",
+    "compare",
+    "simulate",
+    "tip_test",
+]

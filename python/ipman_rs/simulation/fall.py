@@ -30,7 +30,8 @@ Engine = Literal["rapier", "bullet", "mujoco"]
 Shape = Literal["hull", "vhacd"]
 ENGINES: tuple[str, ...] = get_args(Engine)
 HUNDRED_STEPS = 100 / 240  # s, the paper's 100 steps in the usual length
-TIMES = (HUNDRED_STEPS, 2.0)
+VERDICT = 2.0  # s; after 100 steps a body that falls has moved by centimetres, but need not have tilted by 15° yet
+TIMES = (HUNDRED_STEPS, VERDICT)
 STEP = 1 / 240  # s
 PIECE = 32  # bodies between two looks at the progress
 MOST_STEPS = 1_000_000
@@ -60,8 +61,22 @@ class Simulation:
     displacement: NDArray[np.float64]
     tilt: NDArray[np.float64]
 
+    @property
+    def has_verdict(self) -> bool:
+        """Whether the last time is late enough, 2 s, to say which bodies stand. Before, there is displacement alone."""
+        return bool(self.times[-1] >= VERDICT - 1e-9)
+
     def fell(self, tilt: float = FALLEN) -> Any:
-        """(...,) whether the up axis has tilted by more than this, in radians, at the last time."""
+        """(...,) whether the up axis has tilted by more than this, in radians, at the last time. False where unknown.
+
+        Raises:
+            ValueError: the last time is earlier than 2 s, when a body that will fall may hardly have tilted yet.
+        """
+        if not self.has_verdict:
+            raise ValueError(
+                f"times: whether a body fell is judged at {VERDICT:g} s or later, got {self.times[-1]:.3g} s as the "
+                "last; until then displacement says how far it has moved"
+            )
         return self.tilt[..., -1] > tilt
 
     def posed(self, vertices: ArrayLike) -> NDArray[Any]:

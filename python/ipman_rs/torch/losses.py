@@ -23,7 +23,7 @@ def stability_loss(
     epsilon: float = 0.0,
     method: Method = "pcom",
 ) -> Tensor:
-    """‖g(CoM) − g(CoP)‖: vertices (..., V, 3) -> (...), m; gradient 0 where they coincide."""
+    """‖g(CoM) − g(CoP)‖ (Eq. 4): vertices (..., V, 3) -> (...), m; gradient 0 where they coincide."""
     quantity = f"stability_loss.{choice('method', method, Method)}"
     options = (number("alpha", alpha), number("gamma", gamma), not_negative("epsilon", epsilon))
     return evaluate(vertices, template, ground, quantity, options, ())
@@ -40,7 +40,8 @@ def ground_loss(
     points: Points = "samples",
     curve: Curve = "tanh_squared",
 ) -> tuple[Tensor, Tensor]:
-    """pull (...), push (...): means over all points of α1 T(h/α2) where h >= 0, β1 T(h/β2) where h < 0.
+    """L_ground (Eq. 5) as pull (...), push (...): means over all points of α1 T(h/α2) where h >= 0 (Eq. 6) and of
+    β1 T(h/β2) where h < 0 (Eq. 7).
 
     points: "samples" or "vertices"; curve: "tanh_squared" (tanh x)² or "tanh_of_square" tanh(x²).
     """

@@ -14,7 +14,7 @@ from .dispatch import evaluate
 def center_of_mass(vertices: Tensor, template: BodyTemplate, method: Method = "pcom") -> Tensor:
     """vertices (..., V, 3) -> (..., 3), m.
 
-    method: "pcom" (the paper's, parts weighted by volume), "vertex_mean", "sample_mean", "face_area", or "exact".
+    method: "pcom" (the paper's Eq. 1, parts weighted by volume), "vertex_mean", "sample_mean", "face_area", or "exact".
 
     Raises:
         ValueError: unknown method.

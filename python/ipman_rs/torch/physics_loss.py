@@ -23,7 +23,7 @@ Reduction = Literal["mean", "sum", "none"]
 
 
 class IntuitivePhysicsLoss(nn.Module):
-    """The paper's loss terms over a batch of bodies on a ground.
+    """The paper's loss terms (Eqs. 4, 6 and 7) over a batch of bodies on a ground.
 
     preset: a name of ipman_rs.presets; "balanced" has "balance" in place of "stability".
     reduction: "mean" over the counted bodies, "sum", or "none" (one number a body, 0 for one that does not count).

@@ -1,4 +1,4 @@
-"""Pressure by height, and its centre (paper §3.2)."""
+"""Pressure by height (Eq. 2 of the paper), and its centre (Eq. 3)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .ground import Ground
 def pressure(
     vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround, alpha: float = 100.0, gamma: float = 10.0
 ) -> Tensor:
-    """Relative pressure of each sample: 1 − αh below the ground, e^{−γh} from it upwards: (..., V, 3) -> (..., S)."""
+    """Relative pressure of each sample (Eq. 2): 1 − αh below the ground, e^{−γh} above: (..., V, 3) -> (..., S)."""
     options = (number("alpha", alpha), number("gamma", gamma))
     return evaluate(vertices, template, ground, "pressure", options, (template.num_samples,))
 
@@ -28,6 +28,6 @@ def center_of_pressure(
     gamma: float = 10.0,
     epsilon: float = 0.0,
 ) -> Tensor:
-    """Σ ρ v / (Σ ρ + ε): vertices (..., V, 3) -> (..., 3), m; finite for hovering bodies when ε = 0."""
+    """Σ ρ v / (Σ ρ + ε) (Eq. 3): vertices (..., V, 3) -> (..., 3), m; finite for hovering bodies when ε = 0."""
     options = (number("alpha", alpha), number("gamma", gamma), not_negative("epsilon", epsilon))
     return evaluate(vertices, template, ground, "center_of_pressure", options, (3,))

@@ -67,7 +67,7 @@ def bose(
     com_method: Method = "pcom",
     contact: Contact = "paper",
 ) -> Tensor:
-    """Whether the CoM lies over the base of support: vertices (..., V, 3) -> bool (...); not differentiable.
+    """Whether the CoM lies over the base of support (Eq. 10): vertices (..., V, 3) -> bool (...); not differentiable.
 
     "hull" is margin >= 0, on any device; "lp" is the paper's linear programme, solved on the CPU.
     """

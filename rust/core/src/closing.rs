@@ -1,4 +1,4 @@
-//! Closing: the paper's first step of "close, translate, fill".
+//! Closing: the first step of the paper's "close, translate, fill" (section 3.2).
 //!
 //! Where two parts meet, or where the surface is open, there is an interface of edges. Each connected component of all
 //! interfaces gets one virtual vertex, the mean of its vertices, and every part that meets there is capped by a fan of

@@ -11,7 +11,7 @@ use crate::volume::{Moments, SignedVolumes, absolute, part_moments, part_moments
 /// How a body's mass is spread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
-    /// Samples weighted by their part's volume: m̄ = Σ_i vol(part(i)) v_i / Σ_i vol(part(i)).
+    /// Samples weighted by their part's volume (Eq. 1): m̄ = Σ_i vol(part(i)) v_i / Σ_i vol(part(i)).
     Pcom,
     /// Mean of the mesh's vertices.
     VertexMean,
@@ -135,6 +135,7 @@ impl<R: Real> Centre<R> {
     }
 }
 
+/// (Eq. 1), part by part: Σ_p vol_p c_p / Σ_p vol_p n_p, c_p the sum of the part's n_p samples.
 #[inline(always)]
 fn pcom<R: Real>(scene: &Scene<R>) -> Centre<R> {
     let signed = SignedVolumes::forward(&scene.template.closing, scene.points);

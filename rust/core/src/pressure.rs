@@ -1,4 +1,4 @@
-//! Pressure: from the height above the ground to pressure to the centre of pressure.
+//! Pressure: from the height above the ground to pressure (Eq. 2) to the centre of pressure (Eq. 3).
 
 use crate::number::vector::{Vec3, add_scaled, add_to, dot, narrow, over, scale, widen};
 use crate::number::{BLOCK, Real, Room};
@@ -7,7 +7,7 @@ use crate::sampling::{CHUNK, Place, Points, Row, Walk, sum_row};
 use crate::scene::{self, Scene};
 use crate::template::Template;
 
-/// The paper's heuristic: ρ = 1 − αh below the ground, e^(−γh) from the ground up. No unit.
+/// The paper's heuristic (Eq. 2): ρ = 1 − αh below the ground, e^(−γh) from the ground up. No unit.
 #[derive(Clone, Copy, Debug)]
 pub struct PressureCurve {
     /// 1/m
@@ -17,7 +17,7 @@ pub struct PressureCurve {
 }
 
 impl PressureCurve {
-    /// ρ(h), divided by e^(−γ shift) where h ≥ 0: with `shift` > 0 nothing may lie below the ground.
+    /// ρ(h) (Eq. 2), divided by e^(−γ shift) where h ≥ 0: with `shift` > 0 nothing may lie below the ground.
     #[inline(always)]
     pub fn density<R: Real>(&self, height: R, shift: R) -> R {
         let below = R::of(-self.alpha).mul_add(height, R::of(1.0));
@@ -93,7 +93,7 @@ impl<R: Real> Room<(PressureCurve, &Walk, Vec<R>, &[R])> for PressureBackward {
     }
 }
 
-/// The centre of pressure s̄ = Σ ρ_i v_i / (Σ ρ_i + epsilon) in the world, metres.
+/// The centre of pressure (Eq. 3) s̄ = Σ ρ_i v_i / (Σ ρ_i + epsilon) in the world, metres.
 #[derive(Clone, Copy, Debug)]
 pub struct CenterOfPressure {
     pub curve: PressureCurve,

@@ -1,5 +1,5 @@
-//! Volume: signed tetrahedra from the origin to each face of each closed part (the paper's "fill"), and the exact mass
-//! properties of the solid they fill.
+//! Volume: signed tetrahedra from the origin to each face of each closed part (the paper's "fill", section 3.2), and
+//! the exact mass properties of the solid they fill.
 //!
 //! A closed part's volume does not depend on the origin; the coordinates are local to the body ([`crate::scene`]), which
 //! is the paper's "translate". The volumes alone are summed by rings around the points, which is the same sum in another

@@ -1,7 +1,7 @@
 """The paper's intuitive-physics terms, and this project's balance cost in place of stability, from the compiled core:
 
-    stability   ‖g(CoM) − g(CoP)‖                                  m
-    ground      mean of α1 tanh²(h/α2) over h ≥ 0, plus mean of β1 tanh²(h/β2) over h < 0
+    stability   ‖g(CoM) − g(CoP)‖ (Eq. 4)                          m
+    ground      mean of α1 tanh²(h/α2) over h ≥ 0, plus mean of β1 tanh²(h/β2) over h < 0 (Eqs. 5 to 7)
     balance     log(1 + J), see `ipman_rs.torch.balance_cost`       nats
 
 with the constants of a preset of `ipman_rs.presets`. Terms of one preset share one evaluation.

@@ -80,18 +80,22 @@ def _values(
     load = product(tables.samples_back, density, points.dtype)
     total = density.sum(dim=-1, dtype=wide) + o.epsilon
     moment = (load[..., None] * points).sum(dim=1, dtype=wide)
+    # (Eq. 3)
     cop = (moment - o.epsilon * origin.to(wide)) / total[:, None]  # ε pulls towards the world's origin
 
     a, b, c = _corners(tables, points).unbind(dim=1)
     area = torch.linalg.cross(b - a, c - a)
     volume = product(tables.parts, (a * area).sum(dim=-1), wide) / 6
     sums = product(tables.sample_sums, points, wide)
+    # (Eq. 1)
     com = (volume.abs()[..., None] * sums).sum(dim=1) / _weight(tables, volume)[:, None]
 
+    # (Eq. 4)
     offset = com - cop
     offset = offset - (offset * normal).sum(dim=-1, keepdim=True) * normal
     length = (offset * offset).sum(dim=-1).sqrt()  # differentiated by hand: no trouble at 0
 
+    # (Eq. 6) and (Eq. 7)
     pull = o.alpha1 * _wave(curve, at_samples.clamp(min=0) / o.alpha2)[0].mean(dim=-1, dtype=wide)
     push = o.beta1 * _wave(curve, at_samples.clamp(max=0) / o.beta2)[0].mean(dim=-1, dtype=wide)
     found = torch.stack([length, pull, push], dim=-1).to(points.dtype)
@@ -146,7 +150,7 @@ def _weight(tables: Tables, volume: Tensor) -> Tensor:
 
 
 def _density(o: Options, height: Tensor) -> Tensor:
-    """ρ; without ε a hovering body is first lowered onto the ground, which leaves the centre of pressure as it is."""
+    """ρ (Eq. 2); without ε a hovering body is first lowered onto the ground, which leaves its centre as it is."""
     if o.epsilon == 0:
         height = height - height.amin(dim=-1, keepdim=True).clamp(min=0)
     return torch.where(height < 0, 1 - o.alpha * height, torch.exp(-o.gamma * height.clamp(min=0)))

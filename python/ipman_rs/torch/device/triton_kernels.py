@@ -35,7 +35,7 @@ def _tanh(x):
 
 @triton.jit
 def _wave(x, SQUARED: tl.constexpr):
-    """T(x) and dT/dx."""
+    """T(x) of Eqs. 6 and 7, and dT/dx."""
     if SQUARED:
         t = _tanh(x)
         return t * t, 2 * t * (1 - t * t)
@@ -45,7 +45,7 @@ def _wave(x, SQUARED: tl.constexpr):
 
 @triton.jit
 def _density(height, shift, ALPHA: tl.constexpr, GAMMA: tl.constexpr):
-    """ρ of a height, the ground being raised by `shift`."""
+    """ρ (Eq. 2) of a height, the ground being raised by `shift`."""
     above = tl.exp(-GAMMA * tl.maximum(height - shift, 0))
     return tl.where(height < 0, 1 - ALPHA * height, above)
 
@@ -208,19 +208,20 @@ def balance(
         pull += tl.load(at + 8, mask=real, other=0)
         push += tl.load(at + 9, mask=real, other=0)
 
-    # The centre of pressure; ε pulls towards the world's origin.
+    # The centre of pressure (Eq. 3); ε pulls towards the world's origin.
     ox, oy, oz = _origin(vertices, body, ORIGIN, V)
     load = tl.sum(total) + EPSILON
     px = (tl.sum(mx) - EPSILON * ox) / load
     py = (tl.sum(my) - EPSILON * oy) / load
     pz = (tl.sum(mz) - EPSILON * oz) / load
 
-    # The centre of mass.
+    # The centre of mass (Eq. 1).
     count = tl.load(part_sizes + part, mask=part < P, other=0).to(wide)
     size = tl.abs(volume)
     weight = tl.sum(size * count)
     cx, cy, cz = tl.sum(size * sx) / weight, tl.sum(size * sy) / weight, tl.sum(size * sz) / weight
 
+    # Their distance on the ground (Eq. 4).
     nx, ny, nz = _xyz(normal, body, True)
     dx, dy, dz = cx - px, cy - py, cz - pz
     along = dx * nx + dy * ny + dz * nz

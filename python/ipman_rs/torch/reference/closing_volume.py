@@ -1,4 +1,4 @@
-"""Close each part through shared virtual vertices, and sum signed tetrahedra: the paper's vol^P."""
+"""Close each part through shared virtual vertices, and sum signed tetrahedra: the paper's vol^P (section 3.2)."""
 
 from __future__ import annotations
 

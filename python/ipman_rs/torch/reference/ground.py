@@ -1,4 +1,4 @@
-"""The paper's ground loss: pull what floats down to the floor, push what sank out of it."""
+"""The paper's ground loss (Eq. 5): pull what floats down to the floor (Eq. 6), push what sank out of it (Eq. 7)."""
 
 from __future__ import annotations
 

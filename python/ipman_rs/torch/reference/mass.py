@@ -30,6 +30,7 @@ def safe_norm(vectors: Tensor) -> Tensor:
 
 
 def _pcom(body: Posed) -> Tensor:
+    """(Eq. 1) Σ vol(part(i)) v_i / Σ vol(part(i)) over the samples."""
     volume_of_sample = part_volumes(body).index_select(-1, body.mesh.sample_parts)
     return weighted_mean(body.samples, volume_of_sample)
 

@@ -1,4 +1,4 @@
-"""Height -> pressure -> centre of pressure (paper §3.2)."""
+"""Height -> pressure (Eq. 2) -> centre of pressure (Eq. 3)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from .posed import Posed
 
 
 def pressure_of_height(height: Tensor, alpha: float, gamma: float) -> Tensor:
-    """ρ = 1 − αh below the ground, e^{−γh} on and above it (and its slope at 0). The inner choice prevents overflow."""
+    """(Eq. 2) ρ = 1 − αh below the ground, e^{−γh} on and above it (and its slope at 0).
+
+    The inner choice prevents overflow.
+    """
     below = height < 0
     return torch.where(below, 1 - alpha * height, torch.exp(-gamma * torch.where(below, 0, height)))
 
@@ -28,7 +31,7 @@ def center_of_pressure(
     gamma: float = 10.0,
     epsilon: float = 0.0,
 ) -> Tensor:
-    """Σ ρ v / (Σ ρ + ε): (B, 3), m.
+    """(Eq. 3) Σ ρ v / (Σ ρ + ε): (B, 3), m.
 
     With ε = 0 a hovering body is lowered onto the ground first: where every point is above, that leaves the ratio as it
     is, and e^{−γh} cannot underflow to 0/0.

@@ -1,4 +1,4 @@
-"""The paper's stability loss: ‖g(CoM) − g(CoP)‖₂."""
+"""The paper's stability loss (Eq. 4): ‖g(CoM) − g(CoP)‖₂."""
 
 from __future__ import annotations
 

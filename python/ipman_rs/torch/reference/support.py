@@ -1,4 +1,4 @@
-"""Contact set, the nearest edge of its hull on the ground, and the signed margin (paper §3.3).
+"""Contact set, the nearest edge of its hull on the ground, and the signed margin (paper, section 3.2; Eq. 10).
 
 The edge is a discrete choice, found by gift wrapping without a graph; the margin to it is plain differentiable algebra.
 """

@@ -1,4 +1,4 @@
-"""The intuitive-physics terms on estimated bodies in the world."""
+"""The intuitive-physics terms on estimated bodies in the world: λ_s L_stability + λ_g L_ground of Eq. 8."""
 
 from __future__ import annotations
 

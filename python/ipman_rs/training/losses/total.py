@@ -1,6 +1,6 @@
 """All terms together: 60 · (5 L_2D + 5 L_3D + L_pose + 0.001 L_betas + L_scale + Σ λ L_physics), SPIN's weights.
 
-The paper's λ of its terms stand inside the bracket, so they count sixty times.
+It is the paper's Eq. 8. The λ of its terms stand inside the bracket, as in the authors' code: they count sixty times.
 """
 
 from __future__ import annotations

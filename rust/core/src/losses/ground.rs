@@ -1,5 +1,5 @@
-//! L_ground: pull = mean of α1 tanh(h/α2)² over the points at or above the ground, push = mean of β1 tanh(h/β2)² over
-//! those below it. Both means run over all points.
+//! L_ground = pull + push (Eq. 5): pull = mean of α1 tanh(h/α2)² over the points at or above the ground (Eq. 6), push =
+//! mean of β1 tanh(h/β2)² over those below it (Eq. 7). Both means run over all points.
 
 use crate::error::Result;
 use crate::number::vector::Vec3;

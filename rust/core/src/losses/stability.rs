@@ -1,4 +1,5 @@
-//! L_stability = ‖g(m̄) − g(s̄)‖₂: the distance, on the ground, from the centre of mass to the centre of pressure, metres.
+//! L_stability = ‖g(m̄) − g(s̄)‖₂ (Eq. 4): the distance, on the ground, from the centre of mass to the centre of pressure,
+//! metres.
 
 use crate::mass::{Centre, Method};
 use crate::number::Real;
@@ -13,8 +14,8 @@ pub struct StabilityLoss {
     pub pressure: CenterOfPressure,
 }
 
-/// The loss from m̄ and s̄, and its gradient by m̄; that by s̄ is the opposite. It is the unit offset, 0 where the two
-/// points coincide.
+/// (Eq. 4) The loss from m̄ and s̄, and its gradient by m̄; that by s̄ is the opposite. It is the unit offset, 0 where the
+/// two points coincide.
 pub fn distance_on_ground<R: Real>(scene: &Scene<R>, centre: &Centre<R>, cop: &Cop<R>) -> (R::Wide, Vec3<R::Wide>) {
     let offset = scene.ground.along(sub(centre.point, cop.point));
     let length = dot(offset, offset).sqrt();

@@ -1,4 +1,4 @@
-//! The terms of a training or fitting step together: (stability, pull, push) or (balance, pull, push).
+//! The terms of a training or fitting step together: (stability, pull, push), Eqs. 4, 6 and 7, or (balance, pull, push).
 //!
 //! Stability and ground look at the samples together.
 

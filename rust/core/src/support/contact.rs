@@ -10,7 +10,7 @@ use crate::scene::Scene;
 /// Which samples touch the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ContactRule {
-    /// |h| < τ
+    /// |h| < τ, the paper's set C (section 3.2).
     Paper,
     /// h < τ, and ten contacts or fewer count as none: the authors' released code.
     Released,

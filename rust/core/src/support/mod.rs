@@ -1,4 +1,5 @@
-//! The base of support: the hull of the contact samples on the ground, and whether the centre of mass lies over it.
+//! The base of support: the hull of the contact samples on the ground (section 3.2), and whether the centre of mass lies
+//! over it (BoSE, Eq. 10).
 
 mod contact;
 mod extremes;

@@ -1,4 +1,4 @@
-//! The paper's test for the base of support as a linear programme: is g(m̄) = Σ w_i g(v_i) with w ≥ 0, Σ w = 1?
+//! The paper's test for the base of support (Eq. 10) as a linear programme: is g(m̄) = Σ w_i g(v_i) with w ≥ 0, Σ w = 1?
 //!
 //! Solved as the equivalent ray programme, which is always feasible: from the contacts' mean c, how far towards the point
 //! m does the hull reach? maximise t subject to Σ w_i (x_i − c) = t (m − c), Σ w_i = 1, w, t ≥ 0. The point is supported

@@ -1,0 +1,126 @@
+"""The bodies that `ipman simulate` lets go: a file as `ipman analyze` reads it, predictions, or a folder of fits.
+
+Predictions and fits bring a ground of their own; `--up` or `--ground` take its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import ipman_rs as ip
+
+from ..body import embedded, safe_npz
+from .errors import FileError
+from .fit_outputs import RECORD
+from .measure import Request, on_ground
+from .recording import Recording
+
+PREDICTIONS = "predictions.npz"  # what `ipman predict --data` and `ipman fit --data` leave in their folder
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """T bodies on a ground, which is one for all or one for each. names: (T,) where they have any."""
+
+    recording: Recording
+    template: Any
+    ground: ip.Ground
+    names: tuple[str, ...] | None
+    notes: Sequence[str]
+
+
+def read_bodies(path: Path, request: Request) -> Bodies:
+    """Raises FileError."""
+    if path.is_dir():
+        return _file(path / PREDICTIONS, request) if (path / PREDICTIONS).is_file() else _fits(path, request)
+    return _file(path, request)
+
+
+def _file(path: Path, request: Request) -> Bodies:
+    arrays = _arrays(path) if path.suffix.lower() == ".npz" and path.is_file() and path.stat().st_size else {}
+    request = _with_model(path, request, arrays)
+    own = _own_ground(path, arrays) if request.up is None and request.ground is None else None
+    recording, template, ground, notes = on_ground(path, request if own is None else replace(request, ground=0.0))
+    count = len(recording.vertices)
+    if own is not None:
+        if own.height.size not in (1, count):
+            raise FileError(path, f"has {own.height.size} grounds for {count} bodies; expected one, or one for each")
+        ground = own
+        notes = [note for note in notes if not note.startswith("up: ")]
+        notes.append("ground: the file's own (--up and --ground say otherwise)")
+    if "names" in arrays and arrays["names"].shape != (count,):
+        raise FileError(path, f"names have shape {arrays['names'].shape}; expected one for each of {count} bodies")
+    names = tuple(arrays["names"].astype(str).tolist()) if "names" in arrays else None
+    return Bodies(recording, template, ground, names, notes)
+
+
+def _arrays(path: Path) -> dict[str, np.ndarray]:
+    """What a file says of its bodies beside their parameters."""
+    try:
+        stored = safe_npz.names(path)
+        wanted = ("names", "body", "model", "ground", "ground_normal", "ground_height")
+        return {name: safe_npz.read(path, name) for name in wanted if name in stored}
+    except ValueError as error:
+        raise FileError(path, str(error)) from error
+
+
+def _with_model(path: Path, request: Request, arrays: dict[str, np.ndarray]) -> Request:
+    """With the body that the file names. One whose files are not included must be named by the user."""
+    named = next((str(arrays[key]) for key in ("body", "model") if key in arrays), None)
+    if request.model is not None or named is None:
+        return request
+    if named not in embedded.NAMES:
+        raise FileError(path, f"its bodies are of {named!r}, which is not included; name the model's file with --body")
+    return replace(request, model=named)
+
+
+def _own_ground(path: Path, arrays: dict[str, np.ndarray]) -> ip.Ground | None:
+    """From `ground` (normal and height, of predictions) or `ground_normal` and `ground_height` (of a fit)."""
+    if "ground" in arrays:
+        rows = arrays["ground"]
+        if rows.ndim not in (1, 2) or rows.shape[-1] != 4 or not len(rows):
+            raise FileError(path, f"ground has shape {rows.shape}; expected normal and height, (4,) or (T, 4)")
+        normal, height = rows[..., :3], rows[..., 3]
+    elif {"ground_normal", "ground_height"} <= arrays.keys():
+        normal, height = arrays["ground_normal"], arrays["ground_height"]
+    else:
+        return None
+    try:
+        normal, height = normal.reshape(-1, 3), height.reshape(-1)
+        return ip.Ground(normal[0], height[0]) if len(normal) == len(height) == 1 else ip.Ground(normal, height)
+    except ValueError as error:
+        raise FileError(path, str(error)) from error
+
+
+def _fits(folder: Path, request: Request) -> Bodies:
+    """The bodies of a folder of `ipman fit`, in the order of their names."""
+    items = [record.parent for record in sorted(folder.glob(f"*/{RECORD}"))]
+    if not items:
+        raise FileError(folder, f"holds neither {PREDICTIONS} nor finished fits; name a file, or a folder of ipman fit")
+    each = [_file(item / f"{item.name}.npz", request) for item in items]
+    first = each[0]
+    for item, other in zip(items, each, strict=True):
+        faces = other.recording.faces
+        if faces.shape != first.recording.faces.shape or (faces != first.recording.faces).any():
+            raise FileError(item, f"is another body than {items[0].name}; expected fits of one body model")
+    counts = [len(one.recording.vertices) for one in each]
+    names = [
+        item.name if count == 1 else f"{item.name} {frame}"
+        for item, count in zip(items, counts, strict=True)
+        for frame in range(count)
+    ]
+    normals = [np.broadcast_to(one.ground.normal, (count, 3)) for one, count in zip(each, counts, strict=True)]
+    heights = [np.broadcast_to(one.ground.height, (count,)) for one, count in zip(each, counts, strict=True)]
+    vertices = np.concatenate([np.asarray(one.recording.vertices[:]) for one in each])
+    return Bodies(
+        replace(first.recording, path=folder, vertices=vertices, seconds=None),
+        first.template,
+        ip.Ground(np.concatenate(normals), np.concatenate(heights)),
+        tuple(names),
+        [*first.notes, f"bodies: {len(names)} from {len(items)} fits, each on its own ground"],
+    )
