@@ -109,7 +109,8 @@ def test_the_image_shows_the_labels_and_the_body_stands(scene, change):
     batch = Batch.of([{
         **followed, "inputs": torch.zeros(1), "betas": torch.zeros(10), "has_body": one[0],
         "camera": camera.float(), "hips": true.joints[1:3].mean(dim=0).float(), "regressed": ~one[0],
-        "up": torch.tensor([0.0, 1, 0]), "height": torch.tensor(0.0), "has_world": one[0], "standing": one[0], "contact": one[0],
+        "up": torch.tensor([0.0, 1, 0]), "height": torch.tensor(0.0), "has_world": one[0], "standing": one[0],
+        "contact": one[0],
     }])  # fmt: skip
     estimated = body(columns(batch.pose.double()))
     world = to_world(estimated.vertices.float(), estimated.joints[:, 1:3].mean(dim=1).float(), batch)[0]

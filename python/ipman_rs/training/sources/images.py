@@ -22,8 +22,8 @@ from .source import BadSample
 
 Array = NDArray[np.floating]
 
-# Data sets with joints of their own mean other points by "pelvis", "neck" or "head" than SMPL does. In these they agree,
-# in the hips but for centimetres: with SPIN's regressor they are labels of those that it makes.
+# Data sets with joints of their own mean other points by "pelvis", "neck" or "head" than SMPL does. In these they
+# agree, in the hips but for centimetres: with SPIN's regressor they are labels of those that it makes.
 SHARED = tuple(f"{side}_{name}" for side in ("left", "right") for name in (
     "hip", "knee", "ankle", "shoulder", "elbow", "wrist",
 ))  # fmt: skip
