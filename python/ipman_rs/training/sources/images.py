@@ -119,29 +119,35 @@ class Images:
         """Their middle (3,) in the axes of the frame, None where nothing tells it; whether it is the regressor's."""
         if self._are_own(frame.joint_names) and (of_joints := _middle(joints, HIPS)) is not None:
             return of_joints, False
-        neutral = frame.genders is None or frame.genders[0] == "neutral"
-        if labelled and neutral and frame.transl is not None:
-            assert frame.pose is not None
-            assert frame.betas is not None
-            count = min(self.body.num_betas, frame.betas.shape[1])
-            body = self.body(frame.pose[0], frame.betas[0, :count], frame.transl[0])
-            if np.isfinite(body.joints).all():
-                return np.asarray(body.joints, float)[list(HIPS)].mean(axis=0), False
+        of_body = self._hips_of_body(frame) if labelled else None
+        gender = "neutral" if frame.genders is None else str(frame.genders[0])
+        if of_body is not None and gender == "neutral":
+            return of_body, False
         if self.regressed:
             rows = [self.joints.index(f"{side}_hip_regressed") for side in ("left", "right")]
             if (of_regressed := _middle(joints, rows)) is not None:
                 return of_regressed, True
         of_joints = _middle(joints, HIPS)
-        if of_joints is not None and frame.cameras is not None:
-            self._warn(frame)
-        return of_joints, False
+        found = of_body if of_joints is None else of_joints
+        if found is not None and frame.ground is not None:
+            self._warn(frame, "of its joints" if of_joints is not None else f"of a {gender} body")
+        return found, False
 
-    def _warn(self, frame: Frames) -> None:
+    def _hips_of_body(self, frame: Frames) -> Array | None:
+        """Of the labelled body; None where it has no place or is not finite."""
+        if frame.pose is None or frame.betas is None or frame.transl is None:
+            return None
+        betas = frame.betas[0, : self.body.num_betas]
+        found = np.asarray(self.body(frame.pose[0], betas, frame.transl[0]).joints, float)[list(HIPS)]
+        return found.mean(axis=0) if np.isfinite(found).all() else None
+
+    def _warn(self, frame: Frames, which: str) -> None:
         if not self._warned:
             self._warned = True
             warnings.warn(
-                f"{frame.names[0]}: the data set's hips stand for those of the body {self.body.name!r}, which lie "
-                "centimetres apart; with SPIN's J_regressor_extra.npy (model.regressor) both are the same",
+                f"{frame.names[0]}: bodies are put where the data set's hips are, {which}, which may lie centimetres "
+                f"from those of the body {self.body.name!r}; SPIN's J_regressor_extra.npy (model.regressor, "
+                "--regressor) makes the same ones where a data set labels hips",
                 stacklevel=4,
             )
 
