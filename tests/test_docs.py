@@ -59,3 +59,8 @@ def test_guide_names_real_files():
     paths = re.findall(r"`((?:rust|python|tests)/[\w/.]+)`", guide)
     assert len(paths) > 8
     assert {path for path in paths if not (ROOT / path).exists()} == {"rust/core/src/losses/height.rs"}
+
+
+def test_the_recipe_of_the_paper_is_the_file():
+    recipe = (ROOT / "python/ipman_rs/training/recipes/ipman-r.yaml").read_text()
+    assert f"```yaml\n# ipman-r.yaml\n{recipe}```" in (ROOT / "docs/training.md").read_text()
