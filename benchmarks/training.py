@@ -49,7 +49,7 @@ class LiteralTerms(nn.Module):
         self.literal = Literal(template)
 
     def forward(self, posed: Posed, batch: Batch) -> tuple[Tensor, dict[str, Tensor]]:
-        return self.literal.weighted(to_world(posed.vertices, posed.joints[:, 0], batch)), {}
+        return self.literal.weighted(to_world(posed.vertices, posed.hips(batch.regressed), batch)), {}
 
 
 @click.command()

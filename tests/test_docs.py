@@ -109,3 +109,8 @@ def test_symbols_name_their_equations():
     assert rows == {
         "m̄": "1", "ρ, α, γ": "2", "s̄": "3", "L_stability": "4", "L_ground": "5 = 6 + 7", "BoSE": "10",
     }  # fmt: skip
+
+
+def test_the_recipe_of_the_paper_is_the_file():
+    recipe = (ROOT / "python/ipman_rs/training/recipes/ipman-r.yaml").read_text()
+    assert f"```yaml\n# ipman-r.yaml\n{recipe}```" in (ROOT / "docs/training.md").read_text()

@@ -33,11 +33,13 @@ PRESETS: dict[str, Preset] = {
     for preset in (
         Preset("paper-r", weights={"stability": 0.01, "pull": 0.01, "push": 0.01}),
         Preset("paper-o", alpha=70.0, weights={"stability": 1e4, "pull": 1e4, "push": 1e4}),
+        # Widths are those of the configuration (out_alpha2, in_alpha2) with which the authors trained; the defaults of
+        # their class, pull 0.5 and push 0.15, are not used.
         Preset(
             "released",
             epsilon=1e-6,
-            alpha2=0.5,
             beta1=1.0,
+            beta2=0.5,
             contact="released",
             weights={"stability": 0.01, "pull": 0.01, "push": 0.1},
         ),

@@ -64,8 +64,8 @@ def test_a_lean_is_a_tilt(truth, posing):
 
 
 def test_sinking_does_not_pass_the_strict_figure(truth, posing):
-    """Bodies are judged on the floor: moving the pelvis changes height and BoSE, and not the strict figure."""
-    lower = dataclasses.replace(truth, pelvis=truth.pelvis - torch.tensor([0.0, 0.08, 0.0]))
+    """Bodies are judged on the floor: moving the hips changes height and BoSE, and not the strict figure."""
+    lower = dataclasses.replace(truth, hips=truth.hips - torch.tensor([0.0, 0.08, 0.0]))
     usual, sunk = figures(exact(truth), truth, posing), figures(exact(truth), lower, posing)
     np.testing.assert_allclose(sunk.lowest, -0.08, atol=1e-5)
     assert np.array_equal(usual.strict, sunk.strict)

@@ -28,7 +28,7 @@ def angle_of(turn):
 def test_labels_lean_as_told(clean, lean):
     """Root and joints turn together, about level axes, by 8 ± 5 degrees; nothing else changes."""
     found = leaning(clean, 8.0, 3, lean)
-    for name in ("inputs", "keypoints", "camera", "pelvis", "betas"):
+    for name in ("inputs", "keypoints", "camera", "hips", "betas"):
         assert torch.equal(getattr(clean, name), getattr(found, name))
     turn = found.pose[:, 0].double() @ clean.pose[:, 0].double().transpose(1, 2)  # in camera axes
     world = clean.camera.double().transpose(1, 2) @ turn @ clean.camera.double()
@@ -85,7 +85,7 @@ def test_the_camera_of_the_augmented_image_is_the_way_back_of_the_world(clean):
     points = torch.randn(len(clean), 5, 3, generator=torch.Generator().manual_seed(0))
     world = to_world(points, torch.zeros(len(clean), 3), batch)
     side = torch.where(batch.flip[:, None], torch.tensor([-1.0, 1.0, 1.0]), 1.0)
-    back = (world - (side * batch.pelvis)[:, None]) @ seen_from(batch).transpose(1, 2)
+    back = (world - (side * batch.hips)[:, None]) @ seen_from(batch).transpose(1, 2)
     torch.testing.assert_close(back, points, atol=1e-5, rtol=0)
 
 
@@ -96,5 +96,5 @@ def test_a_shuffled_camera_is_one_of_the_others(clean):
     assert torch.equal(order.sort().values, torch.arange(len(clean)))
     assert (order != torch.arange(len(clean))).float().mean() > 0.99
     assert torch.equal(found.camera, clean.camera[order])
-    for name in ("pose", "joints", "pelvis", "inputs"):
+    for name in ("pose", "joints", "hips", "inputs"):
         assert torch.equal(getattr(found, name), getattr(batch, name))

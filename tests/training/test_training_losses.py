@@ -90,7 +90,7 @@ def test_nobody_labelled_is_zero_with_a_graph():
 def test_the_truth_stands(truth, posing):
     """True labels, through the camera and back: bodies on the floor, over their support."""
     posed = posing(exact(truth))
-    world = to_world(posed.vertices, posed.joints[:, 0], truth)
+    world = to_world(posed.vertices, posed.hips(truth.regressed), truth)
     assert world[..., 1].amin(dim=1).abs().max() < 2e-6
     margins = ipt.support_margin(world, posing.body.template, ipt.Ground.y_up(), 0.011, "exact")
     assert (margins >= -1e-5).all()
@@ -98,7 +98,7 @@ def test_the_truth_stands(truth, posing):
 
 def test_physics_is_the_loss_in_the_world(truth, estimate, posing):
     posed = posing(estimate)
-    world = to_world(posed.vertices, posed.joints[:, 0], truth)
+    world = to_world(posed.vertices, posed.hips(truth.regressed), truth)
     expected = ipt.IntuitivePhysicsLoss(posing.body.template, "paper-r")(world, ipt.Ground.y_up())
     total, terms = losses.Physics(posing.body.template)(posed, truth)
     for name, value in expected.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import csv
+import dataclasses
 import math
 import os
 import signal
@@ -21,7 +22,8 @@ pytest.importorskip("lightning", reason="lightning is not installed")
 from PIL import Image
 
 from ipman_rs.cli import main
-from ipman_rs.training.augment import Augmentation, crop
+from ipman_rs.training import recipes
+from ipman_rs.training.augment import Augmentation, Augmenting, crop
 from ipman_rs.training.projection import project
 from ipman_rs.training.trainer import config
 from ipman_rs.training.trainer.module import Training
@@ -116,6 +118,11 @@ def test_a_gradient_is_clipped_and_one_that_is_infinite_dropped(settings, tmp_pa
     norm = torch.cat([first.grad.flatten(), others[0].grad.flatten()]).norm()
     assert norm == pytest.approx(12.5, rel=1e-4)  # sums in single precision
     assert first.grad.unique() == pytest.approx(-10 * others[0].grad.unique())
+    free = Training(config.load(settings, ["clip=.inf"]))  # as SPIN
+    weights = next(iter(free.model.parameters()))
+    weights.grad = torch.full_like(weights, 1e4)
+    free.configure_gradient_clipping(None)
+    assert (weights.grad == 1e4).all()
     first.grad, others[0].grad = torch.full_like(first, math.inf), torch.ones_like(others[0])
     module.configure_gradient_clipping(None)
     assert all(weights.grad is None for weights in module.parameters())
@@ -261,6 +268,41 @@ def test_configurations_survive_their_file(settings):
     made = config.load(settings, ["model.size=128", "augment.flip=0.25", "loss.pose=2", "precision=bf16-mixed"])
     assert (made.model.size, made.augment.flip, made.loss.pose, made.precision) == (128, 0.25, 2.0, "bf16-mixed")
     assert config.config(config.plain(made)) == made
+
+
+def test_the_recipes_are_the_paper_s():
+    """Shares as the released code names them: Human3.6M 30 %, in the wild 40 % by size, 3DHP 10 %, RICH 20 %."""
+    from ipman_rs.data import module
+
+    made = {name: config.load(recipes.path_of(name)) for name in recipes.NAMES}
+    assert set(made) == {"ipman-r", "hmr-star", "ipman-r-human36m"}
+    for one in made.values():
+        assert (one.steps, one.batch, one.rate, one.schedule) == (14_600, 64, 5e-5, "constant")
+        assert one.steps == pytest.approx(3 * 312_188 / 64, rel=5e-3)
+        assert one.clip == math.inf
+        assert config.config(config.plain(one)) == one
+        assert (one.loss.keypoints_2d, one.loss.keypoints_2d_count, one.loss.all) == (5, 49, 60)
+        assert one.augment == Augmenting()
+        for told in one.data:
+            assert told.options["split"] in module(told.name).FORM.files
+    shares = {(one.name, one.options["split"]): one.share for one in made["ipman-r"].data}
+    sizes = {"coco train": 28_344, "mpii train": 14_810, "lsp extended": 9_427, "lsp train": 1_000}
+    for name, size in sizes.items():
+        assert shares.pop(tuple(name.split())) == pytest.approx(0.4 * size / sum(sizes.values()), abs=5e-4)
+    assert shares == {("human36m", "train"): 0.3, ("mpi-inf-3dhp", "train"): 0.1, ("rich-ipman", "train"): 0.2}
+    assert made["hmr-star"] == dataclasses.replace(made["ipman-r"], physics=config.Physics())
+    assert made["ipman-r"].physics == config.Physics("paper-r")
+    assert [told.name for told in made["ipman-r-human36m"].data] == ["human36m"]
+
+
+def test_a_recipe_by_its_name(tmp_path):
+    """It runs where its data lie; here there are none, and the first that is missing is named."""
+    done = CliRunner().invoke(main, ["train", "ipman-r-human36m", "-o", str(tmp_path / "out"), "body=anny-lite"])
+    assert done.exit_code == 1
+    assert "data/J_regressor_extra.npy" in done.output
+    done = CliRunner().invoke(main, ["train", "ipman-q", "-o", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "ipman-q: no such file, nor a recipe; those are hmr-star" in done.output
 
 
 @pytest.mark.parametrize(

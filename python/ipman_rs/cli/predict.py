@@ -39,6 +39,11 @@ if TYPE_CHECKING:
     "--image-folder", type=click.Path(file_okay=False, path_type=Path), default=Path(),
     help="With --data: where the paths of its images begin.",
 )  # fmt: skip
+@click.option(
+    "--regressor", metavar="FILE", type=click.Path(dir_okay=False, path_type=Path),
+    help="With --data: SPIN's J_regressor_extra.npy. Bodies are put where their hips are; where a data set has hips of "
+    "its own and no bodies, it makes the same of ours. Default: model.regressor of the training.",
+)  # fmt: skip
 def predict(
     images: tuple[Path, ...],
     checkpoint: Path,
@@ -48,6 +53,7 @@ def predict(
     path: Path | None,
     split: str | None,
     image_folder: Path,
+    regressor: Path | None,
     **seen: Any,
 ) -> None:
     """A body for the person in each image, from a regressor that `ipman train` trained, in one look.
@@ -69,6 +75,8 @@ def predict(
 
     if (data is None) == (not images) or (data is None) != (path is None):
         raise click.UsageError("expected images, or --data with --path")
+    if data is None and regressor is not None:
+        raise click.UsageError("--regressor: expected --data with it; without, nothing tells where hips are")
     if seen["box"] and seen["whole"]:
         raise click.UsageError("expected --box or --whole, not both")
     try:
@@ -82,7 +90,7 @@ def predict(
         console.error(str(error))
         sys.exit(1)
     if data is not None and path is not None:
-        _write_predictions(trained, data, path, split, image_folder, output)
+        _write_predictions(trained, data, path, split, image_folder, regressor, output)
         return
     paths = [found for path in images for found in (_inside(path, IMAGES) if path.is_dir() else [path])]
     studies: list[Study] = []
@@ -110,16 +118,21 @@ def predict(
     sys.exit(1 if failures or not paths else 0)
 
 
-def _write_predictions(trained: Trained, name: str, path: Path, split: str | None, images: Path, output: Path) -> None:
+def _write_predictions(
+    trained: Trained, name: str, path: Path, split: str | None, images: Path, regressor: Path | None, output: Path
+) -> None:
     import ipman_rs.data
 
+    from ..body import joint_regressors
     from . import console
     from .fit_outputs import npz, write_whole
 
     try:
         data = ipman_rs.data.open(name, path, **({} if split is None else {"split": split}))
+        told = regressor or trained.settings.model.regressor
+        hips = joint_regressors.read(told) if told else None
         with console.progress("looking", len(data)) as step:
-            found = trained.of_data_set(data, images, step.to)
+            found = trained.of_data_set(data, images, step.to, hips)
     except (OSError, TypeError, ValueError) as error:
         console.error(f"{name}: {error}")
         sys.exit(1)

@@ -9,22 +9,31 @@ import click
 
 
 @click.command()
-@click.argument("config", type=click.Path(dir_okay=False, exists=True, path_type=Path))
+@click.argument("config", type=click.Path(dir_okay=False, path_type=Path))
 @click.argument("changes", nargs=-1, metavar="[NAME=VALUE]...")
 @click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Folder.")
 def train(config: Path, changes: tuple[str, ...], output: Path) -> None:
     """Train a regressor of bodies with the intuitive-physics losses.
 
-    CONFIG is a YAML file (docs/training.md lists its entries); NAME=VALUE takes precedence over it. Interrupted, the
-    same command goes on where it was, with the same losses as if it had not been. Needs the extra `train`.
+    CONFIG is a YAML file (docs/training.md lists its entries), or the name of one of the paper's runs: ipman-r,
+    hmr-star, ipman-r-human36m. NAME=VALUE takes precedence over it. Interrupted, the same command goes on where it was,
+    with the same losses as if it had not been. Needs the extra `train`.
 
     \b
     ipman train hmr.yaml -o out/hmr
     ipman train hmr.yaml -o out/ipman physics.preset=paper-r steps=20000
+    ipman train ipman-r -o out/ipman-r accelerator=gpu    # the paper's, with its data sets in data/
     torchrun --nproc-per-node 4 $(which ipman) train hmr.yaml -o out/hmr devices=4
     """
     from . import console
 
+    if not config.exists():
+        from ..training import recipes
+
+        try:
+            config = recipes.path_of(str(config))
+        except ValueError as error:
+            raise click.UsageError(str(error)) from None
     try:
         from ..training.trainer.config import load
         from ..training.trainer.run import train as run

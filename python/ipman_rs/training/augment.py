@@ -116,17 +116,16 @@ def follow(
 ) -> dict[str, Tensor]:
     """Labels of one person for the augmented crop: fields of `Batch`, less inputs.
 
-    Of the image: keypoints (K, 3) in pixels, joints (J, 4) and pose (J, 3, 3) in the axes of its camera; the names say
-    what lies on which side. `whole` is what `to_crop` gave.
+    Of the image: keypoints (K, 3) in pixels, joints (N, 4) and pose (J, 3, 3) of the first J of them in the axes of its
+    camera; the names say what lies on which side. `whole` is what `to_crop` gave.
     """
     matrix = torch.from_numpy(change.matrix()).float()
     side = torch.diag(torch.tensor([-1.0 if change.flip else 1.0, 1.0, 1.0]))
     affine = torch.from_numpy(whole).float()
     points = labels["keypoints"][_order(keypoints, change.flip)]
     placed = torch.cat([points[:, :2] @ affine[:, :2].T + affine[:, 2], points[:, 2:]], dim=1)
-    order = _order(joints, change.flip)
-    moved = labels["joints"][order]
-    pose = side @ labels["pose"][order] @ side
+    moved = labels["joints"][_order(joints, change.flip)]
+    pose = side @ labels["pose"][_order(joints[: len(labels["pose"])], change.flip)] @ side
     pose[0] = matrix @ labels["pose"][0] @ side
     return {
         **labels,

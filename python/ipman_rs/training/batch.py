@@ -14,14 +14,14 @@ import ipman_rs.torch as ipt
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """B people. Labels are as the augmented input shows them; camera, pelvis and ground are those of the world.
+    """B people. Labels are as the augmented input shows them; camera, hips and ground are those of the world.
 
     "Camera axes" are x right, y down, z forward, of the camera that sees the augmented image.
     """
 
     inputs: Tensor  # (B, 3, H, W) images, or (B, K, 3) keypoints
     keypoints: Tensor  # (B, K, 3) x, y in half sides of the crop from its middle; confidence, 0 where not labelled
-    joints: Tensor  # (B, J, 4) m, camera axes, about any origin; confidence
+    joints: Tensor  # (B, J + R, 4) m, camera axes, about any origin; confidence; as in `Posed.all_joints`
     pose: Tensor  # (B, J, 3, 3) relative to the parent, the root's in camera axes
     betas: Tensor  # (B, b)
     has_body: Tensor  # (B,) bool: pose and betas are labelled
@@ -29,10 +29,11 @@ class Batch:
     camera: Tensor  # (B, 3, 3) world to camera, of the image before augmentation
     flip: Tensor  # (B,) bool: mirrored left to right, after the turn
     turn: Tensor  # (B,) radians by which the image was turned clockwise
-    pelvis: Tensor  # (B, 3) m, in the world before augmentation
+    hips: Tensor  # (B, 3) m, their middle, in the world before augmentation
+    regressed: Tensor  # (B,) bool: the hips are those that the regressor makes of vertices, not the body's joints
     up: Tensor  # (B, 3) the ground's normal
     height: Tensor  # (B,) m, of the ground along it
-    has_world: Tensor  # (B,) bool: camera, pelvis and ground are known
+    has_world: Tensor  # (B,) bool: camera, hips and ground are known
     standing: Tensor  # (B,) bool: labelled as balanced
     contact: Tensor  # (B,) bool: labelled as touching the ground
 
@@ -62,7 +63,7 @@ class Batch:
         """
         seen = _finite(self.inputs)
         body = self.has_body & seen & _finite(self.pose) & _finite(self.betas)
-        world = self.has_world & seen & _finite(self.camera) & _finite(self.pelvis) & _finite(self.up)
+        world = self.has_world & seen & _finite(self.camera) & _finite(self.hips) & _finite(self.up)
         world = world & self.height.isfinite() & self.turn.isfinite()
         return dataclasses.replace(
             self,
@@ -73,7 +74,7 @@ class Batch:
             betas=_cleared(self.betas, body),
             has_body=body,
             camera=_else(self.camera, world, torch.eye(3, dtype=self.camera.dtype, device=self.camera.device)),
-            pelvis=_cleared(self.pelvis, world),
+            hips=_cleared(self.hips, world),
             up=_else(self.up, world, self.up.new_tensor([0.0, 1.0, 0.0])),
             height=_cleared(self.height, world),
             turn=_cleared(self.turn, world),

@@ -29,8 +29,8 @@ STRICT = 0.025  # m, of contact
 
 @dataclass(frozen=True, eq=False)
 class Figures:
-    """Errors: pelvis on pelvis. bose: the paper's, its centre of mass within the base of support at 10 cm, the pelvis
-    where the true one is. strict: the exact centre of mass, 2.5 cm, the body moved onto the floor. lowest: of the
+    """Errors: pelvis on pelvis. bose: the paper's, its centre of mass within the base of support at 10 cm, the hips
+    where the true ones are. strict: the exact centre of mass, 2.5 cm, the body moved onto the floor. lowest: of the
     vertices above the floor. tilt: radians between true and estimated "up", seen from the pelvis."""
 
     mpjpe: Array
@@ -81,8 +81,8 @@ def _on_cpu(estimate: Estimate) -> Estimate:
 
 
 def _in_world(posed: Posed, truth: Batch) -> tuple[Tensor, Tensor]:
-    root = posed.joints[:, 0]
-    return to_world(posed.vertices, root, truth).double(), to_world(posed.joints, root, truth).double()
+    hips = posed.hips(truth.regressed)
+    return to_world(posed.vertices, hips, truth).double(), to_world(posed.joints, hips, truth).double()
 
 
 def _columns(rotations: Tensor) -> Tensor:

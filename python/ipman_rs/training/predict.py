@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import ipman_rs.torch as ipt
+from ipman_rs.body import BodyModel
+from ipman_rs.body.joint_regressors import JointRegressor
 from ipman_rs.data import DataSet
 
 from .augment import ROOM, Augmentation, crop, to_crop
@@ -24,7 +26,7 @@ from .lifting.views import KEYPOINTS
 from .model import HMR
 from .model.made import made
 from .model.trained_weights import read_trained
-from .posing import Posing
+from .posing import HIPS, REGRESSED_HIPS, Posing, check_regressor
 from .sources import BadSample, Images
 from .sources.images import body_kind
 from .trainer.config import Config, config
@@ -69,18 +71,26 @@ class Trained:
 
     @torch.no_grad()
     def of_data_set(
-        self, data: DataSet, images: Path = Path(), progress: Callable[[int], None] = lambda done: None
+        self,
+        data: DataSet,
+        images: Path = Path(),
+        progress: Callable[[int], None] = lambda done: None,
+        regressor: JointRegressor | None = None,
     ) -> dict[str, Array]:
         """The people of a data set with images, as `ipman evaluate` reads them.
 
         names (F,); pose (F, J, 3), betas (F, b) and transl (F, 3) in the axes of its bodies; and body, a word.
 
-        images: the folder in which their paths begin. As in the authors' code, an estimated pelvis is put where the
-        true one is. Frames whose image cannot be read are warned of and left out; progress is told how many are done.
-        ValueError: none is left.
+        images: the folder in which their paths begin. As in the authors' code, the middle of the estimated hips is put
+        where that of the true ones is: of the body's joints or, where the data set labels hips of its own, of those
+        that `regressor` makes (SPIN's `J_regressor_extra.npy`). Frames whose image cannot be read are warned of and
+        left out; progress is told how many are done. ValueError: none is left, or a regressor that does not fit.
         """
         body = self.posing.body.body
-        source = Images(data, body, KEYPOINTS, self.settings.model.size, folder=images)
+        if regressor is not None:
+            check_regressor(regressor, body)
+        size = self.settings.model.size
+        source = Images(data, body, KEYPOINTS, size, folder=images, regressed=regressor is not None)
         rows: list[tuple[Any, ...]] = []
         for row in range(len(data)):
             try:
@@ -91,10 +101,10 @@ class Trained:
             estimate = self.model(batch.inputs)
             matrices, betas = estimate.rotations[0].double().numpy(), estimate.betas[0].double().numpy()
             matrices[0] = batch.camera[0].double().numpy().T @ matrices[0]
-            pelvis = body.J_template[0] + body.J_shapedirs[0] @ betas
             pose = Rotation.from_matrix(matrices).as_rotvec()
+            hips = _hips(body, pose, betas, regressor if batch.regressed[0] else None)
             name = str(data[slice(row, row + 1)].names[0])
-            rows.append((name, pose, betas, batch.pelvis[0].double().numpy() - pelvis))
+            rows.append((name, pose, betas, batch.hips[0].double().numpy() - hips))
             progress(row + 1)
         if not rows:
             raise ValueError("data: none of its images can be read")
@@ -128,3 +138,11 @@ class Trained:
         matrices[0] = rotation.T @ matrices[0]
         pose = Rotation.from_matrix(matrices).as_rotvec()
         return Prediction(pose, betas, rotation.T @ in_camera - pelvis, rotation, focal, center)
+
+
+def _hips(body: BodyModel, pose: Array, betas: Array, regressor: JointRegressor | None) -> Array:
+    """The middle (3,) of a body's hips where it stands without translation."""
+    posed = body(pose, betas)
+    if regressor is None:
+        return np.asarray(posed.joints)[list(HIPS)].mean(axis=0)
+    return regressor.joints(np.asarray(posed.vertices))[list(REGRESSED_HIPS)].mean(axis=0)

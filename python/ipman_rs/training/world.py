@@ -1,8 +1,8 @@
 """Estimated bodies in the world, where the ground is known.
 
 The orientation follows from the camera, R_w = Rᵀ R_c. Where the body stands cannot be told from a crop to within
-centimetres, so, as in the authors' code, its pelvis is put where the true one is: "on the ground" then judges the legs
-and the tilt, not the depth.
+centimetres, so, as in the authors' code, the middle of its hips is put where the true one is: "on the ground" then
+judges the legs and the tilt, not the depth. (The paper instead has t_w = −t_c + t_cw.)
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ import ipman_rs.torch as ipt
 from .batch import Batch
 
 
-def to_world(points: Tensor, root: Tensor, batch: Batch) -> Tensor:
-    """Points (B, N, 3) in the axes of the camera of the augmented image -> the world, `root` (B, 3) on the true pelvis.
+def to_world(points: Tensor, hips: Tensor, batch: Batch) -> Tensor:
+    """Points (B, N, 3) in the axes of the camera of the augmented image -> the world, `hips` (B, 3) on the true ones.
 
     Where the image was flipped this is the mirror image of the scene, across the world's plane x = 0.
     """
-    origin = torch.zeros_like(root)
+    origin = torch.zeros_like(hips)
     turned, _ = ipt.camera_to_world(
-        points - root[:, None], origin, batch.camera, origin, flip=batch.flip, rotation=batch.turn
+        points - hips[:, None], origin, batch.camera, origin, flip=batch.flip, rotation=batch.turn
     )
-    side = torch.where(batch.flip[:, None], batch.pelvis.new_tensor([-1.0, 1.0, 1.0]), 1.0)
-    return turned + (side * batch.pelvis)[:, None]
+    side = torch.where(batch.flip[:, None], batch.hips.new_tensor([-1.0, 1.0, 1.0]), 1.0)
+    return turned + (side * batch.hips)[:, None]
 
 
 def seen_from(batch: Batch) -> Tensor:

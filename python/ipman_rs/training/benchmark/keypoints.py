@@ -32,7 +32,9 @@ class Keypoints:
     name: str = "keypoints"
 
     def trained_on(self) -> dict[str, Any]:
-        return {"name": self.name, "people": self.people, "views": VIEWS, "seed": TRAINING}
+        return {
+            "name": self.name, "people": self.people, "views": VIEWS, "seed": TRAINING, "placed_by": "hips",
+        }  # fmt: skip
 
     def tested_on(self) -> dict[str, Any]:
         return {"split": self.split, "bodies": self.bodies, "test_seed": SPLITS[self.split]}

@@ -55,7 +55,7 @@ class Pictures:
         index = self._data("train").index
         return {
             "name": self.name, "size": SIZE, "cuts": CUTS, "augmenting": dataclasses.asdict(AUGMENTING),
-            "rendered": index["settings"], "images": index["counts"]["train"],
+            "rendered": index["settings"], "images": index["counts"]["train"], "placed_by": "hips",
         }  # fmt: skip
 
     def tested_on(self) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..figures import Figures
+from .claims import UNITS, judged
 from .intervals import paired_over_seeds
 from .rows import BASELINE, CONTROL, OURS
 from .run import TILTS, Benchmark, Result
@@ -55,12 +56,18 @@ def write(found: Found, run: Benchmark) -> Path:
     )  # fmt: skip
     environment.filters |= {"interval": _interval, "signed": _signed}
     tilts = "" if tuple(found) == TILTS[run.task.name] else "".join(f" --tilt {tilt:g}" for tilt in found)
-    judged = verdicts(record["blocks"])
     page = run.folder / f"{name}.md"
     page.write_text(
         environment.get_template(TEMPLATE).render(
-            record, name=name, tilts=tilts, verdicts=judged, columns=COLUMNS, differences=DIFFERENCES
-        )
+            record,
+            name=name,
+            tilts=tilts,
+            verdicts=verdicts(record["blocks"]),
+            claims=judged(record["blocks"]),
+            units=UNITS,
+            columns=COLUMNS,
+            differences=DIFFERENCES,
+        )  # fmt: skip
     )
     return page
 
@@ -104,8 +111,8 @@ def _stacked(figures: Sequence[Figures]) -> dict[str, Array]:
 
 
 def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
-    """What was to be shown: the claim, whether the figures say so, and the numbers."""
-    judged = []
+    """What was to be shown of our own preset: the claim, whether the figures say so, and the numbers."""
+    found = []
     for block in blocks:
         rows = {row["name"]: row for row in block["rows"]}
         ours, control, baseline = rows[OURS], rows[CONTROL], rows[BASELINE]
@@ -113,22 +120,22 @@ def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
         pve, bose = difference["PVE"], difference["BoSE"]
         if block["tilt"] == 0:
             share = 100 * pve[0] / baseline["mean"]["PVE"]
-            judged.append(("clean labels: PVE within +2 %", share <= 2, f"{share:+.1f} % ({_interval(pve)} mm)"))
+            found.append(("clean labels: PVE within +2 %", share <= 2, f"{share:+.1f} % ({_interval(pve)} mm)"))
             for key in ("hover", "penetration"):
-                judged.append(
+                found.append(
                     (f"clean labels: {key} no worse", difference[key][1] <= 0, f"{_interval(difference[key])} mm")
                 )
         elif block["tilt"] == ASKED:
             title = f"labels that lean by {ASKED:g}°"
             each = ", ".join(_signed(value, 2) for value in seeds["BoSE"])  # 3.98 is not 4.0 here
-            judged.append((f"{title}: BoSE 4 points up in every seed", min(seeds["BoSE"]) >= 4, each))
-            judged.append((f"{title}: PVE not above HMR*'s", pve[0] <= 0, f"{_interval(pve)} mm"))
+            found.append((f"{title}: BoSE 4 points up in every seed", min(seeds["BoSE"]) >= 4, each))
+            found.append((f"{title}: PVE not above HMR*'s", pve[0] <= 0, f"{_interval(pve)} mm"))
             for key, gain, unit in (("PVE", pve, "mm"), ("BoSE", bose, "points")):
                 lost = control["against baseline"][key]
                 gone = lost[2] >= 0 if key == "PVE" else lost[1] <= 0
                 said = f"{_interval(lost)}, not {_interval(gain)} {unit}"
-                judged.append((f"{title}: the gain in {key} is lost with a shuffled camera", gone, said))
-    return judged
+                found.append((f"{title}: the gain in {key} is lost with a shuffled camera", gone, said))
+    return found
 
 
 def _interval(interval: Sequence[float], digits: int = 1) -> str:

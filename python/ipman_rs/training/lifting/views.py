@@ -15,7 +15,7 @@ from ipman_rs.body import rotations
 from ipman_rs.fitting.keypoints import coco
 
 from ..batch import Batch
-from ..posing import Posing
+from ..posing import HIPS, Posing
 from .bodies import BODY, Bodies
 
 Array = NDArray[np.floating]
@@ -40,7 +40,7 @@ def views(bodies: Bodies, seed: int, per_body: int = 1) -> Batch:
     body = posing()
     with torch.no_grad():
         posed = body.body.to(torch.float64)(*(torch.from_numpy(part) for part in (bodies.pose, bodies.betas)))
-        pelvis = (posed.joints[:, 0] + torch.from_numpy(bodies.transl)).numpy()[rows]
+        hips = (posed.joints[:, HIPS].mean(dim=1) + torch.from_numpy(bodies.transl)).numpy()[rows]
         joints = (posed.joints - posed.joints[:, :1]).numpy()[rows]
         points = (body.points(posed) - posed.joints[:, :1]).numpy()[rows]
     seen = points @ cameras.swapaxes(1, 2) + places[:, None]
@@ -58,7 +58,8 @@ def views(bodies: Bodies, seed: int, per_body: int = 1) -> Batch:
         camera=_single(cameras),
         flip=~yes,
         turn=torch.zeros(count),
-        pelvis=_single(pelvis),
+        hips=_single(hips),
+        regressed=~yes,
         up=torch.tensor([0.0, 1.0, 0.0]).expand(count, 3),
         height=torch.zeros(count),
         has_world=yes,

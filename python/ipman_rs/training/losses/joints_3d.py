@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from torch import Tensor
 
-HIPS = (1, 2)  # of SMPL's joints
+from ..posing import HIPS
 
 
-def joints_3d_loss(joints: Tensor, labels: Tensor) -> Tensor:
-    """Mean of c |x − x̂|² / 3 over the people who have labels of both hips, both centred there; 0 if nobody has.
+def joints_3d_loss(joints: Tensor, labels: Tensor, hips: Sequence[int] = HIPS, count: int | None = None) -> Tensor:
+    """Σ c |x − x̂|² / (3 count) as a mean over the people who have labels of both hips; 0 if nobody has.
 
-    joints (B, J, 3) m, labels (B, J, 4) with confidence c, in the same axes.
+    joints (B, N, 3) m, labels (B, N, 4) with confidence c, in the same axes; both are centred at the hips. hips: the
+    rows of hips, of one definition or of two, of which a person has labels of one. count: None for all N.
     """
     confidence = labels[..., 3]
-    labelled = (confidence[:, HIPS] > 0).all(dim=1).to(joints.dtype)
-    error = _centred(joints) - _centred(labels[..., :3])
-    of_people = (confidence * (error**2).mean(dim=-1)).mean(dim=1)
+    of_hips = (confidence[:, hips] > 0).to(joints.dtype)
+    labelled = (of_hips.sum(dim=1) == 2).to(joints.dtype)
+    error = _centred(joints, hips, of_hips) - _centred(labels[..., :3], hips, of_hips)
+    of_people = (confidence * (error**2).mean(dim=-1)).sum(dim=1) / (count or joints.shape[1])
     return (labelled * of_people).sum() / labelled.sum().clamp(min=1)
 
 
-def _centred(points: Tensor) -> Tensor:
-    return points - points[:, HIPS].mean(dim=1, keepdim=True)
+def _centred(points: Tensor, hips: Sequence[int], weights: Tensor) -> Tensor:
+    middle = (weights[..., None] * points[:, hips]).sum(dim=1) / weights.sum(dim=1).clamp(min=1)[:, None]
+    return points - middle[:, None]

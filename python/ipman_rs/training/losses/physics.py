@@ -22,7 +22,7 @@ class Physics(nn.Module):
     """`ipt.IntuitivePhysicsLoss` of a preset, its weights changed where `weights` says so.
 
     counted: whose bodies count. "labelled", as the authors' code has it: labelled parameters, and labelled as balanced
-    and as touching the ground. "world": all whose camera, pelvis and ground are known.
+    and as touching the ground. "world": all whose camera, hips and ground are known.
     """
 
     def __init__(
@@ -41,5 +41,5 @@ class Physics(nn.Module):
         valid = batch.has_world
         if self.counted == "labelled":
             valid = valid & batch.has_body & batch.standing & batch.contact
-        vertices = to_world(posed.vertices, posed.joints[:, 0], batch)
+        vertices = to_world(posed.vertices, posed.hips(batch.regressed), batch)
         return self.loss.weighted(vertices, batch.ground, valid)

@@ -23,7 +23,8 @@ from .positive_scale import positive_scale_loss
 
 @dataclass(frozen=True)
 class Weights:
-    """keypoint_maps: of `model.keypoint_maps_loss`, for the backbone "small"."""
+    """keypoint_maps: of `model.keypoint_maps_loss`, for the backbone "small". keypoints_2d_count: by how many keypoints
+    L_2D is divided; 0: by those that are asked for (SPIN: 49)."""
 
     keypoints_2d: float = 5.0
     joints_3d: float = 5.0
@@ -32,6 +33,7 @@ class Weights:
     scale: float = 1.0
     keypoint_maps: float = 0.0
     all: float = 60.0
+    keypoints_2d_count: int = 0
 
 
 class Loss(nn.Module):
@@ -64,8 +66,11 @@ class Loss(nn.Module):
 
     def _data_terms(self, estimate: Estimate, posed: Posed, batch: Batch) -> dict[str, Tensor]:
         return {
-            "keypoints_2d": keypoints_2d_loss(project(posed.keypoints, estimate.camera), batch.keypoints),
-            "joints_3d": joints_3d_loss(posed.joints, batch.joints),
+            "keypoints_2d": keypoints_2d_loss(
+                project(posed.keypoints, estimate.camera), batch.keypoints, self.weights.keypoints_2d_count
+            ),
+            # The regressor's joints come on top of the body's, but SPIN's mean is over 24, too.
+            "joints_3d": joints_3d_loss(posed.all_joints, batch.joints, self.posing.hips, posed.joints.shape[1]),
             "pose": pose_loss(estimate.rotations, batch.pose, batch.has_body),
             "betas": betas_loss(estimate.betas, batch.betas, batch.has_body),
             "scale": positive_scale_loss(estimate.camera),

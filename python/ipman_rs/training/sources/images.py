@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,14 +17,16 @@ from ipman_rs.body.embedded import NAMES
 from ipman_rs.data import DataSet, Frames
 
 from ..augment import Augmentation, Augmenting, Pixels, cut, follow, normalised, to_crop
+from ..posing import HIPS, REGRESSED
 from .source import BadSample
 
 Array = NDArray[np.floating]
 
-# Data sets with joints of their own mean other points by "neck" or "head" than SMPL does; in these they agree.
-SHARED = ("pelvis", *(f"{side}_{name}" for side in ("left", "right") for name in (
+# Data sets with joints of their own mean other points by "pelvis", "neck" or "head" than SMPL does. In these they
+# agree, in the hips but for centimetres: with SPIN's regressor they are labels of those that it makes.
+SHARED = tuple(f"{side}_{name}" for side in ("left", "right") for name in (
     "hip", "knee", "ankle", "shoulder", "elbow", "wrist",
-)))  # fmt: skip
+))  # fmt: skip
 KINDS = {24: "smpl", 52: "smplh", 55: "smplx"}  # of a model file, by its joints
 
 
@@ -32,8 +35,12 @@ class Images:
 
     keypoints: names of those that are asked for; a data set's others are left out. size: pixels of a crop's side.
     folder: where the paths of images begin, unless the data set brings its images. augmenting: how samples are changed
-    where a generator is given. Pose and betas of another body model count as not labelled. Frames without cameras give
-    the body in camera axes, as SPIN's files do; they have no world.
+    where a generator is given. regressed: hips and other joints that SMPL does not have are labels of those that SPIN's
+    regressor makes (`posing.REGRESSED`). Pose and betas of another body model count as not labelled. Frames without
+    cameras give the body in camera axes, as SPIN's files do; they have no world.
+
+    Where a person stands is told by the middle of the hips: by the body's joints, where the data set has these or the
+    body itself (neutral, in the world); else by the hips that it labels.
     """
 
     def __init__(
@@ -44,9 +51,12 @@ class Images:
         size: int = 224,
         augmenting: Augmenting | None = None,
         folder: Path = Path(),
+        regressed: bool = False,
     ) -> None:
         self.data, self.body, self.keypoints, self.size, self.folder = data, body, tuple(keypoints), size, folder
-        self.augmenting = augmenting or Augmenting()
+        self.augmenting, self.regressed = augmenting or Augmenting(), regressed
+        self.joints = (*body.joint_names, *(REGRESSED if regressed else ()))
+        self._warned = False
 
     def __len__(self) -> int:
         return len(self.data)
@@ -68,7 +78,7 @@ class Images:
             pixels = cut(self._image(frame, row), box, change, self.size)
         except (OSError, SyntaxError, ValueError) as error:
             raise BadSample(f"{frame.names[0]}: {error}") from None
-        return pixels, follow(self.labels(frame), whole, change, self.keypoints, self.body.joint_names)
+        return pixels, follow(self.labels(frame), whole, change, self.keypoints, self.joints)
 
     def labels(self, frame: Frames) -> dict[str, Tensor]:
         """Of the one image as it is: fields of `Batch`, keypoints in pixels. What is not labelled has zeros."""
@@ -83,26 +93,72 @@ class Images:
             pose[0] = camera @ pose[0]
             count = min(len(betas), frame.betas.shape[1])
             betas[:count] = frame.betas[0, :count]
-        own = tuple(frame.joint_names or ()) == self.body.joint_names
-        joints = _named(frame.joints, frame.joint_names, self.body.joint_names, 3, None if own else SHARED)
-        pelvis = joints[0, :3].copy()
+        among = None if self._are_own(frame.joint_names) else (*SHARED, *REGRESSED)
+        joints = _named(frame.joints, self._names(frame.joint_names), self.joints, 3, among)
+        hips, regressed = self._hips(frame, joints, labelled)
         joints[:, :3] = joints[:, :3] @ camera.T
-        world = frame.cameras is not None and frame.ground is not None and joints[0, 3] > 0
+        world = frame.cameras is not None and frame.ground is not None and hips is not None
         ground = _plane(frame)
         return {
-            "keypoints": _single(_named(frame.keypoints, frame.keypoint_names, self.keypoints, 2)),
+            "keypoints": _single(_named(frame.keypoints, self._names(frame.keypoint_names), self.keypoints, 2)),
             "joints": _single(joints),
             "pose": _single(pose),
             "betas": _single(betas),
             "has_body": torch.tensor(labelled),
             "camera": _single(camera),
-            "pelvis": _single(pelvis),
+            "hips": _single(np.zeros(3) if hips is None else hips),
+            "regressed": torch.tensor(regressed),
             "up": _single(ground[0]),
             "height": _single(ground[1]),
             "has_world": torch.tensor(world),
             "standing": torch.tensor(_flag(frame.standing)),
             "contact": torch.tensor(_flag(frame.contact)),
         }
+
+    def _hips(self, frame: Frames, joints: Array, labelled: bool) -> tuple[Array | None, bool]:
+        """Their middle (3,) in the axes of the frame, None where nothing tells it; whether it is the regressor's."""
+        if self._are_own(frame.joint_names) and (of_joints := _middle(joints, HIPS)) is not None:
+            return of_joints, False
+        of_body = self._hips_of_body(frame) if labelled else None
+        gender = "neutral" if frame.genders is None else str(frame.genders[0])
+        if of_body is not None and gender == "neutral":
+            return of_body, False
+        if self.regressed:
+            rows = [self.joints.index(f"{side}_hip_regressed") for side in ("left", "right")]
+            if (of_regressed := _middle(joints, rows)) is not None:
+                return of_regressed, True
+        of_joints = _middle(joints, HIPS)
+        found = of_body if of_joints is None else of_joints
+        if found is not None and frame.ground is not None:
+            self._warn(frame, "of its joints" if of_joints is not None else f"of a {gender} body")
+        return found, False
+
+    def _hips_of_body(self, frame: Frames) -> Array | None:
+        """Of the labelled body; None where it has no place or is not finite."""
+        if frame.pose is None or frame.betas is None or frame.transl is None:
+            return None
+        betas = frame.betas[0, : self.body.num_betas]
+        found = np.asarray(self.body(frame.pose[0], betas, frame.transl[0]).joints, float)[list(HIPS)]
+        return found.mean(axis=0) if np.isfinite(found).all() else None
+
+    def _warn(self, frame: Frames, which: str) -> None:
+        if not self._warned:
+            self._warned = True
+            warnings.warn(
+                f"{frame.names[0]}: bodies are put where the data set's hips are, {which}, which may lie centimetres "
+                f"from those of the body {self.body.name!r}; SPIN's J_regressor_extra.npy (model.regressor, "
+                "--regressor) makes the same ones where a data set labels hips",
+                stacklevel=4,
+            )
+
+    def _are_own(self, names: Sequence[str] | None) -> bool:
+        return tuple(names or ()) == self.body.joint_names
+
+    def _names(self, names: Sequence[str] | None) -> Sequence[str] | None:
+        """A data set's names of points: those that mean what the regressor makes are called as in `REGRESSED`."""
+        if names is None or not self.regressed or "spine1" in names:  # names of SMPL's family
+            return names
+        return [f"{name}_regressed" if f"{name}_regressed" in REGRESSED else name for name in names]
 
     def _is_own(self, name: str | None) -> bool:
         """Whether parameters of the body `name` are those of this model."""
@@ -145,6 +201,12 @@ def _named(
             found[index, :size] = point[:size]
             found[index, size] = point[size] if len(point) > size else 1.0
     return found
+
+
+def _middle(joints: Array, rows: Sequence[int]) -> Array | None:
+    """Of two joints (N, 4) with confidence; None if one is not labelled."""
+    both = joints[list(rows)]
+    return both[:, :3].mean(axis=0) if (both[:, 3] > 0).all() and np.isfinite(both).all() else None
 
 
 def _plane(frame: Frames) -> tuple[Array, Array]:

@@ -42,7 +42,8 @@ class Physics:
 class Model:
     """backbone: as in `model.backbone`, or "keypoints". pretrained: with ImageNet's weights. size: of the crop, pixels.
     start: a checkpoint of `ipman train` to start from; spin: one in SPIN's format. mean: SPIN's file of mean
-    parameters. dropout: of the regressor."""
+    parameters. regressor: SPIN's J_regressor_extra.npy, for hips and other joints as data sets label them. dropout: of
+    the regressor of bodies."""
 
     backbone: str = "resnet50"
     pretrained: bool = False
@@ -50,6 +51,7 @@ class Model:
     start: str = ""
     spin: str = ""
     mean: str = ""
+    regressor: str = ""
     dropout: float = 0.5
 
 
@@ -115,8 +117,14 @@ def config(content: Mapping[str, Any]) -> Config:
         raise ValueError(f"physics.preset: expected none or one of {', '.join(PRESETS)}, got {made.physics.preset!r}")
     if made.loss.keypoint_maps and made.model.backbone != "small":
         raise ValueError("loss.keypoint_maps: has maps with model.backbone: small alone")
+    if made.loss.keypoint_maps and made.model.regressor:
+        raise ValueError("loss.keypoint_maps: has no maps of the joints that model.regressor makes")
+    if made.loss.keypoints_2d_count < 0:
+        raise ValueError(f"loss.keypoints_2d_count: expected 0 or more, got {made.loss.keypoints_2d_count}")
     if made.schedule not in SCHEDULES:
         raise ValueError(f"schedule: expected one of {', '.join(SCHEDULES)}, got {made.schedule!r}")
+    if made.model.regressor and made.model.backbone == "keypoints":
+        raise ValueError("model.regressor: built people have the body's own joints; leave it out")
     if made.model.start and (made.model.spin or made.model.pretrained):
         raise ValueError("model.start: has all weights; leave out model.spin and model.pretrained")
     if not made.clip > 0:

@@ -10,9 +10,11 @@ from typing import Any
 from torch.utils.data import DataLoader, Dataset
 
 from ipman_rs.body import BodyModel
+from ipman_rs.body.joint_regressors import JointRegressor, read
 
 from ..batch import Batch
 from ..lifting.views import KEYPOINTS
+from ..posing import REGRESSED
 from ..sources import BadSample, Images, Mixture, People, Share, Source
 from ..sources.mixture import Steps
 from . import config
@@ -20,9 +22,15 @@ from . import config
 PEOPLE_SEED, VALIDATION_SEED = 41_000, 42_000
 
 
-def keypoint_names() -> tuple[str, ...]:
-    """The keypoints that every data set is asked for."""
-    return KEYPOINTS
+def keypoint_names(regressed: bool = False) -> tuple[str, ...]:
+    """The keypoints that every data set is asked for; with those that a regressor makes."""
+    return (*KEYPOINTS, *REGRESSED) if regressed else KEYPOINTS
+
+
+def regressor(settings: config.Config) -> JointRegressor | None:
+    """What `model.regressor` names. ValueError, naming the file, if it cannot be read."""
+    path = settings.model.regressor
+    return read(os.path.expanduser(path)) if path else None
 
 
 def source(told: config.DataSet, settings: config.Config, body: BodyModel, seed: int = PEOPLE_SEED) -> Source:
@@ -43,7 +51,9 @@ def source(told: config.DataSet, settings: config.Config, body: BodyModel, seed:
     except (OSError, TypeError, ValueError) as error:
         raise ValueError(f"data: {told.name}: {error}") from None
     folder = Path(os.path.expanduser(told.images))
-    return Images(data, body, keypoint_names(), settings.model.size, settings.augment, folder)
+    regressed = bool(settings.model.regressor)
+    names = keypoint_names(regressed)
+    return Images(data, body, names, settings.model.size, settings.augment, folder, regressed)
 
 
 def training_loader(settings: config.Config, body: BodyModel, start: int, rank: int, processes: int) -> DataLoader:

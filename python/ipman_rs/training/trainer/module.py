@@ -27,7 +27,8 @@ class Training(lightning.LightningModule):
     def __init__(self, settings: config.Config) -> None:
         super().__init__()
         self.settings = settings
-        posing = Posing(ipt.BodyModel(settings.body), data.keypoint_names())
+        regressor = data.regressor(settings)
+        posing = Posing(ipt.BodyModel(settings.body), data.keypoint_names(regressor is not None), regressor)
         self.body = posing.body.body
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(settings.seed)  # the same weights in every process
@@ -77,7 +78,9 @@ class Training(lightning.LightningModule):
         if batch is None:
             return
         batch = batch.sound()
-        found = columns(figures(self.model(batch.inputs), batch, Posing(ipt.BodyModel(self.body), ())))
+        found = columns(
+            figures(self.model(batch.inputs), batch, Posing(ipt.BodyModel(self.body), (), self.loss.posing.regressor))
+        )
         for number, key in enumerate(COLUMNS):
             values = torch.from_numpy(found[key][np.isfinite(found[key])])
             self._sums[dataloader_idx, number] += torch.tensor([values.sum(), len(values)], dtype=torch.float64)

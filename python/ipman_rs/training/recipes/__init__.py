@@ -1,0 +1,18 @@
+"""The paper's training runs, each a file to copy or to run: data sets in `data/`, where the files say.
+
+ipman-r           IPMAN-R on all data sets          ipman-r-human36m  fine-tuned on Human3.6M alone
+hmr-star          the baseline, without its terms
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+NAMES = tuple(sorted(path.stem for path in Path(__file__).parent.glob("*.yaml")))
+
+
+def path_of(name: str) -> Path:
+    """The file of a recipe. ValueError, listing all, for an unknown name."""
+    if name not in NAMES:
+        raise ValueError(f"{name}: no such file, nor a recipe; those are {', '.join(NAMES)}")
+    return Path(__file__).parent / f"{name}.yaml"
