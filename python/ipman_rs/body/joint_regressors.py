@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+# By SPIN's names of its 24 joints, in which Human3.6M's last of the head is "Head (H36M)", not LSP's top of the head.
 HUMAN36M = (
     "pelvis", "right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle", "spine", "neck",
-    "jaw", "head_top", "left_shoulder", "left_elbow", "left_wrist", "right_shoulder", "right_elbow", "right_wrist",
+    "jaw", "head", "left_shoulder", "left_elbow", "left_wrist", "right_shoulder", "right_elbow", "right_wrist",
 )  # fmt: skip
 EXTRA = ("right_hip", "left_hip", "neck", "head_top", "pelvis", "thorax", "spine", "jaw", "head")
 _NAMES = {len(names): names for names in (HUMAN36M, EXTRA)}
@@ -30,9 +31,7 @@ class JointRegressor:
     def joints(self, vertices: NDArray[np.floating]) -> NDArray[np.float64]:
         """Joints (..., K, 3) m of vertices (..., V, 3) m. ValueError for a mesh with another number of vertices."""
         if vertices.shape[-2] != self.weights.shape[1]:
-            raise ValueError(
-                f"regressor: is for {self.weights.shape[1]} vertices, but a body has {vertices.shape[-2]}"
-            )
+            raise ValueError(f"regressor: is for {self.weights.shape[1]} vertices, but a body has {vertices.shape[-2]}")
         # einsum sums in one order whatever the number of bodies; a matrix product does not.
         return np.einsum("kv,...vc->...kc", self.weights, vertices.astype(np.float64))
 
