@@ -180,7 +180,7 @@ def test_the_joints_of_the_literature_by_a_regressor(tmp_path, true, guessed, bo
         tmp_path / "out",
         files.save(tmp_path / "guess.npz", guessed),
         files.save(tmp_path / "truth.npz", true),
-        regressor=str(tmp_path / "regressor.npy"),
+        regressors=(str(tmp_path / "regressor.npy"),),
     )
     found = files.finish([job])["methods"]["guess"]["figures"]
     counted = [6, 5, 4, 1, 2, 3, 16, 15, 14, 11, 12, 13, 8, 10]  # SPIN's H36M_TO_J14

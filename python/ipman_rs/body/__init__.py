@@ -11,6 +11,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from . import embedded, poses, smpl_files
 from .model import BodyModel, BodyOutput
 from .parts import PART_NAMES
@@ -19,16 +22,27 @@ from .poses import posed
 __all__ = ["PART_NAMES", "BodyModel", "BodyOutput", "load_body", "posed", "poses"]
 
 
-def load_body(name_or_path: str | os.PathLike[str], *, num_betas: int = 10, flat_hand_mean: bool = False) -> BodyModel:
+def load_body(
+    name_or_path: str | os.PathLike[str],
+    *,
+    num_betas: int = 10,
+    flat_hand_mean: bool = False,
+    v_template: ArrayLike | None = None,
+) -> BodyModel:
     """The embedded body "anny" or "anny-lite", or a model file in the SMPL, SMPL+H or SMPL-X format (`.npz`, `.pkl`).
 
-    `num_betas` (shape components to keep) and `flat_hand_mean` (zero hand pose is the flat hand instead of the mean
-    hand; AMASS poses want True) apply to files. Nothing in the file is executed. Raises ValueError for an unknown
-    name and for a file that is missing, damaged, hostile or no body model, naming the file and what was expected.
+    `num_betas` (shape components to keep), `flat_hand_mean` (zero hand pose is the flat hand instead of the mean
+    hand; AMASS poses want True) and `v_template` (V, 3) m (a person's own body in the zero pose, instead of the mean
+    one) apply to files. Nothing in the file is executed. Raises ValueError for an unknown name, for a file that is
+    missing, damaged, hostile or no body model, naming the file and what was expected, and for a template of another
+    shape.
     """
     if name_or_path in embedded.NAMES:
+        if v_template is not None:
+            raise ValueError(f"v_template: is for model files; the body {name_or_path} has its own")
         return embedded.load(str(name_or_path))
     path = Path(name_or_path)
     if not path.is_file():
         raise ValueError(f"no body {str(name_or_path)!r}: it is neither one of {', '.join(embedded.NAMES)} nor a file")
-    return smpl_files.load(path, num_betas=num_betas, flat_hand_mean=flat_hand_mean)
+    template = None if v_template is None else np.asarray(v_template, np.float64)
+    return smpl_files.load(path, num_betas=num_betas, flat_hand_mean=flat_hand_mean, v_template=template)

@@ -21,11 +21,20 @@ HAND_KEYS = ("hands_meanl", "hands_meanr", "hands_componentsl", "hands_component
 Read = Callable[[str, tuple[int, ...]], NDArray[Any]]
 
 
-def load(path: Path, num_betas: int = 10, flat_hand_mean: bool = False) -> BodyModel:
+def load(
+    path: Path,
+    num_betas: int = 10,
+    flat_hand_mean: bool = False,
+    v_template: NDArray[np.float64] | None = None,
+) -> BodyModel:
     """The body model in `path`; see `ipman_rs.load_body`. Raises ValueError naming the file and what was expected."""
     read, keys = _open(path)
-    v_template = read("v_template", (-1, 3))
-    num_vertices = len(v_template)
+    mean = read("v_template", (-1, 3))
+    num_vertices = len(mean)
+    if v_template is None:
+        v_template = mean
+    elif v_template.shape != mean.shape:
+        raise ValueError(f"v_template: expected {mean.shape}, as {path} has, got {v_template.shape}")
     parents = _parents(path, read("kintree_table", (2, -1)))
     names = joints.BY_COUNT.get(len(parents))
     if names is None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..evaluation.tables.paper import Table
 
 # Kept equal to `ipman_rs.evaluation.tables.paper.TABLES` by a test.
-TABLES = ("rich", "h36m", "moyo", "biomech", "com", "3dpw", "push-pull")
+TABLES = ("rich", "h36m", "moyo", "biomech", "com", "3dpw", "push-pull", "rich-o-star")
 
 
 class ShardOf(click.ParamType):
@@ -47,8 +47,9 @@ class ShardOf(click.ParamType):
     help="Body models: SMPL_NEUTRAL.pkl, SMPLX_MALE.npz … anywhere below it.",
 )  # fmt: skip
 @click.option(
-    "--regressor", type=click.Path(path_type=Path), metavar="FILE",
-    help="J_regressor_h36m.npy: compare the 14 joints of the literature instead of the body model's.",
+    "--regressor", "regressors", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
+    help="J_regressor_h36m.npy: compare the 14 joints of the literature instead of the body model's. "
+    "J_regressor_extra.npy: SPIN's joints that SMPL does not have. May be given twice.",
 )  # fmt: skip
 @click.option(
     "--preset", type=click.Choice(PRESETS), default="paper-r", show_default=True, help="Constants of the pressure."
@@ -110,9 +111,15 @@ def _jobs(predictions: tuple[Path, ...], output: Path, given: dict[str, Any]) ->
     if given["path"] is None:
         raise click.UsageError(f"Missing option '--path', where {name} is.")
     split = given["split"] or (table.split if table is not None and name == table.data else None)
-    source = Source(name, str(given["path"]), split, given["options"])
-    words = {key: None if given[key] is None else str(given[key]) for key in ("models", "regressor")}
-    shared = {**words, "preset": given["preset"], "partial": given["partial"], "folder": str(output)}
+    defaults = table.options if table is not None and name == table.data else {}
+    source = Source(name, str(given["path"]), split, tuple({**defaults, **dict(given["options"])}.items()))
+    shared = {
+        "models": None if given["models"] is None else str(given["models"]),
+        "regressors": tuple(str(path) for path in given["regressors"]),
+        "preset": given["preset"],
+        "partial": given["partial"],
+        "folder": str(output),
+    }
     names = methods(predictions)
     return table, [Job(name, str(path), source, **shared) for name, path in zip(names, predictions, strict=True)]
 
@@ -165,8 +172,10 @@ def _report(jobs: list[Job], table: Table | None, output: Path) -> None:
         differences = [difference(job, jobs[0], count) for job in jobs[1:]]
     source = jobs[0].source
     title = table.title if table else f"{' and '.join(job.name for job in jobs)} on {source.name}"
-    where = f"Data: {source.name}{f', {source.split}' if source.split else ''}, {len(jobs[0].data):,} frames"
-    made = report.Report(title, f"{where} ({source.path}).", found, differences, table)
+    parts = [source.name, *([source.split] if source.split else []), *(f"{k}={v}" for k, v in source.options)]
+    where = f"Data: {', '.join(parts)}, {len(jobs[0].data):,} frames ({source.path})."
+    definitions = {job.name: job.definition for job in jobs}
+    made = report.Report(title, where, found, differences, table, definitions)
     with console.progress("writing", frames) as step:
         written = report.write(made, output, jobs, _counter(step))
     console.print_rows(*report.rows(made))

@@ -69,6 +69,7 @@ class Frames:
     pose: Array | None = None  # (F, J, 3) rotation vectors, the root's first, relative to the parent's
     betas: Array | None = None  # (F, n)
     transl: Array | None = None  # (F, 3) m
+    rest_shape: str | None = None  # path of a mesh: the person's own body in the zero pose, whatever the betas say
     vertices: Array | None = None  # (F, V, 3) m
     joints: Array | None = None  # (F, K, 3) m
     joint_names: Sequence[str] | None = None  # K

@@ -11,8 +11,16 @@
 
 World: metres, z up, the floor at z = 0. Frame i of pressure (of the CSV's rows), of the centre of mass and of the body
 are of one time; image n shows frame 2n. The mat's columns run along -x and its rows along -y; its cells are centred in
-the rectangle of the four corners. What a sequence lacks is NaN. Hands are absolute (`flat_hand_mean=True`), and the
-authors pose a template of her own (`v_template`, in their toolkit), not the mean body.
+the rectangle of the four corners. What a sequence lacks is NaN. Hands are absolute (`flat_hand_mean=True`).
+
+The authors pose a template of her own with betas of zero, `data/v_templates/…/mesh.ply` of their toolkit:
+`v_template=mesh.ply` does the same; without it her betas shape the mean female body.
+
+`frames="selected"`: one still frame a sequence instead of all, which most of the time show somebody stepping onto the
+mat, into the pose and out of it. The authors chose theirs by hand, in `moyo/utils/constants.py` of their toolkit:
+`frames=constants.py` (or a `.json` {pose: image}) takes that choice, "selected" one by rule: of the middle half of a
+sequence the even frame about which the body turns least (see `moyo_stills`). A list's figures are the paper's, the
+rule's are near them. Sequences that a list does not have are left out.
 
 Where it comes from: the project's own site, MOYO; the scripts in its repository moyo_toolkit fetch it.
 """
@@ -31,10 +39,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import safe_pickle
+from ipman_rs.body import mesh_file, safe_pickle
 from ipman_rs.ground import Ground
 
-from . import c3d, safe_xml, sequences
+from . import c3d, moyo_stills, safe_xml, sequences
 from .check import Finding
 from .frames import Cameras, DataSet, Frames, PressureMaps
 
@@ -83,25 +91,46 @@ class Recorded:
         return self.session / "images" / self.split / self.name / f"YOGI_Cam_{camera:02d}"
 
 
-def open(path: str | os.PathLike[str], split: str | None = None, *, camera: int | None = None) -> DataSet:
+def open(
+    path: str | os.PathLike[str],
+    split: str | None = None,
+    *,
+    camera: int | None = None,
+    frames: str = "all",
+    v_template: str | os.PathLike[str] | None = None,
+) -> DataSet:
     """The frames of all sequences of a session, or of both; `split`: "train", "val", None for both.
 
-    `camera`: 1 to 8 for the frames of which it has an image, with the camera, at 30 Hz. The bodies of all sequences
-    are read when it is opened, for their lengths; pressure and centres of mass when their frames are asked for. Raises
-    ValueError naming the file for what is damaged, of unequal lengths, or in units or axes that cannot be; ImportError
-    where there are `.c3d` files and the extra is not installed.
+    `camera`: 1 to 8 for the frames of which it has an image, with the camera, at 30 Hz. `frames`: "all", "selected" for
+    one still frame a sequence by rule, or the file of a list of chosen frames. `v_template`: a `.ply` or `.obj` file of
+    her own body in the zero pose, posed without betas (both see above). The bodies of all sequences are read when it is
+    opened, for their lengths; pressure and centres of mass when their frames are asked for. Raises ValueError naming
+    the file for what is damaged, of unequal lengths, or in units or axes that cannot be; ImportError where there are
+    `.c3d` files and the extra is not installed.
     """
     root = Path(path)
+    if frames not in ("all", "selected") and Path(frames).suffix not in (".py", ".json"):
+        raise ValueError(f"frames: expected all, selected, or a list in a .py or .json file, got {frames!r}")
+    chosen = None if frames in ("all", "selected") else moyo_stills.Chosen(frames)
+    if v_template is not None:
+        mesh_file.vertices(v_template)  # is there, and a body
     found = _sequences(root, split)
     parts = (any(each.mat[0].is_file() for each in found), any(each.com.is_file() for each in found))
-    lengths = [len(_body(each).names) for each in found]
-    rows = [np.arange(length) for length in lengths]
-    if camera is not None:
-        rows = [_pictured(each, camera, length) for each, length in zip(found, lengths, strict=True)]
+    rows = []
+    for each in found:
+        body = _body(each)
+        wanted = moyo_stills.selected(frames, body, chosen)
+        rows.append(wanted if camera is None else np.intersect1d(wanted, _pictured(each, camera, len(body))))
+
+    if chosen is not None and not any(map(len, rows)):
+        raise ValueError(f"{frames}: has none of the poses in {root}, such as {found[0].name}")
 
     def sequence(index: int) -> Frames:
-        frames = _frames(found[index], *parts)
-        return frames if camera is None else _seen(found[index], frames[rows[index]], camera, rows[index])
+        whole = replace(_frames(found[index], *parts), rest_shape=None if v_template is None else str(v_template))
+        some = whole if frames == "all" and camera is None else whole[rows[index]]
+        if frames != "all":
+            some = replace(some, frame_rate=None)
+        return some if camera is None else _seen(found[index], some, camera, rows[index])
 
     return sequences.demanded(root, sequences.sequences([len(part) for part in rows], sequence, path))
 
@@ -415,7 +444,8 @@ def _seen(files: Recorded, frames: Frames, camera: int, rows: NDArray[np.int64])
     view = _camera(files, camera)
     spread = (np.broadcast_to(part, (count, *part.shape)) for part in view)
     images = np.array([str(by_number[row // 2]) for row in rows.tolist()] or np.empty(0, "U1"))
-    return replace(frames, frame_rate=IMAGE_RATE, images=images, cameras=Cameras(*spread))
+    rate = None if frames.frame_rate is None else IMAGE_RATE
+    return replace(frames, frame_rate=rate, images=images, cameras=Cameras(*spread))
 
 
 def _camera(files: Recorded, camera: int) -> tuple[Array, Array, Array]:

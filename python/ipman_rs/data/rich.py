@@ -102,7 +102,7 @@ def open(
     path: str | os.PathLike[str],
     split: str | None = None,
     *,
-    cameras: Sequence[int] | None = None,
+    cameras: Sequence[int] | int | None = None,
     hands: Hands | None = None,
 ) -> DataSet:
     """The frames of a split (see above; None: all sequences there are), seen by these cameras.
@@ -155,9 +155,9 @@ def _folders(root: Path, split: str | None) -> list[Path]:
     return list(folders.values())
 
 
-def _cameras(root: Path, folder: Path, split: str | None, wanted: Sequence[int] | None) -> Sequence[int]:
+def _cameras(root: Path, folder: Path, split: str | None, wanted: Sequence[int] | int | None) -> Sequence[int]:
     if wanted is not None:
-        return wanted
+        return (wanted,) if isinstance(wanted, int) else wanted
     if split in ("ipman-train", "ipman-test"):
         calibrated = sorted(_calibration(root, folder).glob("*.xml"))
         numbers = [int(file.stem) for file in calibrated if file.stem.isdigit()]

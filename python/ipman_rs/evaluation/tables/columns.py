@@ -18,7 +18,7 @@ from ipman_rs.data.frames import Frames
 from ipman_rs.ground import Ground
 
 from .. import bose, com_error, cop_error, foot_skating, hover, moyo, mpjpe, pa_mpjpe, penetration, pve, reasons, tilt
-from .joints import joints_of, named
+from .joints import compared
 from .models import Bodies
 
 if TYPE_CHECKING:
@@ -84,14 +84,15 @@ def _finite(bodies: Bodies, count: int) -> NDArray[np.bool_]:
 def _points(truth: Bodies, guess: Bodies, job: Job) -> Columns:
     """Errors of joints and vertices."""
     found: Columns = {}
-    compared = joints_of(truth, guess, job.known_joints, job.joint_regressor)
-    if compared is not None:
-        found["mpjpe"] = pve(compared.estimated, compared.true, compared.root, compared.true_root)
-        found["pa_mpjpe"] = pa_mpjpe(compared.estimated, compared.true)
-        found["mpjpe_world"] = mpjpe(compared.estimated, compared.true, root=None)
+    joints = None
+    if job.definition is not None:
+        joints = compared(truth, guess, job.definition, job.joint_regressors)
+        found["mpjpe"] = pve(joints.estimated, joints.true, joints.root, joints.true_root)
+        found["pa_mpjpe"] = pa_mpjpe(joints.estimated, joints.true)
+        found["mpjpe_world"] = mpjpe(joints.estimated, joints.true, root=None)
     if truth.vertices is not None and guess.vertices is not None and truth.vertices.shape == guess.vertices.shape:
-        if compared is not None:
-            found["pve"] = pve(guess.vertices, truth.vertices, compared.root, compared.true_root)
+        if joints is not None and job.definition is not None and job.definition.same:
+            found["pve"] = pve(guess.vertices, truth.vertices, joints.root, joints.true_root)
         found["pve_world"] = pve(guess.vertices, truth.vertices)
     return found
 
@@ -99,7 +100,11 @@ def _points(truth: Bodies, guess: Bodies, job: Job) -> Columns:
 def _tilt(truth: Bodies, guess: Bodies, ground: Ground, true_ground: Ground) -> Columns:
     if not {*_PELVIS} <= {*truth.joint_names} & {*guess.joint_names}:
         return {}
-    return {"tilt": tilt(named(guess, _PELVIS), named(truth, _PELVIS), ground, true_ground)}
+    return {"tilt": tilt(_pelvis(guess), _pelvis(truth), ground, true_ground)}
+
+
+def _pelvis(bodies: Bodies) -> NDArray[Any]:
+    return np.asarray(bodies.joints)[:, [bodies.joint_names.index(name) for name in _PELVIS]]
 
 
 def _balance(vertices: NDArray[Any], model: BodyModel, ground: Ground, true: Frames) -> Columns:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 _JOINTS = "pelvis (or hips) and other joints of the same names in the data and in the predictions"
 _MESH = "bodies of one mesh in the data and in the predictions"
+_ALIGNED = f"{_MESH}, and a pelvis of one definition (the same body model, or --regressor)"
 _FLOOR = "a body model for the predictions, and a ground"
 _COM = "a measured centre of mass, and a body model for the predictions"
 _COP = "a measured centre of pressure, and what BoSE needs"
@@ -46,7 +47,7 @@ FIGURES = {
     "mpjpe": _mm("MPJPE", "mean distance of the joints, aligned at the pelvis", _JOINTS),
     "pa_mpjpe": _mm("PA-MPJPE", "after the best rotation, scale and translation", _JOINTS),
     "mpjpe_world": _mm("MPJPE world", "mean distance of the joints where they stand", _JOINTS),
-    "pve": _mm("PVE", "mean distance of the vertices, aligned at the pelvis", _MESH),
+    "pve": _mm("PVE", "mean distance of the vertices, aligned at the pelvis", _ALIGNED),
     "pve_world": _mm("PVE world", "mean distance of the vertices where they stand", _MESH),
     "bose": _percent("BoSE", "share with the centre of mass over the base of support, contacts within 10 cm"),
     "bose_3cm": _percent("BoSE 3 cm", "contacts within 3 cm"),

@@ -8,12 +8,13 @@ and what comes out is the same: the final figures are made of all pieces, howeve
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +25,9 @@ from ipman_rs.data import check
 from ipman_rs.data.frames import DataSet, Frames
 from ipman_rs.ground import Ground
 
-from . import joints
 from . import predictions as predicted
 from .columns import Columns, columns
+from .joints import Definition, Regressors, define
 from .models import Models
 from .rows import being_written
 
@@ -42,18 +43,29 @@ class Source:
     name: str
     path: str
     split: str | None = None
-    options: tuple[tuple[str, str | float], ...] = ()
+    options: tuple[tuple[str, str | int | float], ...] = ()
 
-    def open(self, unpacked: Path) -> DataSet:
+    def open(self, unpacked: Path, models: Models) -> DataSet:
         """ValueError naming the file where there is none or something is wrong."""
         if self.name == OWN:
             return predicted.read(self.path, unpacked)
         if self.name not in data.DATASETS:
             raise ValueError(f"data: expected {OWN}, or one of {', '.join(data.DATASETS)}, got {self.name!r}")
-        options = dict(self.options) if self.split is None else {"split": self.split, **dict(self.options)}
+        options: dict[str, Any] = {**({} if self.split is None else {"split": self.split}), **dict(self.options)}
+        known = [*inspect.signature(data.module(self.name).open).parameters][1:]
+        for name in options:
+            if name not in known or name == "hands":
+                raise ValueError(f"{self.name}: has no option {name!r}; it has {', '.join(known)}")
         if not Path(self.path).exists():
             raise ValueError(f"{self.path}: there is no such file or folder; it should hold the data set {self.name}")
+        if "hands" in known:  # without them fingers would be straight
+            options["hands"] = models.hands()
         return data.open(self.name, self.path, **options)
+
+    @property
+    def made_of(self) -> list[list[Any]]:
+        """The options; of those that are files what is in them, for other machines have other paths."""
+        return [[name, predicted.fingerprint(Path(value)) if is_file(value) else value] for name, value in self.options]
 
 
 @dataclass(frozen=True)
@@ -82,7 +94,7 @@ class Job:
     source: Source
     folder: str
     models: str | None = None
-    regressor: str | None = None
+    regressors: tuple[str, ...] = ()
     preset: str = "paper-r"
     partial: bool = False
     piece: int = PIECE
@@ -97,7 +109,7 @@ class Job:
 
     @cached_property
     def data(self) -> DataSet:
-        return self.source.open(self.unpacked)
+        return self.source.open(self.unpacked, self.bodies)
 
     @cached_property
     def estimates(self) -> predicted.Predictions:
@@ -108,17 +120,27 @@ class Job:
         return Models(None if self.models is None else Path(self.models))
 
     @cached_property
-    def joint_regressor(self) -> NDArray[np.floating] | None:
-        return None if self.regressor is None else joints.read_regressor(Path(self.regressor))
+    def joint_regressors(self) -> Regressors:
+        return Regressors.read(self.regressors)
 
     @cached_property
-    def known_joints(self) -> frozenset[str]:
-        """Names of the true joints that have numbers in some frame of a sample."""
-        bodies = self.bodies.posed(check.sample(self.data))
-        if bodies.joints is None:
-            return frozenset()
-        named = enumerate(bodies.joint_names)
-        return frozenset(name for k, name in named if np.isfinite(bodies.joints[:, k]).all(axis=1).any())
+    def without_bodies(self) -> bool:
+        """Whether the data set has measured joints, and in a sample of its frames no pose that is known."""
+        some = check.sample(self.data)
+        return some.joints is not None and some.pose is not None and not np.isfinite(some.pose).all(axis=(1, 2)).any()
+
+    @cached_property
+    def definition(self) -> Definition | None:
+        """Which joints are compared, told by a few frames. ValueError where they would be of unlike definitions."""
+        some = check.sample(self.data)
+        measured: frozenset[str] = frozenset()
+        if some.joints is not None:
+            known = np.asarray(np.isfinite(some.joints).all(axis=2))
+            named = enumerate(some.joint_names or ())
+            measured = frozenset(name for k, name in named if known[:, k].any())
+        truth = self.bodies.posed(self._truth(slice(0, 1)))
+        guess = truth if self.predictions == TRUTH else self.bodies.posed(self.estimates[slice(0, 1)])
+        return define(truth, guess, measured, self.joint_regressors, self.source.name)
 
     @property
     def pieces(self) -> int:
@@ -130,7 +152,7 @@ class Job:
 
     def begin(self) -> None:
         """Makes the folder; ValueError where it holds the figures of something else, or lengths cannot fit."""
-        _ = self.joint_regressor  # fails early
+        _ = self.joint_regressors  # fails early
         self.place.mkdir(parents=True, exist_ok=True)
         file = self.place / "made_of.json"
         if file.exists():
@@ -142,6 +164,7 @@ class Job:
             )
         if self.predictions != TRUTH:
             self._check_axes()
+        _ = self.definition
         with being_written(file) as out:
             out.write((json.dumps(self.made_of, indent=1) + "\n").encode())
 
@@ -172,10 +195,10 @@ class Job:
             if isinstance(true, predicted.Predictions)
             else _content(check.sample(true, 16)),
             "split": self.source.split,
-            "options": [list(each) for each in self.source.options],
+            "options": self.source.made_of,
             "frames": len(self.data),
             "models": {path.name: predicted.fingerprint(path) for path in sorted(files)},
-            "regressor": None if self.regressor is None else predicted.fingerprint(Path(self.regressor)),
+            "regressors": sorted(predicted.fingerprint(Path(path)) for path in self.regressors),
             "preset": self.preset,
             "partial": self.partial,
             "piece": self.piece,
@@ -236,7 +259,7 @@ class Job:
 
     def pair(self, rows: slice) -> tuple[Frames, Frames, NDArray[np.int64]]:
         """True and estimated frames of the same names, and their numbers. ValueError where some have no estimate."""
-        true = self.data[rows]
+        true = self._truth(rows)
         if self.predictions == TRUTH:
             return true, true, rows.start + np.arange(len(true))
         where = self.estimates.index.find(true.names)
@@ -249,6 +272,14 @@ class Job:
             )
         there = np.flatnonzero(where >= 0)
         return true[there], self.estimates[where[there]], rows.start + there
+
+    def _truth(self, rows: slice) -> Frames:
+        true = self.data[rows]
+        return replace(true, pose=None) if self.without_bodies else true
+
+
+def is_file(value: str | int | float) -> TypeGuard[str]:
+    return isinstance(value, str) and Path(value).is_file()
 
 
 def _content(frames: Frames) -> str:

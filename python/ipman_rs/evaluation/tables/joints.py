@@ -1,88 +1,239 @@
-"""Which joints of two skeletons are compared: those of one name, or those that a regressor makes of the vertices."""
+"""Which joints are compared, and what makes them on either side.
+
+Where truth and estimate are bodies, both sides' joints are made of their bodies in one way: of the vertices by the same
+regressor, or, without a regressor, by the body model that both have. Joints that a data set measured are compared only
+where it has no bodies, or where the estimate is joints without a body; they then go by their names.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.body import joint_regressors
+from ipman_rs.body.joint_regressors import HUMAN36M, JointRegressor
+
 from .models import Bodies
 
-# The rows of the regressor J_regressor_h36m.npy of Human3.6M's joints, and those of them that are counted: the 14 that
-# LSP has, too, by which the literature compares. The pelvis is the root, and not counted.
-HUMAN36M = (
-    "pelvis", "right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle", "spine", "neck",
-    "jaw", "head_top", "left_shoulder", "left_elbow", "left_wrist", "right_shoulder", "right_elbow", "right_wrist",
-)  # fmt: skip
+Points = NDArray[Any]
+Maker = Literal["given", "own", "extra", "h36m"]
+
+# The 14 of Human3.6M's 17 joints by which the literature compares (SPIN's H36M_TO_J14). The pelvis is the root, and not
+# counted; MPI-INF-3DHP counts all 17.
 COUNTED = (
     "right_ankle", "right_knee", "right_hip", "left_hip", "left_knee", "left_ankle", "right_wrist", "right_elbow",
-    "right_shoulder", "left_shoulder", "left_elbow", "left_wrist", "neck", "head_top",
+    "right_shoulder", "left_shoulder", "left_elbow", "left_wrist", "neck", "head",
 )  # fmt: skip
+ALL_17 = (*COUNTED, "pelvis", "spine", "jaw")
+ROOTS = (("pelvis",), ("left_hip", "right_hip"))
+# By which regressor a body gets the joints that a data set measured, and the file that is asked for.
+MEASURED: dict[str, tuple[Maker, str]] = {
+    "human36m": ("h36m", "J_regressor_h36m.npy"),
+    "mpi-inf-3dhp": ("h36m", "J_regressor_h36m.npy"),
+    "rich-ipman": ("extra", "J_regressor_extra.npy"),
+}
+
+
+@dataclass(frozen=True)
+class Regressors:
+    """Those that the user gave: Human3.6M's joints, and SPIN's extra ones."""
+
+    human36m: JointRegressor | None = None
+    extra: JointRegressor | None = None
+
+    @classmethod
+    def read(cls, paths: Sequence[str]) -> Regressors:
+        """ValueError, naming the file, for one that is damaged, or the second of its kind."""
+        found: dict[str, JointRegressor] = {}
+        for path in paths:
+            regressor = joint_regressors.read(path)
+            kind = "human36m" if regressor.names == HUMAN36M else "extra"
+            if kind in found:
+                raise ValueError(f"{path}: expected one regressor of {len(regressor.names)} joints, got two")
+            found[kind] = regressor
+        return cls(**found)
+
+
+@dataclass(frozen=True)
+class Definition:
+    """The joints that are compared.
+
+    names: those that are counted. roots: the pelvis, or both hips, whose mean both sides are aligned at. truth,
+    estimate: what makes the joints of each side: "given" by a file, the body's "own", "h36m" or "extra" by a regressor
+    of the vertices. same: both sides by one definition, so that equal bodies have equal joints. words: the same for a
+    reader.
+    """
+
+    names: tuple[str, ...]
+    roots: tuple[str, ...]
+    truth: Maker
+    estimate: Maker
+    same: bool
+    words: str
 
 
 @dataclass(frozen=True)
 class Compared:
-    """Joints (F, K, 3) of the same names, and the pelvis (F, 3) of each."""
+    """Joints (F, K, 3) of the same names, and the root (F, 3) of each."""
 
-    names: tuple[str, ...]
-    true: NDArray[Any]
-    estimated: NDArray[Any]
-    true_root: NDArray[Any]
-    root: NDArray[Any]
+    true: Points
+    estimated: Points
+    true_root: Points
+    root: Points
 
 
-def joints_of(truth: Bodies, guess: Bodies, known: frozenset[str], regressor: NDArray[Any] | None) -> Compared | None:
-    """The joints that two bodies share; None where there are fewer than three, or no pelvis and no hips.
+def define(
+    truth: Bodies, estimate: Bodies, measured: frozenset[str], regressors: Regressors, data: str
+) -> Definition | None:
+    """How these two are compared; None where they share fewer than three joints, or no pelvis and no hips.
 
-    known: those that the data set has numbers for, of the ones that it names.
+    measured: the data set's own joints that have numbers in some frame. data: name of the data set. ValueError where a
+    body would be held against joints of another definition, or where the truth is bodies whose model is missing.
     """
-    truth = Bodies(truth.vertices, truth.joints, tuple(n if n in known else "" for n in truth.joint_names), truth.model)
-    if regressor is not None:
-        measured = {*COUNTED} <= {*truth.joint_names}  # by the data set, which goes before its own body's
-        truth, guess = truth if measured else _regressed(truth, regressor), _regressed(guess, regressor)
-    if truth.joints is None or guess.joints is None:
+    if truth.without_model is not None and estimate.vertices is not None and estimate.given is None:
+        kind = truth.without_model
+        raise ValueError(
+            f"{data}: its truth is bodies of {kind}, to which predicted bodies are compared: --models FOLDER with "
+            f"{kind.upper()}_NEUTRAL.npz or .pkl"
+        )
+    makers = _makers(truth, estimate, regressors, data)
+    if makers is None:
         return None
-    shared = tuple(name for name in truth.joint_names if name and name in guess.joint_names)
-    roots = next((each for each in (("pelvis",), ("left_hip", "right_hip")) if {*each} <= {*shared}), None)
-    names = tuple(name for name in COUNTED if name in shared) if regressor is not None else shared
+    theirs = [name for name in _names(truth, makers[0], regressors) if makers[0] != "given" or name in measured]
+    ours = {*_names(estimate, makers[1], regressors)}
+    shared = tuple(name for name in theirs if name in ours)
+    roots = next((each for each in ROOTS if {*each} <= {*shared}), None)
+    counted = ALL_17 if data == "mpi-inf-3dhp" else COUNTED
+    names = shared if regressors.human36m is None else tuple(name for name in counted if name in shared)
     if roots is None or len(names) < 3:
         return None
+    same = _same(truth, estimate, makers)
+    return Definition(names, roots, *makers, same, _words(truth, estimate, makers, same, names, roots))
+
+
+def compared(truth: Bodies, estimate: Bodies, definition: Definition, regressors: Regressors) -> Compared:
+    """The joints of a definition."""
+    true = _by_name(truth, definition.truth, regressors)
+    guess = _by_name(estimate, definition.estimate, regressors)
     return Compared(
-        names,
-        named(truth, names),
-        named(guess, names),
-        named(truth, roots).mean(axis=1),
-        named(guess, roots).mean(axis=1),
+        _stacked(true, definition.names),
+        _stacked(guess, definition.names),
+        _stacked(true, definition.roots).mean(axis=1),
+        _stacked(guess, definition.roots).mean(axis=1),
     )
 
 
-def read_regressor(path: Path) -> NDArray[np.floating]:
-    """The (17, V) matrix that makes Human3.6M's joints of SMPL's vertices, from an .npy file. ValueError naming it."""
-    try:
-        found = np.load(path, allow_pickle=False)
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: the regressor cannot be read ({error}); expected J_regressor_h36m.npy") from error
-    if found.ndim != 2 or found.shape[0] != len(HUMAN36M) or found.dtype.kind != "f":
-        raise ValueError(f"{path}: expected a regressor of {len(HUMAN36M)} rows, got {found.dtype} {found.shape}")
-    return found.astype(np.float64)
+def _by_name(bodies: Bodies, maker: Maker, regressors: Regressors) -> dict[str, Points]:
+    points = np.moveaxis(_points(bodies, maker, regressors), 1, 0)
+    return dict(zip(_names(bodies, maker, regressors), points, strict=True))
 
 
-def _regressed(bodies: Bodies, regressor: NDArray[Any]) -> Bodies:
-    """The same with the joints of the regressor, where there are vertices."""
-    if bodies.vertices is None:
-        return bodies
-    if bodies.vertices.shape[1] != regressor.shape[1]:
-        raise ValueError(f"regressor: is for {regressor.shape[1]} vertices, but a body has {bodies.vertices.shape[1]}")
-    # einsum sums in one order whatever the number of bodies; a matrix product does not.
-    joints = np.einsum("kv,fvc->fkc", regressor, bodies.vertices.astype(np.float64))
-    return Bodies(bodies.vertices, joints, HUMAN36M, bodies.model)
+def _stacked(points: dict[str, Points], names: Sequence[str]) -> Points:
+    return np.stack([points[name] for name in names], axis=1)
 
 
-def named(bodies: Bodies, names: tuple[str, ...]) -> NDArray[Any]:
-    """Joints (F, K, 3) of these names. ValueError where there are none."""
-    if bodies.joints is None:
-        raise ValueError("joints: expected some")
-    return bodies.joints[:, [bodies.joint_names.index(name) for name in names]]
+def _makers(truth: Bodies, estimate: Bodies, regressors: Regressors, data: str) -> tuple[Maker, Maker] | None:
+    """What makes the joints of the truth and of the estimate; None where one has neither joints nor a body."""
+    true: Maker | None = None
+    guess: Maker | None = None
+    if truth.vertices is not None and estimate.vertices is not None:
+        true, guess = _of_body(truth, regressors), _of_body(estimate, regressors)
+    elif estimate.given is not None:
+        true, guess = "given" if truth.given is not None else _of_body(truth, regressors), "given"
+    elif truth.given is not None and estimate.vertices is not None:
+        true, guess = "given", _as_measured(estimate, regressors, data)
+    return None if true is None or guess is None else (true, guess)
+
+
+def _of_body(bodies: Bodies, regressors: Regressors) -> Maker | None:
+    if bodies.vertices is not None and regressors.human36m is not None:
+        return "h36m"
+    if bodies.vertices is not None and regressors.extra is not None:
+        return "extra"
+    return "own" if bodies.own is not None else "given" if bodies.given is not None else None
+
+
+def _as_measured(estimate: Bodies, regressors: Regressors, data: str) -> Maker | None:
+    """What gives a body the joints that a data set measured. ValueError where that takes a regressor."""
+    if data not in MEASURED:
+        return _of_body(estimate, regressors)
+    maker, file = MEASURED[data]
+    if (regressors.human36m if maker == "h36m" else regressors.extra) is None:
+        raise ValueError(
+            f"{data}: has measured joints and no bodies here, and the predictions are bodies, whose own hips, pelvis, "
+            f"neck and head are other points: --regressor {file} makes the measured ones of the predicted vertices "
+            "(or give joints and joint_names beside the pose)"
+        )
+    return maker
+
+
+def _names(bodies: Bodies, maker: Maker, regressors: Regressors) -> tuple[str, ...]:
+    if maker == "given":
+        return bodies.given_names
+    if maker == "own":
+        return bodies.own_names
+    if maker == "h36m" and regressors.human36m is not None:
+        return regressors.human36m.names
+    extra = () if regressors.extra is None else regressors.extra.names
+    return (*extra, *(name for name in bodies.own_names if name not in extra))
+
+
+def _points(bodies: Bodies, maker: Maker, regressors: Regressors) -> Points:
+    """Joints (F, K, 3) of `_names`."""
+    if maker == "given":
+        return _there(bodies.given)
+    if maker == "own":
+        return _there(bodies.own)
+    if maker == "h36m" and regressors.human36m is not None:
+        return regressors.human36m.joints(_there(bodies.vertices))
+    if regressors.extra is None:
+        raise ValueError("joints: expected a regressor")
+    points = [regressors.extra.joints(_there(bodies.vertices))]
+    if bodies.own is not None:
+        points.append(bodies.own[:, [name not in regressors.extra.names for name in bodies.own_names]])
+    return np.concatenate(points, axis=1)
+
+
+def _there(points: Points | None) -> Points:
+    if points is None:
+        raise ValueError("joints: some frames have none, others have them")
+    return points
+
+
+def _same(truth: Bodies, estimate: Bodies, makers: tuple[Maker, Maker]) -> bool:
+    if makers == ("h36m", "h36m"):
+        return True
+    return makers[0] == makers[1] != "given" and truth.kind == estimate.kind
+
+
+def _words(
+    truth: Bodies,
+    estimate: Bodies,
+    makers: tuple[Maker, Maker],
+    same: bool,
+    names: tuple[str, ...],
+    roots: tuple[str, ...],
+) -> str:
+    true, guess = _made(truth, makers[0], "the data set gives"), _made(estimate, makers[1], "the predictions give")
+    by = f"truth and estimate by {true}" if same else f"truth by {true}, estimate by {guess}"
+    counted = f"{len(names)} joints ({', '.join(names)})"
+    aligned = f"aligned at the {'pelvis' if roots == ('pelvis',) else 'middle of the hips'}"
+    if same or "h36m" in makers or makers == ("given", "given"):
+        return f"{counted}; {by}; {aligned}"
+    return f"{counted}; {by}; {aligned}. Only the names agree: where definitions differ, errors carry their distance"
+
+
+def _made(bodies: Bodies, maker: Maker, giver: str) -> str:
+    """What makes the joints of one side, in words."""
+    own = f"the joints of the body {bodies.kind}"
+    words: dict[Maker, str] = {
+        "given": f"the joints that {giver}",
+        "own": own,
+        "h36m": "J_regressor_h36m × vertices",
+        "extra": "J_regressor_extra × vertices" + (f" and {own}" if bodies.own is not None else ""),
+    }
+    return words[maker]

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ipman_rs as ip
-from ipman_rs.body import BodyModel, embedded
+from ipman_rs.body import BodyModel, embedded, mesh_file
+from ipman_rs.body.hands import Hands
 from ipman_rs.data.frames import Frames
 
 GENDERS = ("neutral", "male", "female")
@@ -24,10 +25,26 @@ _BODY_JOINTS = 22  # of every model of the family, in one order
 class Bodies:
     """Posed bodies, or what the frames have of them; arrays (F, n, 3) m."""
 
-    vertices: NDArray[Any] | None
-    joints: NDArray[Any] | None
-    joint_names: tuple[str, ...]
+    kind: str | None  # "smpl", "anny" …
     model: BodyModel | None  # whose faces and parts the vertices have
+    vertices: NDArray[Any] | None
+    own: NDArray[Any] | None  # the joints of the posed body model
+    given: NDArray[Any] | None  # the joints that the frames name themselves: measured, or predicted without a body
+    given_names: tuple[str, ...]
+    without_model: str | None = None  # the kind of a pose that has no model here, beside given joints
+
+    @property
+    def own_names(self) -> tuple[str, ...]:
+        return () if self.own is None or self.model is None else self.model.joint_names
+
+    @property
+    def joints(self) -> NDArray[Any] | None:
+        """Some joints, by `joint_names`: the body's own before given ones."""
+        return self.given if self.own is None else self.own
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        return self.given_names if self.own is None else self.own_names
 
 
 @dataclass(eq=False)
@@ -35,17 +52,29 @@ class Models:
     """`folder`: where model files are, anywhere below it, or None."""
 
     folder: Path | None = None
-    _loaded: dict[tuple[str, str, int], BodyModel] = field(default_factory=dict)
+    _loaded: dict[tuple[str, str, int, str | None], BodyModel] = field(default_factory=dict)
 
-    def get(self, kind: str, gender: str = "neutral", betas: int = 10) -> BodyModel:
-        """The model of a kind ("smpl", "smplh", "smplx", or an embedded one's name). ValueError if there is no file."""
+    def get(self, kind: str, gender: str = "neutral", betas: int = 10, rest_shape: str | None = None) -> BodyModel:
+        """The model of a kind ("smpl", "smplh", "smplx", or an embedded one's name).
+
+        `rest_shape`: a mesh file of a person's own body in the zero pose, instead of the model's mean. ValueError if
+        there is no file, or if the mesh has other vertices than the model.
+        """
         if kind in embedded.NAMES:
             return ip.load_body(kind)
-        key = (kind, gender, betas)
+        key = (kind, gender, betas, rest_shape)
         if key not in self._loaded:
+            template = None if rest_shape is None else mesh_file.vertices(rest_shape)
             # The hands of frames are rotations, not offsets from a mean hand.
-            self._loaded[key] = ip.load_body(self.file(kind, gender), num_betas=betas, flat_hand_mean=True)
+            self._loaded[key] = ip.load_body(
+                self.file(kind, gender), num_betas=betas, flat_hand_mean=True, v_template=template
+            )
         return self._loaded[key]
+
+    def hands(self) -> Hands | None:
+        """The mean hands and hand components of SMPL-X, in which RICH gives its fingers; None without its file."""
+        files = self.files("smplx")
+        return ip.load_body(files[0]).hands if files else None
 
     def template_of(self, kind: str) -> BodyModel:
         """The model whose faces, parts and samples all bodies of a kind share, whatever their gender."""
@@ -68,15 +97,13 @@ class Models:
     def posed(self, frames: Frames) -> Bodies:
         """Vertices and joints of the frames. ValueError where a pose does not fit its model, or where the pose is all
         that there is and its model is not."""
-        vertices, joints = frames.vertices, frames.joints
-        names = tuple(frames.joint_names or ())
-        needed = vertices is None and joints is None
-        model = None if frames.body is None or not (needed or self.has(frames.body)) else self.template_of(frames.body)
-        if frames.pose is not None and frames.body is not None and model is not None and vertices is None:
-            vertices, own = self._skinned(frames, frames.body)
-            if joints is None and model is not None:
-                joints, names = own, model.joint_names
-        return Bodies(vertices, joints, names, model)
+        vertices, own, kind = frames.vertices, None, frames.body
+        needed = vertices is None and frames.joints is None
+        model = None if kind is None or not (needed or self.has(kind)) else self.template_of(kind)
+        if frames.pose is not None and kind is not None and model is not None and vertices is None:
+            vertices, own = self._skinned(frames, kind)
+        lacking = kind if frames.pose is not None and vertices is None else None
+        return Bodies(kind, model, vertices, own, frames.joints, tuple(frames.joint_names or ()), lacking)
 
     def _skinned(self, frames: Frames, kind: str) -> tuple[NDArray[Any], NDArray[Any]]:
         pose = np.asarray(frames.pose)
@@ -86,10 +113,11 @@ class Models:
         vertices, joints = np.zeros((0, shape.num_vertices, 3)), np.zeros((0, shape.num_joints, 3))
         for number, gender in enumerate(np.unique(genders)):
             rows = np.flatnonzero(genders == gender)
-            model = self.get(kind, str(gender), width)
+            model = self.get(kind, str(gender), width, frames.rest_shape)
+            betas = None if frames.rest_shape is not None else frames.betas
             posed = model(
                 _on_joints(pose[rows], model),
-                None if frames.betas is None else frames.betas[rows, : model.num_betas],
+                None if betas is None else betas[rows, : model.num_betas],
                 None if frames.transl is None else frames.transl[rows],
             )
             if number == 0:

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .job import TRUTH, Job, Shard
+from .job import TRUTH, Job, Shard, is_file
 
 STORE = 80_000_000  # bytes, about the least that Ray takes
 
@@ -65,13 +65,18 @@ def _anywhere(job: Job) -> Job:
     def whole(path: str | None) -> str | None:
         return None if path is None else str(Path(path).resolve())
 
+    options = job.source.options
     return replace(
         job,
         predictions=job.predictions if job.predictions == TRUTH else str(whole(job.predictions)),
-        source=replace(job.source, path=str(whole(job.source.path))),
+        source=replace(
+            job.source,
+            path=str(whole(job.source.path)),
+            options=tuple((name, str(whole(value)) if is_file(value) else value) for name, value in options),
+        ),
         folder=str(whole(job.folder)),
         models=whole(job.models),
-        regressor=whole(job.regressor),
+        regressors=tuple(str(whole(path)) for path in job.regressors),
     )
 
 

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from ..bootstrap import Interval
 from . import parquet
 from .figures import FIGURES, Figure
 from .job import Job
+from .joints import COUNTED, Definition
 from .paper import Table
 from .rows import being_written
 from .summary import EDGES, Difference, Measured, frames_of
@@ -35,7 +36,20 @@ class Report:
     measured: Sequence[Measured]
     differences: Sequence[Difference]
     table: Table | None = None
-    notes: Sequence[str] = ()
+    definitions: Mapping[str, Definition | None] = field(default_factory=dict)  # of the joints, by method
+
+    @property
+    def joints(self) -> list[str]:
+        """Which joints were compared, a line for all methods with the same ones; and whether the paper's are."""
+        methods: dict[str, list[str]] = {}
+        for name, definition in self.definitions.items():
+            if definition is not None:
+                methods.setdefault(definition.words, []).append(name)
+        lines = [f"{', '.join(names)}: {words}." for words, names in methods.items()]
+        makers = {each.estimate for each in self.definitions.values() if each is not None}
+        if self.table is not None and self.table.regressor and makers & {"own", "extra"}:
+            lines.append(f"The paper compares {len(COUNTED)} other joints here: give --regressor J_regressor_h36m.npy.")
+        return lines
 
     @property
     def figures(self) -> dict[str, Figure]:
@@ -153,7 +167,10 @@ def record(report: Report) -> dict[str, Any]:
         "version": __version__,
         "title": report.title,
         "data": report.data,
-        "notes": list(report.notes),
+        "joints": {
+            name: None if each is None else {**asdict(each), "names": list(each.names), "roots": list(each.roots)}
+            for name, each in report.definitions.items()
+        },
         "units": {name: "shown in " + (f.unit or "1") + f", times {f.factor:g}" for name, f in FIGURES.items()},
         "printed": {} if report.table is None else {k: dict(v) for k, v in report.table.published.items()},
         "edges": EDGES.tolist(),

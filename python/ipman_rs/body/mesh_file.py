@@ -1,0 +1,34 @@
+"""The vertices of a person's own mesh in a file, in the order of its body model."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+ENDINGS = (".ply", ".obj")
+SPAN = (0.25, 3.5)  # m, of a body's longest side
+
+
+def vertices(path: str | os.PathLike[str]) -> NDArray[np.float64]:
+    """The vertices (V, 3) m of a .ply or .obj file, in its own order. ValueError, naming the file, for one that is
+    missing, damaged, of another kind, or not in metres."""
+    place = Path(path)
+    if place.suffix.lower() not in ENDINGS or not place.is_file():
+        what = "no such file" if not place.is_file() else f"a file {place.suffix or 'without ending'}"
+        raise ValueError(f"{path}: expected a mesh in a .ply or .obj file, got {what}")
+    import trimesh
+
+    try:
+        found = np.asarray(trimesh.load(place, process=False, maintain_order=True).vertices, np.float64)  # type: ignore[union-attr]
+    except Exception as error:  # damaged files fail in any way
+        raise ValueError(f"{path}: cannot be read as a mesh: {error}") from None
+    if found.ndim != 2 or not len(found) or not np.isfinite(found).all():
+        raise ValueError(f"{path}: expected a mesh with finite vertices, got {found.shape}")
+    span = float(np.ptp(found, axis=0).max())
+    if not SPAN[0] <= span <= SPAN[1]:
+        hint = "; looks like millimetres" if span > 100 else ""
+        raise ValueError(f"{path}: expected a body in metres, got one that spans {span:.4g}{hint}")
+    return found
