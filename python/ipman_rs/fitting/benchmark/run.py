@@ -21,7 +21,7 @@ from .scenes import draw_scenes
 from .settings import Task, calibrated, presented, regressed
 from .truth import Truth
 
-SPLITS = {"test": 30_000, "tune": 10_000}  # seeds of the people; those of 20_000 were looked at
+SPLITS = {"test": 40_000, "tune": 10_000}  # seeds of the people; those of 20_000 and 30_000 were looked at
 CONTROLS = ("baseline", "both", "ours", "ours without physics")
 
 

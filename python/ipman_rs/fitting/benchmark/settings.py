@@ -26,6 +26,7 @@ from .. import start
 from ..camera import Camera
 from ..keypoints import mediapipe
 from ..landmarks import Landmarks, known
+from ..presented import touching
 from ..problem import Presented, Problem
 from .truth import FITTED, Truth
 
@@ -88,9 +89,18 @@ def presented(truth: Truth, seed: int, noise: float) -> Task:
         image_size=seen.image_size,
         height=torch.from_numpy(truth.height),
         mass=torch.from_numpy(truth.mass),
-        presented=Presented(torch.from_numpy(pose[:, 1:]), orient=torch.from_numpy(pose[:, 0])),
+        presented=Presented(torch.from_numpy(pose[:, 1:]), _touching(pose), torch.from_numpy(pose[:, 0])),
     )
     return Task(problem, start.camera_around(problem), camera)
+
+
+def _touching(pose: Array) -> Tensor:
+    """Which vertices (n, V) touch another part of the mean body in each presented pose (n, J, 3)."""
+    body = load_body(FITTED)
+    contact = torch.zeros(len(pose), body.num_vertices, dtype=torch.bool)
+    for row, each in enumerate(pose):
+        contact[row, torch.from_numpy(touching(body, each))] = True
+    return contact
 
 
 def cameras(truth: Truth, draw: np.random.Generator) -> Camera:
