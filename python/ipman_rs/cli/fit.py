@@ -81,9 +81,9 @@ if TYPE_CHECKING:
     "--data", metavar="NAME", help="Instead of inputs: a data set of `ipman data list`, such as moyo or rich."
 )
 @click.option("--path", type=click.Path(path_type=Path), help="With --data: where it is.")
-@click.option("--split", metavar="NAME", help="With --data: which part of it. Default: all.")
+@click.option("--split", metavar="NAME", help="With --data: which part. Default: the paper's, or all.")
 @click.option(
-    "--option", "settings", type=Setting(), multiple=True, help="With --data: of its reader, such as camera=1."
+    "--option", "settings", type=Setting(), multiple=True, help="With --data: of its reader, such as camera=2."
 )
 @click.option(
     "--models", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
@@ -136,8 +136,8 @@ def fit(
     ipman fit yoga.json -o out --preset ipman-o --pose shown.npz --height 1.7 --mass 62
     ipman fit frames/ -o out --sequence --fps 25    one person over time, with one shape
     ipman fit squats.trc -o out --every 5           optical markers, by the preset markers
-    ipman fit --data moyo --path MOYO/ --split val --option camera=1 --models models/ -o out/ipman-o
-    ipman fit --data rich --path RICH/ --split ipman-test --models models/ -o out/ipman-o-star
+    ipman fit --data moyo --path MOYO/ --models models/ -o out/ipman-o        Table 2: then ipman evaluate --table moyo
+    ipman fit --data rich --path RICH/ --models models/ -o out/ipman-o-star   and --table rich-o-star
 
     Exit code: 0 when every item has a body, 1 when one has none (the others have), 2 for wrong usage.
     """

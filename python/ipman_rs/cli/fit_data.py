@@ -22,14 +22,14 @@ def fit_data(
     options: dict[str, Any],
 ) -> int:
     """Fits a data set and says what became of it; the exit code."""
-    from ..evaluation.tables.job import Source
     from ..fitting import config
-    from ..fitting.data_fits import PREDICTIONS, PRESETS, DataFit
+    from ..fitting.data_fits import PAPER, PREDICTIONS, DataFit, source_of
 
     given = [f"--{name.replace('_', '-')}" for name in NOT_OF_DATA if options.get(name) is not None]
     if given:
         raise click.UsageError(f"--data brings its own cameras, ground and people: leave out {', '.join(given)}")
-    preset = options["preset"] or PRESETS.get(source["name"], "fast")
+    paper = PAPER.get(source["name"])
+    preset = options["preset"] or ("fast" if paper is None else paper.preset)
     try:
         chosen = config.load(preset)
     except ValueError as error:
@@ -37,7 +37,8 @@ def fit_data(
     if options["iterations"] is not None:
         chosen = config.capped(chosen, options["iterations"])
     of_person = {name: options[name] for name in ("height", "mass", "pose")}
-    job = DataFit(Source(**source), chosen, output, models, options["model"], keypoints, images, every, **of_person)
+    data = source_of(source["name"], source["path"], source["split"], dict(source["options"]))
+    job = DataFit(data, chosen, output, models, options["model"], keypoints, images, every, **of_person)
     try:
         job.begin()
         with console.progress(f"fitting {source['name']}", len(job.rows)) as step:
@@ -71,8 +72,10 @@ def _say(record: dict[str, Any], predictions: Path, source: dict[str, Any]) -> N
     if len(record["left_out"]) > 10:
         console.warn(f"and {len(record['left_out']) - 10:,} frames more, see fits.json")
     console.say(f"predictions: {predictions.resolve()}")
-    table = {"moyo": "moyo", "rich": "rich-o-star", "rich-ipman": "rich"}.get(source["name"])
-    which = f"--table {table}" if table else f"--data {source['name']}"
+    from ..fitting.data_fits import PAPER
+
+    paper = PAPER.get(source["name"])
+    which = f"--data {source['name']}" if paper is None else f"--table {paper.table}"
     partial = " --partial" if record["left_out"] or record["fitted"] < record["frames"] else ""
     console.say(
         f"next: ipman evaluate {predictions} {which} --path {source['path']} -o {predictions.parent}/table{partial}"

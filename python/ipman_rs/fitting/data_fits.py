@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -43,11 +43,34 @@ from .variables import full_pose
 
 PIECE = 64  # frames: fitted side by side
 PREDICTIONS, RECORD = "predictions.npz", "fits.json"
-PRESETS = {"moyo": "ipman-o", "rich": "ipman-o-star", "rich-ipman": "ipman-o-star"}  # of the paper
 DENSITY = 985.0  # kg/m³
 _COLUMNS = ("names", "pose", "betas", "transl", "genders", "ground")
 
 Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class Paper:
+    """What the paper fits of a data set, and the table of `ipman evaluate` that holds it."""
+
+    preset: str
+    split: str
+    table: str
+    options: Mapping[str, str | int] = field(default_factory=dict)  # of the data set's reader
+
+
+PAPER = {
+    "moyo": Paper("ipman-o", "val", "moyo", {"frames": "selected", "camera": 1}),
+    "rich": Paper("ipman-o-star", "ipman-test", "rich-o-star"),
+}
+
+
+def source_of(name: str, path: str, split: str | None, options: Mapping[str, str | float]) -> Source:
+    """A data set; what is not said is as in the paper, if it fits that data set."""
+    paper = PAPER.get(name)
+    if paper is None:
+        return Source(name, path, split, tuple(options.items()))
+    return Source(name, path, split or paper.split, tuple({**paper.options, **options}.items()))
 
 
 @dataclass(frozen=True)
@@ -84,7 +107,7 @@ class DataFit:
 
     @cached_property
     def data(self) -> DataSet:
-        return self.source.open(self.folder / "unpacked")
+        return self.source.open(self.folder / "unpacked", self.bodies)
 
     @cached_property
     def bodies(self) -> Models:
@@ -117,7 +140,7 @@ class DataFit:
         if self.imitates and self.pose is None and first.pose is None:
             raise ValueError(f"{self.source.name}: has no poses to present; give one with --pose")
         if first.cameras is None and not self.stays:
-            raise ValueError(f"{self.source.name}: has no cameras here; {_camera_advice(self.source.name)}")
+            raise ValueError(f"{self.source.name}: has no cameras here, and the preset needs them")
         if self.pose is not None:
             presented.load(self.pose, body)
         if weighs(self.config, "measured_shape") and self.height is None and self.mass is None:
@@ -302,8 +325,10 @@ class DataFit:
             return self.height, self.mass
         if frame.pose is None or frame.body is None:
             raise ValueError(f"{self.source.name}: does not know how tall its people are: give --height and --mass")
-        body = self.bodies.get(frame.body, str("neutral" if frame.genders is None else frame.genders[0]))
-        betas = None if frame.betas is None else np.asarray(frame.betas, float)[0, : body.num_betas]
+        gender = "neutral" if frame.genders is None else str(frame.genders[0])
+        body = self.bodies.get(frame.body, gender, rest_shape=frame.rest_shape)
+        known = frame.betas is not None and frame.rest_shape is None
+        betas = np.asarray(frame.betas, float)[0, : body.num_betas] if known else None
         resting = np.asarray(body(betas=betas).vertices)
         volume = float(np.asarray(ip.part_volumes(resting, body.template)).sum())
         height = float(np.ptp(resting[:, 1])) if self.height is None else self.height
@@ -384,7 +409,3 @@ def _check_camera(frame: Frames, stays: bool) -> None:
         return
     if not np.isfinite(np.asarray(frame.cameras.translation[0], float)).all():
         raise ValueError("the place of its camera is not known")
-
-
-def _camera_advice(name: str) -> str:
-    return "give --option camera=1" if name == "moyo" else "the preset needs them"
