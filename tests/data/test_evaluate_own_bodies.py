@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 from miniatures import human36m, models, rich, rich_ipman, spin, threedpw
 
+import ipman_rs as ip
 from ipman_rs import data
 from ipman_rs.body.joint_regressors import EXTRA, HUMAN36M
 from ipman_rs.cli import main
@@ -164,6 +165,53 @@ def test_measured_joints_take_the_regressor_of_the_protocol(bodies, regressors, 
     assert not found["joints"]["guess"]["same"]
     page = (tmp_path / "out" / "evaluation.md").read_text()
     assert "truth by the joints that the data set gives, estimate by J_regressor_h36m × vertices; aligned at" in page
+
+
+def test_the_table_of_rich_by_plain_loops(bodies, regressors, tmp_path):
+    """Both sides' joints and pelvis of their vertices; the file's own joints, 30 mm away, do not count."""
+    folder = make("rich", tmp_path / "data", bodies, regressors[0])
+    frames = data.open("rich-ipman", folder, split="test-all")[:]
+    guess = guess_of(frames, tmp_path / "guess.npz")
+    where = "--path", folder, "--models", bodies, "--regressor", regressors[0], "-o", tmp_path / "out"
+    code, said = evaluated(guess, "--table", "rich", *where)
+    assert code == 0, said
+    figures = record(tmp_path / "out")["methods"]["guess"]["figures"]
+    with np.load(guess) as stored:
+        meshes = [
+            ip.load_body(bodies / "SMPL_NEUTRAL.npz")(pose, frames.betas, frames.transl).vertices
+            for pose in (frames.pose, stored["pose"])
+        ]
+    weights = np.load(regressors[0])
+    true, own = ([weights @ vertices for vertices in mesh] for mesh in meshes)
+    assert figures["mpjpe"]["mean"] == pytest.approx(plain_mpjpe(true, own, HUMAN36M, COUNTED), abs=1e-12)
+    pve = [
+        np.linalg.norm((b - own[k][0]) - (a - true[k][0]), axis=1).mean()
+        for k, (a, b) in enumerate(zip(*meshes, strict=True))
+    ]
+    assert figures["pve"]["mean"] == pytest.approx(np.mean(pve), abs=1e-12)
+    assert 0.01 < figures["pve"]["mean"] < 0.5
+
+
+def test_poses_that_are_known_nowhere_are_no_bodies(bodies, regressors, tmp_path):
+    """has_smpl_world is 0 in every row: Human3.6M's measured joints are all that there is."""
+    file, _ = human36m.write(tmp_path)
+    guess = guess_of(data.open("human36m", file)[:], tmp_path / "guess.npz")
+    human36m.write(tmp_path, has_smpl_world=np.zeros(12))
+    asked = guess, "--table", "h36m", "--path", file, "--models", bodies
+    code, said = evaluated(*asked, "--regressor", regressors[0], "-o", tmp_path / "out")
+    assert code == 0, said
+    found = record(tmp_path / "out")
+    assert found["joints"]["guess"]["truth"] == "given"
+    assert found["methods"]["guess"]["figures"]["mpjpe"]["frames"] == 12
+
+
+def test_one_camera_of_rich(bodies, tmp_path):
+    folder = make("rich-o-star", tmp_path / "data", bodies, None)
+    where = "--path", folder, "--models", bodies, "-o", tmp_path / "out"
+    code, said = evaluated("truth", "--table", "rich-o-star", *where, "--option", "cameras=1")
+    assert code == 0, said
+    assert record(tmp_path / "out")["methods"]["truth"]["frames"] == 12  # of 36 by three cameras
+    assert record(tmp_path / "out")["printed"]["IPMAN-O*"] == {"mpjpe": 240.9, "pve": 217.1, "bose": 98.0}
 
 
 def test_measured_joints_of_spin_s_definition_take_its_extra_regressor(bodies, regressors, tmp_path):

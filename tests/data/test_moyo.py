@@ -178,6 +178,14 @@ def test_a_sequence_without_pressure_or_centre_of_mass(whole, tmp_path):
     assert frames.center_of_mass is None
 
 
+def test_the_mat_that_was_broken(tmp_path):
+    name = "220923_yogi_body_hands_03596_Cow_Face_Pose_or_Gomukhasana_-c"
+    miniature.sequence(tmp_path / "first", name)
+    miniature.sequence(tmp_path / "second", name.replace("yogi_", "yogi_nexus_"))
+    assert np.isnan(data.open("moyo", tmp_path / "first")[:].pressure.values).all()
+    assert np.isfinite(data.open("moyo", tmp_path / "second")[:].pressure.values).all()
+
+
 def test_lengths_that_differ(one):
     root, files, truth = one
     for count, there in ((22, 22), (23, 23), (25, 24), (26, 24)):  # an image's time at the end is let go

@@ -110,6 +110,11 @@ def test_only_frames_that_a_camera_shows(sessions, tmp_path):
     frames = data.open("moyo", sessions / miniature.HANDS, frames=file, camera=1)[:]
     assert frames.names.tolist() == [FIRST + BOAT + "/00008"]
     assert frames.images[0].endswith("_YOGI_Cam_01_0004.jpg")
+    where = "--path", sessions / miniature.HANDS, "--models", models.folder(tmp_path / "models"), "-o", tmp_path / "out"
+    options = "--option", "camera=1", "--option", f"frames={file}"
+    done = CliRunner().invoke(main, ["evaluate", "truth", "--table", "moyo", *map(str, (*where, *options))])
+    assert done.exit_code == 0, done.output
+    assert json.loads((tmp_path / "out" / "evaluation.json").read_text())["methods"]["truth"]["frames"] == 1
 
 
 @pytest.mark.parametrize(

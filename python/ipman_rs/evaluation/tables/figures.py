@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-_JOINTS = "pelvis (or hips) and other joints of the same names in the data and in the predictions"
+_JOINTS = "joints of the same names, pelvis or hips among them, in the data and in the predictions (or a --regressor)"
 _MESH = "bodies of one mesh in the data and in the predictions"
 _ALIGNED = f"{_MESH}, and a pelvis of one definition (the same body model, or --regressor)"
 _FLOOR = "a body model for the predictions, and a ground"

@@ -124,19 +124,24 @@ class Job:
         return Regressors.read(self.regressors)
 
     @cached_property
+    def sample(self) -> Frames:
+        """Some frames of the data set: one where all have the same things, more where joints may be missing."""
+        first = self.data[slice(0, 1)]
+        return first if first.joints is None else check.sample(self.data)
+
+    @cached_property
     def without_bodies(self) -> bool:
-        """Whether the data set has measured joints, and in a sample of its frames no pose that is known."""
-        some = check.sample(self.data)
-        return some.joints is not None and some.pose is not None and not np.isfinite(some.pose).all(axis=(1, 2)).any()
+        """Whether the data set has joints, and poses that are known in none of a sample's frames."""
+        pose = self.sample.pose
+        return self.sample.joints is not None and pose is not None and not np.isfinite(pose).all(axis=(1, 2)).any()
 
     @cached_property
     def definition(self) -> Definition | None:
         """Which joints are compared, told by a few frames. ValueError where they would be of unlike definitions."""
-        some = check.sample(self.data)
         measured: frozenset[str] = frozenset()
-        if some.joints is not None:
-            known = np.asarray(np.isfinite(some.joints).all(axis=2))
-            named = enumerate(some.joint_names or ())
+        if self.sample.joints is not None:
+            known = np.asarray(np.isfinite(self.sample.joints).all(axis=2))
+            named = enumerate(self.sample.joint_names or ())
             measured = frozenset(name for k, name in named if known[:, k].any())
         truth = self.bodies.posed(self._truth(slice(0, 1)))
         guess = truth if self.predictions == TRUTH else self.bodies.posed(self.estimates[slice(0, 1)])

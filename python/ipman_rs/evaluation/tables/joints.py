@@ -29,6 +29,7 @@ COUNTED = (
     "right_shoulder", "left_shoulder", "left_elbow", "left_wrist", "neck", "head",
 )  # fmt: skip
 ALL_17 = (*COUNTED, "pelvis", "spine", "jaw")
+LISTED = 24  # joints that are named one by one for a reader
 ROOTS = (("pelvis",), ("left_hip", "right_hip"))
 # By which regressor a body gets the joints that a data set measured, and the file that is asked for.
 MEASURED: dict[str, tuple[Maker, str]] = {
@@ -220,7 +221,8 @@ def _words(
 ) -> str:
     true, guess = _made(truth, makers[0], "the data set gives"), _made(estimate, makers[1], "the predictions give")
     by = f"truth and estimate by {true}" if same else f"truth by {true}, estimate by {guess}"
-    counted = f"{len(names)} joints ({', '.join(names)})"
+    listed = ", ".join(names) if len(names) <= LISTED else f"{names[0]} to {names[-1]}; evaluation.json names them"
+    counted = f"{len(names)} joints ({listed})"
     aligned = f"aligned at the {'pelvis' if roots == ('pelvis',) else 'middle of the hips'}"
     if same or "h36m" in makers or makers == ("given", "given"):
         return f"{counted}; {by}; {aligned}"
