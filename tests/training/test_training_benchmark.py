@@ -16,7 +16,7 @@ import ipman_rs.data
 from ipman_rs.body import load_body
 from ipman_rs.cli import main
 from ipman_rs.training.augment import normalised
-from ipman_rs.training.benchmark import report
+from ipman_rs.training.benchmark import claims, report
 from ipman_rs.training.benchmark.intervals import paired_over_seeds
 from ipman_rs.training.benchmark.pictures import AUGMENTING, Pictures, moved
 from ipman_rs.training.benchmark.rows import BASELINE, CONTROL, OURS, settings
@@ -233,3 +233,21 @@ def test_verdicts_say_what_the_figures_say():
                                     row(CONTROL, zero, (1.0, 0.2, 2), [0])]}  # fmt: skip
     # Its BoSE gain is not lost, and it has none in PVE.
     assert [holds for _, holds, _ in report.verdicts([tilted])] == [True, True, True, False]
+
+
+def test_the_paper_s_claims_are_judged_by_their_intervals():
+    """Rows of made-up figures; printed differences are those of the paper's tables: Table 1, push and pull."""
+    printed = {(claim.row, claim.figure): claim.printed for claim in claims.CLAIMS}
+    assert printed["both (IPMAN-R)", "PVE"] == pytest.approx(89.9 - 92.4)
+    assert printed["both (IPMAN-R)", "BoSE"] == pytest.approx(71.2 - 62.0)
+    assert printed["+ ground", "BoSE"] == pytest.approx(66.5 - 62.0)
+    assert printed["+ stability", "PVE"] == pytest.approx(90.8 - 92.4)
+    assert (printed["push only", "PVE"], printed["pull only", "PVE"]) == pytest.approx((96.6 - 92.3, 99.4 - 92.3))
+    assert {claim.row for claim in claims.CLAIMS} <= {row.name for row in settings("keypoints").rows}
+    pve, bose = claims.Claim("x", "PVE", -2.5), claims.Claim("x", "BoSE", 9.2)
+    worse = claims.Claim("x", "PVE", 4.3)
+    assert [one.question for one in (pve, bose, worse)] == ["x: PVE better?", "x: BoSE better?", "x: PVE worse?"]
+    above, below, both = (0.4, 0.2, 0.6), (-0.4, -0.6, -0.2), (0.1, -0.2, 0.4)
+    for claim, verdicts in ((pve, "no yes"), (bose, "yes no"), (worse, "yes no")):
+        assert [claim.verdict(interval) for interval in (above, below)] == verdicts.split()
+        assert claim.verdict(both) == "not shown"
