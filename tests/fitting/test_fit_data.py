@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner
-from miniatures import body_files, moyo, rich
+from miniatures import models as model_files
+from miniatures import moyo, rich
 
 import ipman_rs as ip
 import ipman_rs.torch as ipt
@@ -65,10 +66,7 @@ def keypoints(folder, frames, body):
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("models")
-    for gender in ("NEUTRAL", "FEMALE", "MALE"):
-        body_files.write(folder / f"SMPLX_{gender}.npz")
-    return folder
+    return model_files.folder(tmp_path_factory.mktemp("models"))
 
 
 @pytest.fixture(scope="module")

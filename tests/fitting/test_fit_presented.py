@@ -8,7 +8,7 @@ import re
 
 import numpy as np
 import pytest
-from miniatures import body_files
+from miniatures import models
 from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
@@ -18,7 +18,9 @@ from ipman_rs.fitting import presented
 
 @pytest.fixture(scope="module")
 def smplx(tmp_path_factory):
-    return ip.load_body(body_files.write(tmp_path_factory.mktemp("models") / "SMPLX_NEUTRAL.npz"))
+    path = tmp_path_factory.mktemp("models") / "SMPLX_NEUTRAL.npz"
+    models.smplx(path)
+    return ip.load_body(path)
 
 
 @pytest.mark.parametrize("name", poses.NAMES)
