@@ -33,8 +33,8 @@ class Candidate:
     @property
     def expression(self) -> Tensor | None:
         """(B, E), None for bodies without a face that moves."""
-        expression = self.variables["expression"]
-        return expression if expression.shape[1] else None
+        expression = self.variables.get("expression")
+        return None if expression is None or expression.shape[1] == 0 else expression
 
     @cached_property
     def posed(self) -> BodyOutput:
@@ -59,8 +59,8 @@ class Candidate:
         variables, points, body = self.variables, self.landmarks, self.problem.body.body
         zero = points.new_zeros(())
         by_body = self.problem.landmarks.jacobian(self.full_pose, variables["betas"], self.expression)
-        sizes = [self.full_pose[0].numel(), variables["betas"].shape[1], variables["expression"].shape[1]]
-        by_pose, by_betas, by_expression = by_body.split(sizes, dim=1)
+        sizes = [self.full_pose[0].numel(), variables["betas"].shape[1]]
+        by_pose, by_betas, by_expression = by_body.tensor_split([sizes[0], sum(sizes)], dim=1)
         by_joint = pose_blocks(by_pose.unflatten(1, (-1, 3)), body)  # (B, joints, 3, K, 3), the root's (B, 3, K, 3)
         known = {"orient": by_joint["orient"]} | {name: by_joint[name].flatten(1, 2) for name in ("pose", "face")}
         by_transl = torch.eye(3, dtype=points.dtype)[:, None].expand(len(points), 3, points.shape[1], 3)

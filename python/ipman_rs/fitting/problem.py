@@ -63,9 +63,8 @@ def _rows(value: Any, index: Tensor) -> Any:
             ipt.Ground.of_unit(value.normal.expand(-1, 3)[index], value.height[index]) if value.height.ndim else value
         )
     if isinstance(value, Presented):
-        orient = None if value.orient is None else value.orient[index]
-        own = value.contact is not None and value.contact.ndim == 2
-        return replace(
-            value, pose=value.pose[index], orient=orient, contact=value.contact[index] if own else value.contact
-        )
+        orient, contact = None if value.orient is None else value.orient[index], value.contact
+        if contact is not None and contact.ndim == 2:
+            contact = contact[index]
+        return replace(value, pose=value.pose[index], orient=orient, contact=contact)
     return value

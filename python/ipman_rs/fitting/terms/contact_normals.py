@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from torch import Tensor
 
 from ipman_rs import BodyTemplate
@@ -83,7 +83,7 @@ def search(place: Array, template: BodyTemplate, distance: float, geodesic: floa
     """The opposite samples of a body (V, 3) within a distance."""
     _, corners, _ = samples = _samples(template)
     points = _points(place, samples, slice(None))
-    first, second = cKDTree(points).query_pairs(distance, output_type="ndarray").T
+    first, second = KDTree(points).query_pairs(distance, output_type="ndarray").T
     shared = (corners[first, :, None] == corners[second, None]).any(axis=(1, 2))  # a vertex: not worth a search
     first, second = first[~shared], second[~shared]
     far = geodesics(template, geodesic).far(corners[first, 0], corners[second, 0])
