@@ -59,10 +59,10 @@ def _frame_map(axes: Axes, study: Study, body: np.ndarray, frame: int) -> None:
     shown = shown[np.isfinite(shown).all(axis=-1)]
     everything = _on_floor(study, body)
     middle = (shown.min(axis=0) + shown.max(axis=0)) / 2 if len(shown) else everything.mean(axis=0)
-    half = 0.62 * np.ptp(shown, axis=0).max() if len(shown) else 0.0
-    half = max(half, 0.30 * np.ptp(everything, axis=0).max(), 0.03)
     page = axes.get_window_extent()
     ratio = page.width / page.height
+    half = 0.62 * np.ptp(shown, axis=0).max() / min(ratio, 1.0) if len(shown) else 0.0
+    half = max(half, 0.30 * np.ptp(everything, axis=0).max(), 0.03)
     axes.set(xlim=middle[0] + half * ratio * np.array([-1, 1]), ylim=middle[1] + half * np.array([-1, 1]))
     axes.set_aspect("equal")
     step = grid_step(half)

@@ -60,8 +60,7 @@ def draw_scene(
 def camera_on(
     bodies: Sequence[np.ndarray], study: Study, turn: float = 35.0, tilt: float = 16.0, box: Box = _BOX
 ) -> Camera:
-    """A camera that sees these bodies (V, 3) and their shadows in a box of pixels; turned and tilted as `look_at` says.
-    """
+    """A camera that sees these bodies (V, 3) and their shadows in a box of pixels; turn and tilt as in `look_at`."""
     points = np.concatenate([part for body in bodies for part in (body, study.ground.project(body))])
     return look_at(points, np.asarray(study.ground.normal, dtype=np.float64), box, turn, tilt)
 
@@ -112,9 +111,7 @@ def _draw_floor(
     axes.set(xlim=(0, width), ylim=(height, 0))
 
 
-def _shadow(
-    camera: Camera, study: Study, body: np.ndarray, shadow: np.ndarray, size: tuple[int, int]
-) -> np.ndarray:
+def _shadow(camera: Camera, study: Study, body: np.ndarray, shadow: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """Darkness of the floor's pixels at half size: the lower the skin above them, the darker."""
     from scipy.ndimage import gaussian_filter
 
