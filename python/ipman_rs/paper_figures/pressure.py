@@ -34,6 +34,7 @@ Array = NDArray[np.floating]
 
 CELL = (460, 560)  # pixels
 AROUND = 0.08  # m of the mat that are shown around what presses
+PRESSED, FAINT = 0.1, 0.02  # of the largest: what presses, and what is left white
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,19 +134,22 @@ def pressure(pressed: Pressed, preset: str = "paper-r") -> PaperFigure:
         "center_of_pressure": {"estimated": center, "measured": pressed.center},
         "margin_m": study.numbers["margin"][0],
     }
-    figure = new_figure(9.6, 4.4)
-    body, left, right = figure.subplots(1, 3, width_ratios=(1.15, 1, 1))
+    rows, columns = _shown(maps, mat.cell)
+    figure = new_figure(7.6, 4.0)
+    wide = float(np.clip(np.ptp(columns) / np.ptp(rows), 0.35, 1.0))
+    body, left, right = figure.subplots(1, 3, width_ratios=(CELL[0] / CELL[1], wide, wide))
     camera = camera_on([pressed.vertices], study, 40.0, 14.0, cells.box_of(CELL))
     show_pixels(body, cells.scene(study, camera, CELL))
     for axes, key, points in (
         (left, "estimated", (mass, center)),
         (right, "measured", (pressed.mass, pressed.center)),
     ):
-        _draw_map(axes, mat, maps, key, points)
+        _draw_map(axes, mat, maps[key], points)
+        axes.set(xlim=100 * columns, ylim=100 * rows[::-1])
     words = f"IoU {numbers['iou']:.2f}, CoP {1e3 * numbers['cop_error_m']:.0f} mm off"
-    left.set_title(f"estimated\n{words}", size=WORDS, color=colors.INK)
-    right.set_title("measured by the mat\n", size=WORDS, color=colors.INK)
-    body.set_title(pressed.name, size=WORDS, color=colors.INK, parse_math=False)
+    left.set_title("estimated", size=WORDS, color=colors.INK)
+    right.set_title("measured", size=WORDS, color=colors.INK)
+    figure.suptitle(f"{pressed.name}\n{words}", size=WORDS, color=colors.INK, parse_math=False)
     _write_key(figure, (left, right))
     return PaperFigure("pressure", figure, numbers, maps)
 
@@ -174,23 +178,30 @@ def _scaled(values: Array) -> Array:
     return (values - values.min()) / (span if span else 1.0)
 
 
-def _draw_map(axes: Axes, mat: PressureMaps, maps: dict[str, Array], key: str, points: tuple[Array, Array]) -> None:
+def _shown(maps: dict[str, Array], cell: float) -> tuple[Array, Array]:
+    """The first and the last m along the rows and the columns that are drawn: around what presses, within the mat."""
+    both = np.maximum(maps["estimated"], maps["measured"])
+    limits = []
+    for axis, count in ((1, both.shape[0]), (0, both.shape[1])):
+        pressed = np.flatnonzero(both.max(axis=axis) > PRESSED) * cell
+        ends = np.array([pressed[0] - AROUND, pressed[-1] + cell + AROUND])
+        limits.append(ends.clip(0, count * cell))
+    return limits[0], limits[1]
+
+
+def _draw_map(axes: Axes, mat: PressureMaps, values: Array, points: tuple[Array, Array]) -> None:
     """A map as it lies on the floor, in cm along the mat, the columns to the right, the rows down."""
     cm = 100 * mat.cell
     height, width = mat.values.shape
-    shown = np.where(maps[key] > 0, maps[key], np.nan)
+    shown = np.where(values > FAINT, values, np.nan)
     axes.imshow(shown, cmap=_heat(), vmin=0, vmax=1, extent=(0, width * cm, height * cm, 0), interpolation="nearest")
     for point, color in zip(points, (colors.COM, colors.COP), strict=True):
         if np.isfinite(point).all():
             offset = point - mat.origin
             at = 100 * float(offset @ mat.e2), 100 * float(offset @ mat.e1)
             axes.plot(*at, "o", color=color, markersize=8, markeredgecolor="white", markeredgewidth=1.2, zorder=5)
-    rows, columns = (np.flatnonzero(np.maximum(*maps.values()).max(axis=axis) > 0.02) for axis in (1, 0))
-    around = 100 * AROUND
-    axes.set_xlim(max(columns[0] * cm - around, 0), min((columns[-1] + 1) * cm + around, width * cm))
-    axes.set_ylim(min((rows[-1] + 1) * cm + around, height * cm), max(rows[0] * cm - around, 0))
     axes.set_aspect("equal")
-    axes.set_facecolor("#f4f5f7")
+    axes.set_facecolor("white")
     axes.tick_params(labelsize=WORDS - 2, colors=colors.MUTED)
     axes.set_xlabel("cm", size=WORDS - 1, color=colors.INK)
     for side in axes.spines.values():
@@ -207,8 +218,8 @@ def _write_key(figure: Any, axes: tuple[Axes, Axes]) -> None:
     from matplotlib.cm import ScalarMappable
     from matplotlib.lines import Line2D
 
-    bar = figure.colorbar(ScalarMappable(cmap=_heat()), ax=axes, fraction=0.035, pad=0.02)
-    bar.set_label("pressure, of the largest", size=WORDS - 1)
+    bar = figure.colorbar(ScalarMappable(cmap=_heat()), ax=axes, fraction=0.035, pad=0.02, shrink=0.85)
+    bar.set_label(f"pressure, of the largest (under {100 * FAINT:g} %: white)", size=WORDS - 1)
     bar.ax.tick_params(labelsize=WORDS - 2)
     handles = [
         Line2D([], [], color=color, marker="o", linestyle="", markersize=7, label=word)
