@@ -11,7 +11,7 @@ from ipman_rs.body import load_body
 from ipman_rs.ground import Ground
 from ipman_rs.losses import balance_cost, ground_loss, stability_loss
 from ipman_rs.mass import center_of_mass
-from ipman_rs.pressure import center_of_pressure, pressure
+from ipman_rs.pressure import binary_center_of_pressure, center_of_pressure, pressure
 from ipman_rs.sampling import sample_surface
 from ipman_rs.self_contact import SelfPenetration, self_contact_distance, self_contact_loss, self_penetration
 from ipman_rs.status import Status, UnitsWarning, body_status
@@ -33,6 +33,7 @@ __all__ = [
     "analyze_poses",
     "balance_cost",
     "base_of_support",
+    "binary_center_of_pressure",
     "body",
     "body_status",
     "bose",

@@ -12,6 +12,7 @@ from .benchmark import benchmark
 from .data import data
 from .errors import FileError
 from .evaluate import evaluate
+from .figure import figure
 from .fit import fit
 from .options import GROUND, PRESETS, UP
 from .predict import predict
@@ -48,6 +49,7 @@ def main() -> None:
     ipman fit photo.jpg -o out      a body for the person in a photo
     ipman evaluate pred.npz --data own --path true.npz -o out   predictions against the truth
     ipman validate folder/ -o out   the engine against force plates and OpenSim
+    ipman figure pull -o out        the paper's figures, as PNG, SVG and numbers
     ipman simulate body.obj         how firmly it stands, and what becomes of it when it is let go
     """
 
@@ -60,6 +62,7 @@ main.add_command(predict)
 main.add_command(evaluate)
 main.add_command(validate)
 main.add_command(data)
+main.add_command(figure)
 
 
 @main.command()

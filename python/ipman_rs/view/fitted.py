@@ -99,7 +99,7 @@ def draw_overlay(study: Study, path: Path) -> None:
     fx, fy = np.broadcast_to(fitted.camera.focal, 2) * scale
     cx, cy = np.asarray(fitted.camera.center) * scale
     camera = replace(fitted.camera, focal=(fx, fy), center=(cx, cy))
-    if _in_front(camera, body):
+    if in_front(camera, body):
         opacity = 0.72 if fitted.photo is not None else 1.0
         draw_body(axes, camera, study, body, heat_top(study), (width, height), opacity)
     _draw_points(axes, fitted, scale)
@@ -109,7 +109,7 @@ def draw_overlay(study: Study, path: Path) -> None:
     save(figure, path)
 
 
-def _in_front(camera: Camera, body: np.ndarray) -> bool:
+def in_front(camera: Camera, body: np.ndarray) -> bool:
     depth = (camera.eye - body) @ camera.axes[2]
     return bool(np.isfinite(body).all() and (depth > 1e-3).all())
 

@@ -24,8 +24,6 @@ _MAP = (0.05, 0.11, 0.90, 0.76)
 
 def draw_floor_view(study: Study, frame: int, path: Path) -> None:
     """Write the PNG of one frame's ground seen from above."""
-    import ipman_rs as ip
-
     figure, page = new_page(WIDTH, HEIGHT)
     title, line = words(study, frame)
     page.text(60, 60, title, size=23, color=colors.INK, va="center", weight="bold", parse_math=False)
@@ -33,14 +31,19 @@ def draw_floor_view(study: Study, frame: int, path: Path) -> None:
     body = np.asarray(study.vertices[frame], dtype=np.float64)
     if np.isfinite(body).all():
         axes = figure.add_axes(_MAP)
-        points = _on_floor(study, ip.sample_surface(body, study.template))
-        _frame_map(axes, study, body, frame)
-        _draw_silhouette(axes, study, body)
-        _draw_contacts(axes, study, body, points)
-        _draw_marks(axes, study, frame)
-        _draw_scale_bar(axes)
+        draw_map(axes, study, frame)
     write_legend(figure, study, heat_top(study))
     save(figure, path)
+
+
+def draw_map(axes: Axes, study: Study, frame: int, measured: bool = True) -> None:
+    """One frame's ground seen from above, filling the axes; `measured`: with margin and CoM–CoP distance."""
+    body = np.asarray(study.vertices[frame], dtype=np.float64)
+    _frame_map(axes, study, body, frame)
+    _draw_silhouette(axes, study, body)
+    _draw_contacts(axes, study, body)
+    _draw_marks(axes, study, frame, measured)
+    _draw_scale_bar(axes)
 
 
 def _on_floor(study: Study, points: np.ndarray) -> np.ndarray:
@@ -56,9 +59,10 @@ def _frame_map(axes: Axes, study: Study, body: np.ndarray, frame: int) -> None:
     shown = shown[np.isfinite(shown).all(axis=-1)]
     everything = _on_floor(study, body)
     middle = (shown.min(axis=0) + shown.max(axis=0)) / 2 if len(shown) else everything.mean(axis=0)
-    half = 0.62 * np.ptp(shown, axis=0).max() if len(shown) else 0.0
+    page = axes.get_window_extent()
+    ratio = page.width / page.height
+    half = 0.62 * np.ptp(shown, axis=0).max() / min(ratio, 1.0) if len(shown) else 0.0
     half = max(half, 0.30 * np.ptp(everything, axis=0).max(), 0.03)
-    ratio = _MAP[2] * WIDTH / (_MAP[3] * HEIGHT)
     axes.set(xlim=middle[0] + half * ratio * np.array([-1, 1]), ylim=middle[1] + half * np.array([-1, 1]))
     axes.set_aspect("equal")
     step = grid_step(half)
@@ -86,10 +90,11 @@ def _draw_silhouette(axes: Axes, study: Study, body: np.ndarray) -> None:
     axes.imshow(veil, extent=(left, right, low, high), zorder=1, interpolation="bilinear")
 
 
-def _draw_contacts(axes: Axes, study: Study, body: np.ndarray, points: np.ndarray) -> None:
+def _draw_contacts(axes: Axes, study: Study, body: np.ndarray) -> None:
     import ipman_rs as ip
 
-    height = study.ground.signed_height(ip.sample_surface(body, study.template))
+    samples = ip.sample_surface(body, study.template)
+    points, height = _on_floor(study, samples), study.ground.signed_height(samples)
     reach = study.preset.threshold
     contact = height < reach if study.preset.contact == "released" else np.abs(height) < reach
     rho = pressure_at(height, study.preset.alpha, study.preset.gamma)
@@ -101,7 +106,7 @@ def _draw_contacts(axes: Axes, study: Study, body: np.ndarray, points: np.ndarra
     axes.scatter(*points[order].T, c=tint, s=np.clip(size, 2.5, 12) ** 2, linewidths=0, zorder=3)
 
 
-def _draw_marks(axes: Axes, study: Study, frame: int) -> None:
+def _draw_marks(axes: Axes, study: Study, frame: int, measured: bool) -> None:
     polygon, value = study.polygons[frame], study.numbers
     if len(polygon):
         outline = _on_floor(study, polygon)
@@ -109,11 +114,11 @@ def _draw_marks(axes: Axes, study: Study, frame: int) -> None:
         axes.plot(*np.vstack([outline, outline[:1]]).T, color=colors.SUPPORT_EDGE, linewidth=2.6, zorder=4)
     com, cop = (study.ground.project(value[key][frame]) for key in ("center_of_mass", "center_of_pressure"))
     com_at, cop_at = _on_floor(study, com), _on_floor(study, cop)
-    if np.isfinite(com).all() and len(polygon):
+    if measured and np.isfinite(com).all() and len(polygon):
         near = _on_floor(study, nearest_on_outline(com, polygon))
         text = f"margin {signed(value['margin'][frame])} mm"
         _measure(axes, com_at, near, colors.SUPPORT_EDGE, text, beyond=bool(value["inside"][frame]))
-    if np.isfinite(com).all() and np.isfinite(cop).all():
+    if measured and np.isfinite(com).all() and np.isfinite(cop).all():
         _measure(axes, cop_at, com_at, colors.INK, f"{value['com_cop_distance'][frame] * 1000:.0f} mm")
     for at, color in ((com_at, colors.COM), (cop_at, colors.COP)):
         axes.plot(*at, "o", color=color, markersize=17, markeredgecolor="white", markeredgewidth=2.2, zorder=7)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
@@ -20,9 +20,12 @@ if TYPE_CHECKING:
 
     from .study import Study
 
+Paint = Callable[[np.ndarray], np.ndarray]
+Box = tuple[float, float, float, float]
+
 # Pixels of the whole picture and of the box (left, top, right, bottom) that the body fills.
 WIDTH, HEIGHT = 1200, 1400
-_BOX = (90.0, 160.0, 1110.0, 1215.0)
+_BOX: Box = (90.0, 160.0, 1110.0, 1215.0)
 _SAMPLES = 2
 # Top of the pressure scale: 1 is a touching point; deeper ones saturate at 3 (2 cm below the floor by the paper).
 _TOP = 3.0
@@ -35,10 +38,8 @@ def draw_picture(study: Study, frame: int, path: Path | IO[bytes], camera: Camer
     top = heat_top(study)
     if np.isfinite(body).all():
         camera = camera or camera_on([body], study)
-        _draw_floor(axes, camera, study, body, study.ground.project(body))
-        _draw_support(axes, camera, study.polygons[frame])
-        draw_body(axes, camera, study, body, top, (WIDTH, HEIGHT))
-        _draw_markers(axes, camera, study, frame)
+        draw_scene(axes, camera, study, frame, (WIDTH, HEIGHT))
+        draw_markers(axes, camera, study, frame)
     else:
         axes.text(WIDTH / 2, HEIGHT / 2, "this body has no finite position", ha="center", color=colors.MUTED, size=15)
     _write_title(axes, study, frame)
@@ -46,10 +47,22 @@ def draw_picture(study: Study, frame: int, path: Path | IO[bytes], camera: Camer
     save(figure, path)
 
 
-def camera_on(bodies: Sequence[np.ndarray], study: Study, turn: float = 35.0, tilt: float = 16.0) -> Camera:
-    """A camera that sees these bodies (V, 3) and their shadows; turned and tilted as `look_at` says."""
+def draw_scene(
+    axes: Axes, camera: Camera, study: Study, frame: int, size: tuple[int, int], paint: Paint | None = None
+) -> None:
+    """One frame's floor, base of support and body on axes of `size` pixels. `paint`: as in `draw_body`."""
+    body = np.asarray(study.vertices[frame], dtype=np.float64)
+    _draw_floor(axes, camera, study, body, study.ground.project(body), size)
+    _draw_support(axes, camera, study.polygons[frame])
+    draw_body(axes, camera, study, body, heat_top(study), size, paint=paint)
+
+
+def camera_on(
+    bodies: Sequence[np.ndarray], study: Study, turn: float = 35.0, tilt: float = 16.0, box: Box = _BOX
+) -> Camera:
+    """A camera that sees these bodies (V, 3) and their shadows in a box of pixels; turn and tilt as in `look_at`."""
     points = np.concatenate([part for body in bodies for part in (body, study.ground.project(body))])
-    return look_at(points, np.asarray(study.ground.normal, dtype=np.float64), _BOX, turn, tilt)
+    return look_at(points, np.asarray(study.ground.normal, dtype=np.float64), box, turn, tilt)
 
 
 def save(figure: Figure, path: Path | IO[bytes]) -> None:
@@ -77,7 +90,9 @@ def new_page(width: int, height: int) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def _draw_floor(axes: Axes, camera: Camera, study: Study, body: np.ndarray, shadow: np.ndarray) -> None:
+def _draw_floor(
+    axes: Axes, camera: Camera, study: Study, body: np.ndarray, shadow: np.ndarray, size: tuple[int, int]
+) -> None:
     from matplotlib.collections import LineCollection
 
     ground = study.ground
@@ -87,15 +102,16 @@ def _draw_floor(axes: Axes, camera: Camera, study: Study, body: np.ndarray, shad
     lines, strength = floor_lines(center, e1, e2, radius, grid_step(radius))
     rgba = np.concatenate([np.broadcast_to(colors.rgb(colors.GRID), (len(lines), 3)), strength[:, None]], axis=1)
     axes.add_collection(LineCollection(list(camera.pixels(lines)[0]), colors=rgba, linewidths=1.1, zorder=1))
-    darkness = _shadow(camera, study, body, shadow)
+    width, height = size
+    darkness = _shadow(camera, study, body, shadow, size)
     ink = np.zeros((*darkness.shape, 4))
     ink[..., :3] = colors.rgb("#3a3f4a")
     ink[..., 3] = darkness
-    axes.imshow(ink, extent=(0, WIDTH, HEIGHT, 0), zorder=1.5, interpolation="bilinear")
-    axes.set(xlim=(0, WIDTH), ylim=(HEIGHT, 0))
+    axes.imshow(ink, extent=(0, width, height, 0), zorder=1.5, interpolation="bilinear")
+    axes.set(xlim=(0, width), ylim=(height, 0))
 
 
-def _shadow(camera: Camera, study: Study, body: np.ndarray, shadow: np.ndarray) -> np.ndarray:
+def _shadow(camera: Camera, study: Study, body: np.ndarray, shadow: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """Darkness of the floor's pixels at half size: the lower the skin above them, the darker."""
     from scipy.ndimage import gaussian_filter
 
@@ -103,7 +119,7 @@ def _shadow(camera: Camera, study: Study, body: np.ndarray, shadow: np.ndarray) 
     height = np.maximum(study.ground.signed_height(body), 0.0)
     faces = study.template.faces
     corners, heights = pixels[faces] / 2, height[faces]
-    image, covered = rasterize(corners, -heights, heights[..., None], WIDTH // 2, HEIGHT // 2)
+    image, covered = rasterize(corners, -heights, heights[..., None], size[0] // 2, size[1] // 2)
     near = np.where(covered, 0.34 * np.exp(-image[..., 0] / 0.06), 0.0)
     far = np.where(covered, 0.22 * np.exp(-image[..., 0] / 0.8), 0.0)
     return gaussian_filter(near, 3.0) + gaussian_filter(far, 11.0)
@@ -118,9 +134,17 @@ def _draw_support(axes: Axes, camera: Camera, polygon: np.ndarray) -> None:
 
 
 def draw_body(
-    axes: Axes, camera: Camera, study: Study, body: np.ndarray, top: float, size: tuple[int, int], opacity: float = 1.0
+    axes: Axes,
+    camera: Camera,
+    study: Study,
+    body: np.ndarray,
+    top: float,
+    size: tuple[int, int],
+    opacity: float = 1.0,
+    paint: Paint | None = None,
 ) -> None:
-    """The skin with its pressure on a picture of `size` pixels."""
+    """The skin on a picture of `size` pixels: with its pressure, or `paint`, colours (N, 3) of heights (N,) above the
+    ground."""
     faces = study.template.faces
     pixels, distance = camera.pixels(body)
     normals = vertex_normals(body, faces)
@@ -135,10 +159,13 @@ def draw_body(
     width, height = (high - low) * _SAMPLES
     image, covered = rasterize((pixels - low)[faces] * _SAMPLES, 1.0 / distance[faces], values[faces], width, height)
     seen = image[covered]
-    # The pressure is evaluated at every pixel, not blended between vertices: exact on large triangles too.
-    rho = pressure_at(seen[:, 3], study.preset.alpha, study.preset.gamma)
+    # Colours are evaluated at every pixel, not blended between vertices: exact on large triangles too.
+    if paint is None:
+        albedo = colors.heat(pressure_at(seen[:, 3], study.preset.alpha, study.preset.gamma), top)
+    else:
+        albedo = paint(seen[:, 3])
     rgba = np.zeros((*covered.shape, 4), dtype=np.float32)
-    rgba[covered, :3] = _light(colors.heat(rho, top), seen[:, :3] @ camera.axes.T)
+    rgba[covered, :3] = _light(albedo, seen[:, :3] @ camera.axes.T)
     rgba[covered, 3] = 1.0
     small = shrink(rgba, _SAMPLES)
     small[..., :3] /= np.maximum(small[..., 3:], 1e-6)
@@ -162,7 +189,7 @@ def _light(albedo: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return np.clip(linear, 0.0, 1.0) ** (1 / 2.2) * (1.0 - 0.25 * rim)[:, None]
 
 
-def _draw_markers(axes: Axes, camera: Camera, study: Study, frame: int) -> None:
+def draw_markers(axes: Axes, camera: Camera, study: Study, frame: int) -> None:
     """CoM with its plumb line, CoP and the outline of the support again, faintly, over the body."""
     com, cop = study.numbers["center_of_mass"][frame], study.numbers["center_of_pressure"][frame]
     polygon = study.polygons[frame]

@@ -1,0 +1,192 @@
+"""The people that one method estimated, by name, each with its image and camera: from a folder of `ipman fit` or
+`ipman predict`, or from a file of predictions for a data set with images."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import ipman_rs as ip
+from ipman_rs import view
+from ipman_rs.body import BodyModel, embedded, safe_npz
+from ipman_rs.data.frames import DataSet, Frames
+from ipman_rs.evaluation.tables import predictions
+from ipman_rs.evaluation.tables.models import Models
+from ipman_rs.view import Study
+from ipman_rs.view.fitted import camera_of
+
+PHOTOS = (".jpg", ".jpeg", ".png")
+RECORD = "fit.json"
+CAMERA = ("camera_rotation", "camera_translation", "focal", "center")
+
+
+@dataclass(frozen=True)
+class FittedFolder:
+    """The outputs of `ipman fit` or `ipman predict`, a folder a person. `photos`: where their photos are, if not where
+    they were; `body`: the model's file, unless it is an embedded one."""
+
+    path: Path
+    photos: Path | None = None
+    body: str | None = None
+
+    def names(self) -> list[str]:
+        """Of the people, in the order of their folders. ValueError if there is nobody."""
+        found = [record.parent.name for record in sorted(self.path.glob(f"*/{RECORD}"))] if self.path.is_dir() else []
+        if not found:
+            what = "no fitted body in this folder" if self.path.is_dir() else "there is no such folder"
+            raise ValueError(f"{self.path}: {what}; expected the output of ipman fit or ipman predict (NAME/{RECORD})")
+        return found
+
+    def study(self, name: str, preset: str = "paper-r") -> Study:
+        """The measured body of one person. ValueError, naming the file, for what is damaged or missing."""
+        path = self.path / name / f"{name}.npz"
+        if not path.is_file():
+            raise ValueError(f"{path}: there is no such file; was the fit interrupted?")
+        arrays = {key: safe_npz.read(path, key) for key in safe_npz.names(path)}
+        lacking = [key for key in ("betas", "transl", "model", "image_size", *CAMERA) if key not in arrays]
+        if lacking:
+            raise ValueError(f"{path}: no {', '.join(lacking)} in it; expected parameters of ipman fit or predict")
+        body = self._model(path, str(arrays["model"]))
+        vertices = _posed(body, arrays, path)
+        ground, note = _ground(arrays, vertices)
+        points = np.zeros((0, 3)) if "keypoints" not in arrays else arrays["keypoints"][0]
+        fitted = view.Fitted(
+            camera=camera_of(*(arrays[key][0] for key in CAMERA)),
+            size=(float(arrays["image_size"][0, 0]), float(arrays["image_size"][0, 1])),
+            seen=points,
+            projected=points[:, :2],
+            photo=self._photo(name),
+        )
+        return replace(view.study(name, vertices, body.template, ground, preset, notes=[note]), fitted=fitted)
+
+    def _model(self, path: Path, named: str) -> BodyModel:
+        if self.body is not None:
+            return ip.load_body(self.body)
+        if named in embedded.NAMES:
+            return ip.load_body(named)
+        raise ValueError(f"{path}: is of the body {named}, whose file is not known here; give --body FILE")
+
+    def _photo(self, name: str) -> NDArray[np.uint8] | None:
+        """The pixels of a person's photo, None where there is none."""
+        from ipman_rs.fitting import photo
+
+        record = json.loads((self.path / name / RECORD).read_text(encoding="utf-8"))
+        source = Path(str(record.get("source", "")))
+        folders = [] if self.photos is None else [self.photos]
+        stems = dict.fromkeys((name, source.stem))
+        places = [folder / f"{stem}{ending}" for folder in folders for stem in stems for ending in PHOTOS]
+        places += [source] if source.suffix.lower() in PHOTOS else []
+        return next((photo.read(place) for place in places if place.is_file()), None)
+
+
+def _posed(body: BodyModel, arrays: Mapping[str, NDArray[Any]], path: Path) -> NDArray[np.float64]:
+    from ipman_rs.fitting.result import joints_of
+
+    pose = np.zeros((body.num_joints, 3))
+    for piece, columns in joints_of(body).items():
+        if piece not in arrays or arrays[piece].size != 3 * len(columns):
+            raise ValueError(f"{path}: {piece}: expected {3 * len(columns)} numbers for the body {body.name}")
+        pose[columns] = arrays[piece].reshape(-1, 3)
+    return np.asarray(body(pose, arrays["betas"][0], arrays["transl"][0]).vertices, np.float64)
+
+
+def _ground(arrays: Mapping[str, NDArray[Any]], vertices: NDArray[np.float64]) -> tuple[ip.Ground, str]:
+    if "ground_normal" in arrays and "ground_height" in arrays:
+        return ip.Ground(arrays["ground_normal"][0], arrays["ground_height"][0]), "ground: of the fit"
+    return ip.Ground.y_up(vertices[:, 1].min()), "ground: under the lowest vertex"
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Predictions (.npz or .parquet, as `ipman evaluate` reads them) for a data set with images and cameras.
+    `images`: the folder in which its paths begin."""
+
+    path: Path
+    data: DataSet
+    models: Models = field(default_factory=Models)
+    images: Path = Path()
+
+    def names(self) -> list[str]:
+        """Of the predicted frames. ValueError as `ipman evaluate` says it."""
+        with TemporaryDirectory() as unpacked:
+            return [str(name) for name in predictions.read(self.path, Path(unpacked)).columns["names"][:]]
+
+    def study(self, name: str, preset: str = "paper-r") -> Study:
+        """The measured body of one frame in the data set's camera. ValueError, naming the file, where something that is
+        needed is not there."""
+        row, true = self._frame(name)
+        with TemporaryDirectory() as unpacked:
+            found = predictions.read(self.path, Path(unpacked))
+            number = int(found.index.find(np.array([name]))[0])
+            if number < 0:
+                raise ValueError(f"{self.path}: has no prediction for {name!r}")
+            guess = found[np.array([number])]
+        bodies = self.models.posed(guess)
+        if bodies.vertices is None or bodies.model is None:
+            raise ValueError(f"{self.path}: has no bodies whose model is here: give --models FOLDER")
+        ground = guess.ground if guess.ground is not None else true.ground
+        if ground is None or true.cameras is None:
+            raise ValueError(f"{name}: the data set has no {'ground' if ground is None else 'camera'} for it")
+        ground = ip.Ground(np.reshape(ground.normal, (-1, 3))[0], np.ravel(ground.height)[0])
+        photo = self._photo(row, true)
+        matrix = true.cameras.intrinsics[0]
+        camera = camera_of(
+            true.cameras.rotation[0], true.cameras.translation[0], matrix[[0, 1], [0, 1]], matrix[:2, 2]
+        )  # fmt: skip
+        points = np.zeros((0, 3)) if true.keypoints is None else np.nan_to_num(true.keypoints[0])
+        size = (2.0 * matrix[0, 2], 2.0 * matrix[1, 2]) if photo is None else (photo.shape[1], photo.shape[0])
+        fitted = view.Fitted(camera=camera, size=size, seen=points, projected=points[:, :2], photo=photo)
+        vertices = np.asarray(bodies.vertices[0], np.float64)
+        found = view.study(name, vertices, bodies.model.template, ground, preset, notes=["ground: of the data set"])
+        return replace(found, fitted=fitted)
+
+    def _frame(self, name: str) -> tuple[int, Frames]:
+        for start in range(0, len(self.data), 4096):
+            found = np.flatnonzero(self.data[slice(start, start + 4096)].names == name)
+            if len(found):
+                row = start + int(found[0])
+                return row, self.data[slice(row, row + 1)]
+        raise ValueError(f"{self.path}: predicts {name!r}, but the data set has no such frame")
+
+    def _photo(self, row: int, true: Frames) -> NDArray[np.uint8] | None:
+        from ipman_rs.fitting import photo
+
+        if hasattr(self.data, "image"):  # it brings its images along
+            return self.data.image(row)  # type: ignore[attr-defined]
+        if true.images is None or not str(true.images[0]):
+            return None
+        return photo.read(self.images / str(true.images[0]))
+
+
+Estimated = FittedFolder | Predicted
+
+
+def shared_names(methods: Sequence[tuple[str, Estimated]], wanted: Sequence[str], most: int) -> list[str]:
+    """The people that all methods have: those that are wanted, or up to `most`, evenly spaced. ValueError if one is not
+    in all, or none is."""
+    lists = [method.names() for _, method in methods]
+    shared = [name for name in lists[0] if all(name in other for other in lists[1:])]
+    lost = [name for name in wanted if name not in shared]
+    if lost:
+        raise ValueError(f"people: {lost[0]!r} is not in all of them; these are: {', '.join(shared[:20]) or 'nobody'}")
+    if not shared:
+        names = " and ".join(str(method.path) for _, method in methods)
+        raise ValueError(f"{names}: have nobody of the same name")
+    if wanted:
+        return list(wanted)
+    return [shared[int(row)] for row in np.unique(np.linspace(0, len(shared) - 1, min(most, len(shared))).round())]
+
+
+def studies(
+    methods: Sequence[tuple[str, Estimated]], name: str, preset: str = "paper-r"
+) -> Iterator[tuple[str, Study]]:
+    """Each method with its measured body of one person."""
+    for title, method in methods:
+        yield title, method.study(name, preset)

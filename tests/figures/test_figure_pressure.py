@@ -1,0 +1,68 @@
+"""Estimated beside measured pressure, on a made-up recording of a mat of springs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ipman_rs as ip
+from ipman_rs import data, evaluation
+from ipman_rs.evaluation.tables.models import Models
+from ipman_rs.paper_figures import pressure as made
+
+pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+spring_mat = pytest.importorskip("spring_mat")
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    return spring_mat.write(tmp_path_factory.mktemp("made-up"))
+
+
+def test_the_numbers(figure, recording, contents):
+    path, models = recording
+    said = figure("pressure", "--path", path, "--models", models)
+    assert said.code == 0, said.err
+    numbers = said.numbers
+    with np.load(said.folder / "pressure.npz") as stored:
+        maps = dict(stored)
+    # The drawn maps are those of the protocol, whose IoU was found in its own way.
+    assert numbers["iou"] == pytest.approx(evaluation.pressure_iou(maps["estimated"], maps["measured"]))
+    assert 0.3 < numbers["iou"] < 1
+    pressed = made.of_data_set("moyo", data.open("moyo", path), 0, Models(models))
+    center = ip.center_of_pressure(pressed.vertices, pressed.model.template, pressed.ground)
+    np.testing.assert_allclose(numbers["center_of_pressure"]["estimated"], center, atol=1e-9)
+    aside = np.linalg.norm((center - pressed.center)[:2])
+    assert numbers["cop_error_m"] == pytest.approx(aside, abs=1e-9)
+    assert numbers["best_of_the_grid"]["iou"] >= numbers["iou"] - 0.05
+    # The springs carry the moments of the exact centre of mass.
+    exact = ip.center_of_mass(pressed.vertices, pressed.model.template, "exact")
+    np.testing.assert_allclose(numbers["center_of_pressure"]["measured"][:2], exact[:2], atol=1e-3)
+    again = figure("pressure", "--path", path, "--models", models, "--frame", f"{spring_mat.NAME}/00000", out="again")
+    assert contents(said.folder) == contents(again.folder)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--frame", "9"), "has 3 frames, from 0; there is no frame 9"),
+        (("--frame", "who"), "no frame is called 'who'"),
+        (("--models", "/nowhere"), "/nowhere"),
+        (("--option", "frame=camera"), "moyo: "),
+    ],
+)
+def test_bad_input(more, words, figure, recording):
+    path, models = recording
+    said = figure("pressure", "--path", path, "--models", models, *more)
+    assert said.code == 1
+    assert said.err.count("\n") == 1
+    assert words in said.err
+
+
+def test_a_data_set_without_a_mat(figure, tmp_path):
+    from miniatures import amass
+
+    amass.tree(tmp_path)
+    said = figure("pressure", "--data", "amass", "--path", tmp_path)
+    assert said.code == 1
+    assert "has no pressure maps" in said.err
