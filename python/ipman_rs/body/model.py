@@ -145,9 +145,10 @@ class BodyModel:
         pose: ArrayLike,
         betas: ArrayLike | None = None,
         transl: ArrayLike | None = None,
+        expression: ArrayLike | None = None,
     ) -> NDArray[np.floating]:
         """The vertices of `forward` for poses (n, J, 3): in `buffer` (≥ n, V, 3) if it fits, else in a new array."""
-        dtype, batch, parameters = self._checked(pose, betas, transl, None)
+        dtype, batch, parameters = self._checked(pose, betas, transl, expression)
         (count,) = batch
         if buffer is None or len(buffer) < count or buffer.dtype != dtype:
             buffer = np.empty((count, self.num_vertices, 3), dtype)

@@ -18,13 +18,13 @@ Index = slice | NDArray[np.integer]
 class PosedSequence:
     """T bodies of one model in their poses; reads like an array (T, V, 3) that is indexed along its first axis.
 
-    `parameters(index)` gives pose (n, J, 3), betas and transl of the bodies that a slice or an array of n numbers
-    names, as `BodyModel.forward` takes them.
+    `parameters(index)` gives pose (n, J, 3), betas, transl and, where they have one, expression of the bodies that a
+    slice or an array of n numbers names, as `BodyModel.forward` takes them.
     """
 
     body: BodyModel
     length: int
-    parameters: Callable[[Index], tuple[NDArray[Any], NDArray[Any] | None, NDArray[Any] | None]]
+    parameters: Callable[[Index], tuple[Any, ...]]
 
     @classmethod
     def of(

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import FileError
-from .evaluate import Setting
-from .options import GROUND, PRESETS, UP
+from .options import GROUND, PRESETS, UP, Setting
 
 if TYPE_CHECKING:
     from ..data import DataSet
@@ -402,6 +401,7 @@ def _opened(
     import tempfile
 
     from ..evaluation.tables.job import Source
+    from ..evaluation.tables.models import Models
 
     unpacked = click.get_current_context().with_resource(tempfile.TemporaryDirectory())  # until the command ends
 
@@ -409,7 +409,7 @@ def _opened(
         raise click.UsageError(f"expected a --path for each --data, got {len(names)} and {len(paths)}")
     for title, name, path in zip(_told_apart(list(names)), names, paths, strict=True):
         try:
-            data = Source(name, str(path), split, options).open(Path(unpacked))
+            data = Source(name, str(path), split, options).open(Path(unpacked), Models())
         except TypeError as error:  # an option that its reader does not have
             raise ValueError(f"{name}: {error}") from error
         yield title, data

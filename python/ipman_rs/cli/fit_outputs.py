@@ -68,7 +68,9 @@ def posed(body: BodyModel, arrays: dict[str, np.ndarray], prefix: str = "") -> n
     pose = np.zeros((body.num_joints, 3))
     for name, columns in joints_of(body).items():
         pose[columns] = arrays[prefix + name].reshape(-1, 3)
-    return np.asarray(body(pose, arrays[f"{prefix}betas"][0], arrays[f"{prefix}transl"][0]).vertices)
+    betas, transl, expression = (arrays.get(prefix + name) for name in ("betas", "transl", "expression"))
+    rows = (None if each is None else each[0] for each in (betas, transl, expression))
+    return np.asarray(body(pose, *rows).vertices)
 
 
 def study_of(

@@ -148,12 +148,11 @@ def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
     if not kept:
         raise ValueError(f"nobody was found in any of {len(items)} frames; first of all: {unseen[0]}")
     body = ipt.BodyModel(settings.model)
-    problem = problem_of(
-        body, join([item.seen for item in kept if item.seen is not None]), settings, settings.presented(body.body)
-    )
+    seen = join([item.seen for item in kept if item.seen is not None])
+    problem = problem_of(body, seen, settings, settings.presented(body.body))
     rate = pace.fps / pace.every
     with console.progress(f"fitting {recording.name}", len(kept)) as step:
-        variables = start.before_camera(problem, **start.options(settings.config.start))
+        problem, variables = start.begin(problem, settings.config.start)
         told = {"rate": rate, "progress": lambda _stage, done: step.to(min(done, len(kept)))}
         found = fit_sequence(problem, variables, settings.config, **told)
     assert problem.points is not None

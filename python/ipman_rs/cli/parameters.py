@@ -99,9 +99,10 @@ def _read_parameters(stored: _Npz, model: str) -> Recording:
         raise FileError(stored.path, f"trans has shape {trans.shape}; expected ({len(pose)}, 3)")
     trans = None if trans is None else trans.reshape(-1, 3)
     betas, more = _betas(stored, body, len(pose), amass)
+    expression, untold = _expression(stored, body, len(pose))
 
-    def parameters(index: Index) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
-        return pose.of(index), _singles(betas, index), _singles(trans, index)
+    def parameters(index: Index) -> tuple[np.ndarray | None, ...]:
+        return pose.of(index), *(_singles(rows, index) for rows in (betas, trans, expression))
 
     vertices = PosedSequence(body, len(pose), parameters)
     why = ", as AMASS has it" if amass else ""
@@ -109,7 +110,7 @@ def _read_parameters(stored: _Npz, model: str) -> Recording:
     return Recording(
         stored.path, vertices[:].astype(np.float64) if len(pose) == 1 else vertices, body.faces, body.template,
         seconds=_seconds(stored, len(pose)), up=Z_UP if amass else Y_UP, up_why=why,
-        notes=(said, *pose.notes(), *more),
+        notes=(said, *pose.notes(), *more, *untold),
     )  # fmt: skip
 
 
@@ -167,6 +168,20 @@ def _betas(stored: _Npz, body: Any, frames: int, amass: bool) -> tuple[np.ndarra
     used = min(rows.shape[1], body.num_betas)
     notes = [f"shape: the first {used} of {rows.shape[1]} betas"] if used < rows.shape[1] else []
     return rows[:, :used], notes
+
+
+def _expression(stored: _Npz, body: Any, frames: int) -> tuple[np.ndarray | None, list[str]]:
+    """The face's expression, rows (1 or T, E), and what of it was left out."""
+    given = stored.first("expression")
+    if given is None or not given.any():
+        return None, []
+    rows = given.reshape(-1, given.shape[-1]) if given.ndim else given.reshape(1, 1)
+    if len(rows) not in (1, frames):
+        raise FileError(stored.path, f"expression has shape {given.shape}; expected one row, or {frames}")
+    used = min(rows.shape[1], body.num_expressions)
+    if not used:
+        return None, [f"expression: left out, for the body {body.name} has none"]
+    return rows[:, :used], [f"expression: the first {used} of {rows.shape[1]}"] if used < rows.shape[1] else []
 
 
 def _seconds(stored: _Npz, frames: int) -> np.ndarray | None:

@@ -28,7 +28,7 @@ from .presented import PresentedBody, of_pose, touching, y_up
 from .problem import Problem
 from .start import level_camera
 
-Array = NDArray[np.floating]
+Array = NDArray[np.float64]
 
 OPENPOSE = "openpose_"  # before the names of OpenPose's points in files of SPIN's form
 # Points that annotators and regressors place elsewhere than the body's joint of that name.

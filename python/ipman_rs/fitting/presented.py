@@ -70,7 +70,7 @@ class PresentedBody:
 
     def vertices(self, body: BodyModel) -> NDArray[np.float64]:
         """The mean body (V, 3) m in this pose, where the fit's world has it."""
-        return np.asarray(body(self.pose).vertices)
+        return np.asarray(body(self.pose).vertices, np.float64)
 
     def floor(self, body: BodyModel) -> float:
         """Height of the floor in the fit's world, m."""
