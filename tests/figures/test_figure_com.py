@@ -75,6 +75,14 @@ def test_a_body_in_the_air(figure, lite, tmp_path):
     assert "–" in said.out
 
 
+def test_a_body_in_millimetres(figure, lite, tmp_path):
+    np.savez(tmp_path / "mm.npz", vertices=1000 * ip.body.posed(lite, "standing"), faces=lite.faces)
+    said = figure("com", tmp_path / "mm.npz", "--body", "anny-lite")
+    assert said.code == 0
+    assert said.err.count("\n") == 1
+    assert "is it in millimetres?" in said.err
+
+
 @pytest.mark.parametrize(
     ("body", "more", "code", "words"),
     [

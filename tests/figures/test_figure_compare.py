@@ -13,8 +13,6 @@ import ipman_rs as ip
 from ipman_rs import data
 from ipman_rs.cli import fit_outputs, main
 
-pytest.importorskip("torch", reason="torch is the extra fit")
-
 
 def fitted(folder, name, body, pose, drop=0.0, **more):
     """A folder as `ipman predict` leaves it: a body in a named pose, `drop` m below its floor y = 0."""
@@ -79,6 +77,7 @@ def test_two_fitted_folders(figure, methods, lite, tmp_path):
 
 def test_folders_of_the_fitter(figure, tmp_path):
     """What `ipman fit` writes with and without physics terms, of one keypoint file."""
+    pytest.importorskip("torch", reason="torch is the extra fit")
     import keypoint_files
 
     path = keypoint_files.write(tmp_path / "anna.json", keypoint_files.seen("standing"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -425,11 +426,19 @@ def _models_in(folder: Path | None) -> Models:
 
 @contextmanager
 def _one_line_errors(output: Path) -> Iterator[None]:
-    """Ends the command with one line and exit code 1 where something could not be read or written."""
+    """Ends the command with one line and exit code 1 where something could not be read or written; a warning about
+    units is one line, too."""
+    import ipman_rs as ip
+
     from . import console
 
     try:
-        yield
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("ignore")
+            warnings.simplefilter("always", ip.UnitsWarning)
+            yield
+        for warning in caught[:1]:
+            console.warn(str(warning.message))
     except (FileError, ValueError, ImportError) as error:
         console.error(str(error))
         sys.exit(1)

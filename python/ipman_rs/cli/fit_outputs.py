@@ -19,6 +19,7 @@ import ipman_rs as ip
 
 from .. import view
 from ..body import BodyModel, safe_npz
+from ..body.stored_pose import joints_of
 from ..view.fitted import camera_of
 from . import mesh_files
 from .fit_inputs import Item
@@ -63,8 +64,6 @@ def complete(folder: Path, identity: str) -> dict[str, Any] | None:
 
 def posed(body: BodyModel, arrays: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
     """The vertices (V, 3) of stored parameters."""
-    from ..fitting.result import joints_of
-
     pose = np.zeros((body.num_joints, 3))
     for name, columns in joints_of(body).items():
         pose[columns] = arrays[prefix + name].reshape(-1, 3)

@@ -10,8 +10,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from ipman_rs.body import joints
 from ipman_rs.body.model import BodyModel
+from ipman_rs.body.stored_pose import joints_of
 from ipman_rs.plain import plain
 
 from .candidate import Candidate
@@ -27,14 +27,6 @@ PHYSICS = ("stability", "balance", "ground")
 POOR = 5.0  # % of the person's height: a median error above it is flagged
 OFF = 0.05  # m: a body whose lowest point is further from the floor is flagged
 FAR = 99.0  # m from the camera: where the start gives up
-# The names that the smplx package, and `ipman analyze`, give the pieces of a pose, by joints.
-_PIECES = {
-    "jaw_pose": ("jaw",),
-    "leye_pose": ("left_eye_smplhf",),
-    "reye_pose": ("right_eye_smplhf",),
-    "left_hand_pose": joints.LEFT_HAND,
-    "right_hand_pose": joints.RIGHT_HAND,
-}
 
 
 @dataclass(frozen=True)
@@ -148,14 +140,6 @@ def parameters(body: BodyModel, variables: Variables) -> Arrays:
     if body.num_expressions:
         found["expression"] = _array(variables["expression"])
     return {**found, "betas": _array(variables["betas"]), "transl": _array(variables["transl"])}
-
-
-def joints_of(body: BodyModel) -> dict[str, list[int]]:
-    """The joints of each piece of a stored pose that the body has."""
-    column = {name: index for index, name in enumerate(body.joint_names)}
-    whole = joints.SMPL if set(joints.SMPL) <= set(column) else joints.BODY
-    pieces = {"global_orient": joints.BODY[:1], "body_pose": whole[1:], **_PIECES}
-    return {name: [column[joint] for joint in piece] for name, piece in pieces.items() if set(piece) <= set(column)}
 
 
 def _before_physics(fit: Fit, config: Config, start: Variables) -> Variables | None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 import ipman_rs as ip
 from ipman_rs import view
 from ipman_rs.body import BodyModel, embedded, safe_npz
+from ipman_rs.body.stored_pose import joints_of
 from ipman_rs.data.frames import DataSet, Frames
 from ipman_rs.evaluation.tables import predictions
 from ipman_rs.evaluation.tables.models import Models
@@ -87,14 +88,13 @@ class FittedFolder:
 
 
 def _posed(body: BodyModel, arrays: Mapping[str, NDArray[Any]], path: Path) -> NDArray[np.float64]:
-    from ipman_rs.fitting.result import joints_of
-
     pose = np.zeros((body.num_joints, 3))
     for piece, columns in joints_of(body).items():
         if piece not in arrays or arrays[piece].size != 3 * len(columns):
             raise ValueError(f"{path}: {piece}: expected {3 * len(columns)} numbers for the body {body.name}")
         pose[columns] = arrays[piece].reshape(-1, 3)
-    return np.asarray(body(pose, arrays["betas"][0], arrays["transl"][0]).vertices, np.float64)
+    face = arrays["expression"][0] if "expression" in arrays and body.num_expressions else None
+    return np.asarray(body(pose, arrays["betas"][0], arrays["transl"][0], face).vertices, np.float64)
 
 
 def _ground(arrays: Mapping[str, NDArray[Any]], vertices: NDArray[np.float64]) -> tuple[ip.Ground, str]:
