@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .joints import BODY, LEFT_HAND, RIGHT_HAND, SMPL, SMPLH, SMPLX
+from .model import BodyModel
 
 WHOLE_POSES = ("poses", "fullpose", "pose")
 # Arrays that hold a piece of the pose, and the joints of that piece by its number of columns / 3.
@@ -67,6 +68,16 @@ def place(pieces: Sequence[Piece], joint_names: Sequence[str], length: int) -> N
         here = [k for k, name in enumerate(joints) if name in joint_names]
         pose[:, [joint_names.index(joints[k]) for k in here]] = rotations[:, here]
     return pose
+
+
+def joints_of(body: BodyModel) -> dict[str, list[int]]:
+    """The joints of each piece that a body has, under the names that the smplx package gives the pieces."""
+    column = {name: index for index, name in enumerate(body.joint_names)}
+    whole = SMPL if set(SMPL) <= set(column) else BODY
+    hands = {"left_hand_pose": LEFT_HAND, "right_hand_pose": RIGHT_HAND}
+    face = {"jaw_pose": SMPLX[22:23], "leye_pose": SMPLX[23:24], "reye_pose": SMPLX[24:25]}
+    pieces = {"global_orient": BODY[:1], "body_pose": whole[1:], **face, **hands}
+    return {name: [column[joint] for joint in piece] for name, piece in pieces.items() if set(piece) <= set(column)}
 
 
 def _whole(array: Array) -> Piece:

@@ -99,7 +99,7 @@ def stability(
         from ..paper_figures import stability_distribution as made
 
         losses = []
-        for name, data in _opened(names, paths, split, options):
+        for name, data in _opened(names, paths, split, options, _models_in(models)):
             with console.progress(f"measuring {name}", len(range(0, len(data), every))) as step:
                 losses.append(made.of_data_set(name, data, _models_in(models), every, preset, step.to))
         if not names:
@@ -256,7 +256,7 @@ def pressure(
     with _one_line_errors(output):
         from ..paper_figures import pressure as made
 
-        ((_, data),) = _opened((name,), (path,), split, options)
+        ((_, data),) = _opened((name,), (path,), split, options, _models_in(models))
         with console.busy("measuring and drawing"):
             asked = int(frame) if frame is not None and frame.isdecimal() else frame
             found = made.pressure(made.of_data_set(name, data, asked, _models_in(models)), preset)
@@ -297,7 +297,7 @@ def poses(
         from ..paper_figures import poses as made
 
         groups = []
-        for name, data in _opened(names, paths, split, options):
+        for name, data in _opened(names, paths, split, options, _models_in(None)):
             with console.progress(f"reading {name}", min(most, len(data))) as step:
                 groups.append(made.of_data_set(name, data, most, step.to))
         if not names:
@@ -368,7 +368,11 @@ def compare(
         from ..paper_figures.estimated_people import FittedFolder, Predicted
 
         found_by: list[tuple[str, Any]] = []
-        opened = None if name is None or path is None else next(_opened((name,), (path,), split, options))[1]
+        opened = (
+            None
+            if name is None or path is None
+            else next(_opened((name,), (path,), split, options, _models_in(models)))[1]
+        )
         for title, method in zip(names, methods, strict=True):
             if opened is None and method.is_file():
                 raise click.UsageError(
@@ -396,13 +400,16 @@ def _told_apart(names: list[str]) -> list[str]:
 
 
 def _opened(
-    names: tuple[str, ...], paths: tuple[Path, ...], split: str | None, options: tuple[tuple[str, Any], ...]
+    names: tuple[str, ...],
+    paths: tuple[Path, ...],
+    split: str | None,
+    options: tuple[tuple[str, Any], ...],
+    models: Models,
 ) -> Iterator[tuple[str, DataSet]]:
     """Each data set with its name, opened when its turn comes."""
     import tempfile
 
     from ..evaluation.tables.job import Source
-    from ..evaluation.tables.models import Models
 
     unpacked = click.get_current_context().with_resource(tempfile.TemporaryDirectory())  # until the command ends
 
@@ -410,7 +417,7 @@ def _opened(
         raise click.UsageError(f"expected a --path for each --data, got {len(names)} and {len(paths)}")
     for title, name, path in zip(_told_apart(list(names)), names, paths, strict=True):
         try:
-            data = Source(name, str(path), split, options).open(Path(unpacked), Models())
+            data = Source(name, str(path), split, options).open(Path(unpacked), models)
         except TypeError as error:  # an option that its reader does not have
             raise ValueError(f"{name}: {error}") from error
         yield title, data

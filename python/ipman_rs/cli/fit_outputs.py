@@ -19,7 +19,7 @@ import ipman_rs as ip
 
 from .. import view
 from ..body import BodyModel, safe_npz
-from ..body.stored_pose import joints_of
+from ..body.pose_arrays import joints_of
 from ..view.fitted import camera_of
 from . import mesh_files
 from .fit_inputs import Item

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ipman_rs.body.model import BodyModel
-from ipman_rs.body.stored_pose import joints_of
+from ipman_rs.body.pose_arrays import joints_of
 from ipman_rs.plain import plain
 
 from .candidate import Candidate

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import ipman_rs as ip
 from ipman_rs import view
 from ipman_rs.body import BodyModel, embedded, safe_npz
-from ipman_rs.body.stored_pose import joints_of
+from ipman_rs.body.pose_arrays import joints_of
 from ipman_rs.data.frames import DataSet, Frames
 from ipman_rs.evaluation.tables import predictions
 from ipman_rs.evaluation.tables.models import Models
