@@ -142,5 +142,10 @@ def test_bad_input(figure, methods, lite, tmp_path):
     assert "anna.npz: not a .npz file" in said.err
     fitted(ours, "anna", lite, "tree", model=np.array("SMPL_NEUTRAL"))
     assert "give --body FILE" in figure("compare", base, ours).err
+    fitted(ours, "anna", lite, "tree", betas=np.array(0.0))
+    assert "anna.npz: expected parameters" in figure("compare", base, ours).err
+    fitted(ours, "anna", lite, "tree")
+    (ours / "anna" / "fit.json").write_text("{")
+    assert "fit.json: expected the record of a fit" in figure("compare", base, ours).err
     fitted(tmp_path / "others", "carl", lite, "tree")
     assert "nobody of the same name" in figure("compare", base, tmp_path / "others").err

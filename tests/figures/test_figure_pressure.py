@@ -42,6 +42,18 @@ def test_the_numbers(figure, recording, contents):
     assert contents(said.folder) == contents(again.folder)
 
 
+def test_the_recording_s_stability(figure, recording):
+    """L_stability of a data set whose bodies need a model file, z up."""
+    path, models = recording
+    said = figure("stability", "--data", "moyo", "--path", path, "--models", models, "--every", 2)
+    assert said.code == 0, said.err
+    (about,) = said.numbers["data"]
+    pressed = made.of_data_set("moyo", data.open("moyo", path), 0, Models(models))
+    loss = ip.stability_loss(pressed.vertices, pressed.model.template, pressed.ground)
+    assert about["bodies"] == 2
+    assert about["median_m"] == pytest.approx(float(loss), abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
     [

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -50,6 +51,12 @@ class FittedFolder:
         path = self.path / name / f"{name}.npz"
         if not path.is_file():
             raise ValueError(f"{path}: there is no such file; was the fit interrupted?")
+        try:
+            return self._study(path, name, preset)
+        except (IndexError, TypeError) as error:  # an array of another shape
+            raise ValueError(f"{path}: expected parameters of ipman fit or predict: {error}") from error
+
+    def _study(self, path: Path, name: str, preset: str) -> Study:
         arrays = {key: safe_npz.read(path, key) for key in safe_npz.names(path)}
         lacking = [key for key in ("betas", "transl", "model", "image_size", *CAMERA) if key not in arrays]
         if lacking:
@@ -78,8 +85,11 @@ class FittedFolder:
         """The pixels of a person's photo, None where there is none."""
         from ipman_rs.fitting import photo
 
-        record = json.loads((self.path / name / RECORD).read_text(encoding="utf-8"))
-        source = Path(str(record.get("source", "")))
+        record = self.path / name / RECORD
+        try:
+            source = Path(str(json.loads(record.read_text(encoding="utf-8"))["source"]))
+        except (ValueError, KeyError, TypeError) as error:
+            raise ValueError(f"{record}: expected the record of a fit, with its source ({error})") from error
         folders = [] if self.photos is None else [self.photos]
         stems = dict.fromkeys((name, source.stem))
         places = [folder / f"{stem}{ending}" for folder in folders for stem in stems for ending in PHOTOS]
@@ -115,19 +125,22 @@ class Predicted:
 
     def names(self) -> list[str]:
         """Of the predicted frames. ValueError as `ipman evaluate` says it."""
-        with TemporaryDirectory() as unpacked:
-            return [str(name) for name in predictions.read(self.path, Path(unpacked)).columns["names"][:]]
+        return [str(name) for name in self._read[0].columns["names"][:]]
+
+    @cached_property
+    def _read(self) -> tuple[predictions.Predictions, TemporaryDirectory]:
+        """The file, and the folder of what had to be unpacked, which lasts as long."""
+        unpacked = TemporaryDirectory()
+        return predictions.read(self.path, Path(unpacked.name)), unpacked
 
     def study(self, name: str, preset: str = "paper-r") -> Study:
         """The measured body of one frame in the data set's camera. ValueError, naming the file, where something that is
         needed is not there."""
         row, true = self._frame(name)
-        with TemporaryDirectory() as unpacked:
-            found = predictions.read(self.path, Path(unpacked))
-            number = int(found.index.find(np.array([name]))[0])
-            if number < 0:
-                raise ValueError(f"{self.path}: has no prediction for {name!r}")
-            guess = found[np.array([number])]
+        number = int(self._read[0].index.find(np.array([name]))[0])
+        if number < 0:
+            raise ValueError(f"{self.path}: has no prediction for {name!r}")
+        guess = self._read[0][np.array([number])]
         bodies = self.models.posed(guess)
         if bodies.vertices is None or bodies.model is None:
             raise ValueError(f"{self.path}: has no bodies whose model is here: give --models FOLDER")
@@ -172,7 +185,8 @@ def shared_names(methods: Sequence[tuple[str, Estimated]], wanted: Sequence[str]
     """The people that all methods have: those that are wanted, or up to `most`, evenly spaced. ValueError if one is not
     in all, or none is."""
     lists = [method.names() for _, method in methods]
-    shared = [name for name in lists[0] if all(name in other for other in lists[1:])]
+    others = [set(names) for names in lists[1:]]
+    shared = [name for name in lists[0] if all(name in other for other in others)]
     lost = [name for name in wanted if name not in shared]
     if lost:
         raise ValueError(f"people: {lost[0]!r} is not in all of them; these are: {', '.join(shared[:20]) or 'nobody'}")
