@@ -50,26 +50,25 @@ def write(found: Found, run: Benchmark) -> Path:
     (run.folder / f"{name}.json").write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
     _write_csv(found, run.folder / f"{name}.csv")
     _plot(record["blocks"], run.folder / f"{name}.svg")
+    path = run.folder / f"{name}.md"
+    path.write_text(page(record))
+    return path
+
+
+def page(record: dict[str, Any]) -> str:
+    """The Markdown of a record, as `write` leaves it in the JSON."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent), trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True,
     )  # fmt: skip
     environment.filters |= {"interval": _interval, "signed": _signed}
-    tilts = "" if tuple(found) == TILTS[run.task.name] else "".join(f" --tilt {tilt:g}" for tilt in found)
-    page = run.folder / f"{name}.md"
-    page.write_text(
-        environment.get_template(TEMPLATE).render(
-            record,
-            name=name,
-            tilts=tilts,
-            verdicts=verdicts(record["blocks"]),
-            claims=judged(record["blocks"]),
-            units=UNITS,
-            columns=COLUMNS,
-            differences=DIFFERENCES,
-        )  # fmt: skip
-    )
-    return page
+    task = record["run"]["name"]
+    tilts = tuple(block["tilt"] for block in record["blocks"])
+    return environment.get_template(TEMPLATE).render(
+        record, name=PAGES[task], tilts="" if tilts == TILTS[task] else "".join(f" --tilt {tilt:g}" for tilt in tilts),
+        verdicts=verdicts(record["blocks"]), claims=judged(record["blocks"]), units=UNITS, columns=COLUMNS,
+        differences=DIFFERENCES,
+    )  # fmt: skip
 
 
 def columns(figures: Figures) -> dict[str, Array]:
