@@ -42,7 +42,7 @@ stages:
     free: [orient, pose, betas, transl]
     iterations: 12
     find_ground: true
-    weights: {reprojection: 4, pose_prior: 1, stability: 1.0e+3, ground: 1.0e+3}
+    weights: {reprojection: 4, pose_prior: 1, hand_prior: 1, stability: 1.0e+3, ground: 1.0e+3}
 """
 
 
@@ -130,11 +130,13 @@ def test_table_2_in_two_commands(yoga, models, tmp_path, preset):
     """One still frame of each sequence of the validation split, seen by camera 1, as the paper has it."""
     said = fit_moyo(yoga, models, tmp_path / "out", preset(PRESENTED))
     assert "next: ipman evaluate" in said
+    assert f"--models {models}" in said
     found = arrays(tmp_path / "out" / "predictions.npz")
     stills = data.open("moyo", yoga.root, split="val", frames="selected")[:]
     assert found["names"].tolist() == stills.names.tolist()
     assert len(stills) == 2
     assert str(found["body"]) == "smplx"
+    np.testing.assert_allclose(found["ground"], [[0, 0, 1, 0]] * 2, atol=1e-12)  # of MoYo, for whoever reads the file
     # The root keeps the presented rotation, and the body its place: R^b = I, t^b = 0 in the recorded frame.
     np.testing.assert_allclose(found["pose"][:, 0], stills.pose[:, 0], atol=1e-9)
     model = Models(models).get("smplx", "female")
@@ -216,7 +218,8 @@ def test_a_named_pose_for_all(yoga, models, tmp_path, preset):
     vertices = model(found["pose"], found["betas"], found["transl"]).vertices
     drawn = ip.body.posed(model, "tree")
     assert np.ptp(vertices[..., 2], axis=1) == pytest.approx(np.ptp(drawn[:, 1]), abs=0.15)  # z is up in MoYo
-    np.testing.assert_allclose(vertices[..., 2].min(axis=1), 0, atol=0.05)
+    # It began on the floor; after so few iterations shape and pose are still on their way.
+    np.testing.assert_allclose(vertices[..., 2].min(axis=1), 0, atol=0.1)
 
 
 @pytest.mark.parametrize(
@@ -226,6 +229,7 @@ def test_a_named_pose_for_all(yoga, models, tmp_path, preset):
         (("--data", "moyo"), "expected INPUT..., or --data with --path"),
         ((), "expected INPUT..., or --data with --path"),
         (("--data", "moyo", "--path", ".", "--focal", "900"), "leave out --focal"),
+        (("--data", "moyo", "--path", ".", "--camera-pitch", "30", "--obj"), "leave out --camera-pitch, --obj"),
         (("--data", "moyo", "--path", ".", "--preset", "nonsense"), "expected one of"),
     ],
 )
@@ -241,3 +245,26 @@ def test_what_is_missing_is_named(yoga, models, tmp_path, preset):
     said = run("fit", "--data", "moyo", *root, "-o", tmp_path / "o", code=1)
     assert "SMPLX_FEMALE" in said
     assert "--models" in said
+
+
+def test_a_frame_without_keypoints_is_left_out(scans, models, tmp_path, preset, monkeypatch):
+    """Without MediaPipe, too; keypoints of a file belong to the frame that it names, and to no other."""
+    from ipman_rs.fitting import photo
+
+    def missing():
+        raise ImportError("photos need MediaPipe")
+
+    monkeypatch.setattr(photo, "_model", missing)
+    folder = tmp_path / "keypoints"
+    names = scans.frames.names.tolist()
+    for name in names[:2]:
+        place = folder / f"{name}_keypoints.json"
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes((scans.root / "keypoints" / f"{name}_keypoints.json").read_bytes())
+    where = "--data", "rich", "--path", scans.root, "--models", models, "--preset", preset(CALIBRATED)
+    said = run("fit", *where, "--keypoints", folder, "-o", tmp_path / "o", code=1)
+    assert "left out: no keypoint file" in said
+    assert arrays(tmp_path / "o" / "predictions.npz")["names"].tolist() == names[:2]
+    assert "--partial" in said
+    said = run("fit", *where, "-o", tmp_path / "p", code=1)
+    assert "no frame has a body; the first: photos need MediaPipe; or give keypoint files" in said

@@ -15,6 +15,8 @@ import ipman_rs as ip
 from ipman_rs.body import poses
 from ipman_rs.fitting import presented
 
+LITE = {"pose": np.zeros((1, 72)), "model": np.array("anny-lite")}
+
 
 @pytest.fixture(scope="module")
 def smplx(tmp_path_factory):
@@ -212,3 +214,80 @@ def test_one_of_several_poses(lite, tmp_path):
     np.savez(tmp_path / "two.npz", pose=rows, model=np.array("anny-lite"))
     found = presented.load(tmp_path / "two.npz", lite, frame=1)
     np.testing.assert_allclose(found.pose, poses.pose_of(lite, "squat"), atol=1e-12)
+
+
+def test_predictions_are_presented_as_they_stand(smplx, tmp_path):
+    """The form of `ipman evaluate`: axes of a data set with a ground for each frame, and fingers that are absolute."""
+    pose = np.stack([poses.pose_of(smplx, name) for name in ("standing", "squat")])
+    turn = Rotation.from_rotvec([np.pi / 2, 0, 0])  # y up to z up
+    turned = pose + smplx.pose_mean
+    turned[:, 0] = (turn * Rotation.from_rotvec(pose[:, 0])).as_rotvec()
+    lowest = [float(smplx(each).vertices[:, 1].min()) for each in pose]
+    pelvis = smplx.J_template[0]
+    transl = np.tile(turn.apply(pelvis) - pelvis, (2, 1))
+    told = {"names": np.array(["a", "b"]), "body": np.array("smplx"), "pose": turned, "transl": transl}
+    np.savez(tmp_path / "grounded.npz", **told, ground=np.array([[0, 0, 1, height] for height in lowest]))
+    found = presented.load(tmp_path / "grounded.npz", smplx, frame=1)
+    np.testing.assert_allclose(found.pose, pose[1], atol=1e-9)
+    assert found.record(smplx)["lowest_above_floor_m"] == pytest.approx(0.0, abs=1e-9)
+    np.savez(tmp_path / "bare.npz", **told)
+    with pytest.raises(ValueError, match="say what points up"):
+        presented.load(tmp_path / "bare.npz", smplx, frame=1)
+    by_hand = presented.load(tmp_path / "bare.npz", smplx, frame=1, up=(0.0, 0.0, 1.0))
+    np.testing.assert_allclose(by_hand.pose, pose[1], atol=1e-9)
+
+
+def test_components_of_hands_are_those_of_the_frame(smplx, tmp_path):
+    """Each hand by itself, and of the frame that is presented."""
+    np.savez(
+        tmp_path / "shown.npz", body_pose=np.zeros((3, 63)), left_hand_pose=np.arange(36).reshape(3, 12) / 100,
+        right_hand_pose=np.full((3, 45), 0.2),
+    )  # fmt: skip
+    found = presented.load(tmp_path / "shown.npz", smplx, frame=2)
+    np.testing.assert_allclose(found.pose[25:40].ravel()[:12], np.arange(24, 36) / 100)
+    np.testing.assert_allclose(found.pose[40:], 0.2)
+
+
+def test_a_height_alone_is_a_floor(lite, tmp_path):
+    """As the parameters of a fitted sequence have it."""
+    np.savez(tmp_path / "shown.npz", **LITE, ground_height=np.array([-1.5]))
+    assert presented.load(tmp_path / "shown.npz", lite).height == pytest.approx(-1.5)
+
+
+def test_fingers_without_a_jaw_may_be_smplx(smplx, tmp_path):
+    pieces = {"global_orient": np.zeros(3), "body_pose": np.zeros(63)}
+    hands = {"left_hand_pose": np.zeros(45), "right_hand_pose": np.zeros(45)}
+    np.savez(tmp_path / "shown.npz", **pieces, **hands, ground=np.array([0, 1, 0, -1.2]), contact=np.array([[1, 2]]))
+    found = presented.load(tmp_path / "shown.npz", smplx)
+    assert (found.height, found.contact.tolist()) == (pytest.approx(-1.2), [1, 2])
+
+
+@pytest.mark.parametrize(
+    ("arrays", "says"),
+    [
+        ({"pose": np.full((1, 72), 20.0)}, "looks like degrees"),
+        ({"pose": np.full((1, 72), 1e30)}, "looks like degrees"),
+        ({**LITE, "ground": np.array([0, 1, 0, -900.0])}, "in metres?"),
+        ({**LITE, "ground": np.array([0, 0, 0, 1.0])}, "a finite normal that is not 0"),
+        ({**LITE, "ground": np.array([0, 1, 0, np.nan])}, "a finite normal that is not 0"),
+        ({**LITE, "ground": np.array([0, 1, 0, 0]), "transl": np.full((1, 3), np.nan)}, "transl: expected finite"),
+        ({**LITE, "ground": np.array([0, 1, 0, 0]), "transl": np.zeros((0, 3))}, "transl: expected finite"),
+        ({**LITE, "ground": np.array([0, 1, 0, 0]), "betas": np.array(1.0)}, "betas: expected finite"),
+    ],
+)
+def test_what_cannot_be_is_refused(arrays, says, lite, tmp_path):
+    np.savez(tmp_path / "shown.npz", **arrays)
+    with pytest.raises(ValueError, match=re.escape(says)) as raised:
+        presented.load(tmp_path / "shown.npz", lite)
+    assert str(tmp_path / "shown.npz") in str(raised.value)
+
+
+def test_options_of_files_do_not_go_with_names(lite):
+    with pytest.raises(ValueError, match="leave out --pose-frame"):
+        presented.load("tree", lite, frame=3)
+
+
+def test_infinite_contact(lite, tmp_path):
+    (tmp_path / "touch.json").write_text("[1, Infinity]")
+    with pytest.raises(ValueError, match="whole numbers"):
+        presented.load("tree", lite, contact=tmp_path / "touch.json")

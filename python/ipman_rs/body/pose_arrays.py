@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .joints import BODY, LEFT_HAND, RIGHT_HAND, SMPL, SMPLH, SMPLX
 from .model import BodyModel
 
-WHOLE_POSES = ("poses", "fullpose", "pose")
+WHOLE_POSES = ("poses", "fullpose", "pose", "full_pose")
 # Arrays that hold a piece of the pose, and the joints of that piece by its number of columns / 3.
 PIECES: dict[str, tuple[tuple[str, ...], ...]] = {
     "global_orient": (BODY[:1],),
@@ -85,6 +85,8 @@ def _whole(array: Array) -> Piece:
     by_columns[72] = SMPL
     if array.ndim >= 2 and array.shape[-1] == 3 and 3 * array.shape[-2] in by_columns:
         array = array.reshape(*array.shape[:-2], -1)
+    if array.ndim == 3 and array.shape[-1] in by_columns and array.shape[0] == 1:
+        array = array[0]
     if array.ndim not in (1, 2) or array.shape[-1] not in by_columns or array.size == 0:
         counts = ", ".join(str(count) for count in sorted(by_columns))
         raise ValueError(f"the pose has shape {array.shape}; expected (T, n) with n of {counts}")

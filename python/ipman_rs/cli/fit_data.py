@@ -6,10 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from . import console
 
-NOT_OF_DATA = ("camera", "focal", "ground", "image", "person", "image_size", "contact", "pose_frame", "pose_up")
+NOT_OF_DATA = (
+    "camera", "focal", "pitch", "ground", "image", "person", "image_size", "obj", "pictures", "sequence", "fps",
+    "resume",
+)  # fmt: skip
 
 
 def fit_data(
@@ -25,9 +29,13 @@ def fit_data(
     from ..fitting import config
     from ..fitting.data_fits import PAPER, PREDICTIONS, DataFit, source_of
 
-    given = [f"--{name.replace('_', '-')}" for name in NOT_OF_DATA if options.get(name) is not None]
+    said = click.get_current_context().get_parameter_source
+    given = [name for name in NOT_OF_DATA if said(name) is ParameterSource.COMMANDLINE]
     if given:
-        raise click.UsageError(f"--data brings its own cameras, ground and people: leave out {', '.join(given)}")
+        words = ", ".join("--camera-pitch" if name == "pitch" else f"--{name.replace('_', '-')}" for name in given)
+        raise click.UsageError(
+            f"--data has its own cameras, ground and people, and goes on by itself: leave out {words}"
+        )
     paper = PAPER.get(source["name"])
     preset = options["preset"] or ("fast" if paper is None else paper.preset)
     try:
@@ -36,7 +44,7 @@ def fit_data(
         raise click.UsageError(str(error)) from error
     if options["iterations"] is not None:
         chosen = config.capped(chosen, options["iterations"])
-    of_person = {name: options[name] for name in ("height", "mass", "pose")}
+    of_person = {name: options[name] for name in ("height", "mass", "pose", "pose_frame", "pose_up", "contact")}
     data = source_of(source["name"], source["path"], source["split"], dict(source["options"]))
     job = DataFit(data, chosen, output, models, options["model"], keypoints, images, every, **of_person)
     try:
@@ -49,11 +57,11 @@ def fit_data(
     except OSError as error:
         console.error(f"{error.filename or output}: {error.strerror or error}; what is done is kept")
         return 1
-    _say(record, output / PREDICTIONS, source)
+    _say(record, output / PREDICTIONS, source, models)
     return 1 if record["left_out"] else 0
 
 
-def _say(record: dict[str, Any], predictions: Path, source: dict[str, Any]) -> None:
+def _say(record: dict[str, Any], predictions: Path, source: dict[str, Any], models: Path | None) -> None:
     count = record["fitted"]
     console.print_rows(
         ["", "frames", "fitted", "converged", "error px", "error %"],
@@ -72,11 +80,20 @@ def _say(record: dict[str, Any], predictions: Path, source: dict[str, Any]) -> N
     if len(record["left_out"]) > 10:
         console.warn(f"and {len(record['left_out']) - 10:,} frames more, see fits.json")
     console.say(f"predictions: {predictions.resolve()}")
+    console.say(f"next: {_evaluation(record, predictions, source, models)}")
+
+
+def _evaluation(record: dict[str, Any], predictions: Path, source: dict[str, Any], models: Path | None) -> str:
+    """The command that measures the predictions."""
+    from ..evaluation.tables.paper import TABLES
     from ..fitting.data_fits import PAPER
 
     paper = PAPER.get(source["name"])
-    which = f"--data {source['name']}" if paper is None else f"--table {paper.table}"
-    partial = " --partial" if record["left_out"] or record["fitted"] < record["frames"] else ""
-    console.say(
-        f"next: ipman evaluate {predictions} {which} --path {source['path']} -o {predictions.parent}/table{partial}"
-    )
+    table = paper.table if paper is not None else source["name"]
+    words = ["ipman evaluate", str(predictions), f"--table {table}" if table in TABLES else f"--data {source['name']}"]
+    words += [f"--path {source['path']}"]
+    words += [] if source["split"] is None else [f"--split {source['split']}"]
+    words += [f"--option {name}={value}" for name, value in source["options"]]
+    words += [] if models is None else [f"--models {models}"]
+    words += ["--partial"] if record["left_out"] or record["every"] > 1 else []
+    return " ".join([*words, f"-o {predictions.parent / 'table'}"])

@@ -148,8 +148,8 @@ def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
     if not kept:
         raise ValueError(f"nobody was found in any of {len(items)} frames; first of all: {unseen[0]}")
     body = ipt.BodyModel(settings.model)
-    seen = join([item.seen for item in kept if item.seen is not None])
-    problem = problem_of(body, seen, settings, settings.presented(body.body))
+    seen, imitated = join([item.seen for item in kept if item.seen is not None]), settings.presented(body.body)
+    problem = problem_of(body, seen, settings, imitated)
     rate = pace.fps / pace.every
     with console.progress(f"fitting {recording.name}", len(kept)) as step:
         problem, variables = start.begin(problem, settings.config.start)
@@ -157,7 +157,10 @@ def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
         found = fit_sequence(problem, variables, settings.config, **told)
     assert problem.points is not None
     median = (found.candidate.projected - problem.points).norm(dim=-1).median()
-    return found, {}, {"frames_left_out": unseen, "median_error_px": _number(median)}, rate
+    record: dict[str, Any] = {"frames_left_out": unseen, "median_error_px": _number(median)}
+    if imitated is not None:
+        record |= {"presented": imitated.record(body.body), "notes": [*imitated.notes]}
+    return found, {}, record, rate
 
 
 def _stages(found: Fit) -> dict[str, Any]:

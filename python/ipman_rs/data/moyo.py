@@ -111,6 +111,8 @@ def open(
     `.c3d` files and the extra is not installed.
     """
     root = Path(path)
+    if camera is not None and camera not in range(1, 9):
+        raise ValueError(f"camera: expected 1 to 8, got {camera!r}")
     if frames not in ("all", "selected") and Path(frames).suffix not in (".py", ".json"):
         raise ValueError(f"frames: expected all, selected, or a list in a .py or .json file, got {frames!r}")
     chosen = None if frames in ("all", "selected") else moyo_stills.Chosen(frames)

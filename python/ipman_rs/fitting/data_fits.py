@@ -88,8 +88,8 @@ class DataFit:
 
     folder: of the results. models: folder of model files. body: an embedded body or a model file; None: the data set's
     own. keypoints: folder of keypoint files, named as the frames. images: where the paths of images begin. every: fit
-    each n-th frame. pose: a presented pose for all, by name or file; None: the recorded ones. height, mass: of the
-    person; None: of the data set's body.
+    each n-th frame. pose: a presented pose for all, by name or file, with its frame, up and contact as in
+    `presented.load`; None: the recorded ones. height, mass: of the person; None: of the data set's body.
     """
 
     source: Source
@@ -101,6 +101,9 @@ class DataFit:
     images: Path = Path()
     every: int = 1
     pose: str | None = None
+    pose_frame: int | None = None
+    pose_up: tuple[float, float, float] | None = None
+    contact: Path | None = None
     height: float | None = None
     mass: float | None = None
     piece: int = PIECE
@@ -141,8 +144,7 @@ class DataFit:
             raise ValueError(f"{self.source.name}: has no poses to present; give one with --pose")
         if first.cameras is None and not self.stays:
             raise ValueError(f"{self.source.name}: has no cameras here, and the preset needs them")
-        if self.pose is not None:
-            presented.load(self.pose, body)
+        self._presented_to_all(body)
         if weighs(self.config, "measured_shape") and self.height is None and self.mass is None:
             self.sizes([first], [self._gender(first)])
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -162,7 +164,8 @@ class DataFit:
     def made_of(self) -> dict[str, Any]:
         """All that decides the fits, as plain values; no paths, for a folder may be moved."""
         files = [] if self.models is None else self.bodies.files(str(self.data[slice(0, 1)].body))
-        files += [Path(path) for path in (self.body, self.pose) if path is not None and Path(path).is_file()]
+        given = (self.body, self.pose, self.contact)
+        files += [Path(path) for path in given if path is not None and Path(path).is_file()]
         listed = [] if self.keypoints is None else sorted(self.keypoints.rglob("*.json"))
         content = hashlib.sha256()
         for path in listed:
@@ -176,7 +179,8 @@ class DataFit:
             "every": self.every,
             "preset": json.loads(json.dumps(asdict(self.config), default=str)),
             "body": None if self.body is None else Path(self.body).name,
-            "pose": None if self.pose is None else Path(self.pose).name,
+            "pose": None if self.pose is None else [Path(self.pose).name, self.pose_frame, str(self.pose_up)],
+            "contact": None if self.contact is None else self.contact.name,
             "files": {path.name: fingerprint(path) for path in sorted(files)},
             "keypoints": None if self.keypoints is None else content.hexdigest(),
             "height": self.height,
@@ -264,6 +268,9 @@ class DataFit:
                     why = too_little(shared, found.select(shared).confidence[0])
                     if why is not None or found.image_size is None:
                         raise ValueError(why or "the size of its image is not known")
+                except ImportError as error:
+                    left_out[name] = f"{error}; or give keypoint files (--keypoints)"
+                    continue
                 except ValueError as error:
                     left_out[name] = str(error)
                     continue
@@ -276,9 +283,6 @@ class DataFit:
             return data_frames.detections_of(frame)
         name = str(frame.names[0])
         places = [self.keypoints / f"{name}{ending}" for ending in (".json", "_keypoints.json")]
-        if frame.images is not None:
-            stem = Path(str(frame.images[0])).stem
-            places += [self.keypoints / f"{stem}{ending}" for ending in (".json", "_keypoints.json")]
         place = next((place for place in places if place.is_file()), None)
         if place is None:
             raise ValueError(f"no keypoint file {places[0]}")
@@ -306,8 +310,8 @@ class DataFit:
     ) -> tuple[list[presented.PresentedBody] | None, list[World]]:
         """The presented pose of each frame, if the preset imitates one, and the worlds of the fits."""
         whole = [World.of(frame) for frame in frames]
-        if self.pose is not None:
-            shown = presented.load(self.pose, body)
+        shown = self._presented_to_all(body)
+        if shown is not None:
             return [shown] * len(frames), [_on_floor(world, frame, shown.floor(body), self.stays)
                                            for world, frame in zip(whole, frames, strict=True)]  # fmt: skip
         if not self.imitates:
@@ -315,6 +319,12 @@ class DataFit:
         found = [data_frames.presented_of(frame, self.bodies.posed(frame), body) for frame in frames]
         worlds = [world for _, world in found]
         return [each for each, _ in found], worlds if self.stays else whole
+
+    def _presented_to_all(self, body: BodyModel) -> presented.PresentedBody | None:
+        """The pose that all are presented, if there is one. Raises ValueError."""
+        if self.pose is None:
+            return None
+        return presented.load(self.pose, body, contact=self.contact, frame=self.pose_frame, up=self.pose_up)
 
     def sizes(self, frames: Sequence[Frames], genders: Sequence[str]) -> list[tuple[float, float]]:
         """Height, m, and mass, kg, of each person: as given, or of the data set's own body in its zero pose."""
@@ -350,7 +360,7 @@ class DataFit:
             "contact_vertices": contacts,
         }
         ground = result.candidate.problem.ground
-        if seen.frame.ground is None and ground is not None:
+        if ground is not None:
             row["ground"] = world.ground(float(ground.height.reshape(-1)[0]))
         return row
 
@@ -381,6 +391,7 @@ class DataFit:
             "preset": self.config.name,
             "body": kind,
             "frames": len(self.rows),
+            "every": self.every,
             "fitted": len(arrays["names"]),
             "converged": int(arrays["converged"].sum()),
             "median_reprojection_px": float(np.median(arrays["median_px"])),

@@ -187,5 +187,6 @@ def prediction(row: dict[str, Any], world: World, body: BodyModel) -> dict[str, 
     betas = row["betas"][0]
     root = body.J_template[0] + body.J_shapedirs[0, :, : len(betas)] @ betas
     pose = row["full_pose"][0] + body.pose_mean  # absolute hands, as data sets have them
+    pose = Rotation.from_rotvec(pose).as_rotvec()  # what nothing held may have turned more than once
     pose[0], transl = world.body(pose[0], row["transl"][0], root)
     return {"pose": pose, "betas": betas, "transl": transl}

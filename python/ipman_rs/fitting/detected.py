@@ -10,7 +10,6 @@ import torch
 from torch import Tensor
 
 import ipman_rs.torch as ipt
-from ipman_rs.checks import positive
 
 from .camera import Camera
 from .camera_file import KnownCamera
@@ -60,7 +59,7 @@ def problem(
     size = torch.from_numpy(np.asarray(detections.image_size, dtype=np.float64))
 
     def each(name: str, value: float | None) -> Tensor | None:
-        return None if value is None else torch.full((people,), positive(name, value), dtype=torch.float64)
+        return None if value is None else torch.full((people,), measured(name, value), dtype=torch.float64)
 
     def known_of(numbers: tuple[float, ...] | None, *shape: int) -> Tensor | None:
         if numbers is None:
@@ -88,6 +87,19 @@ def problem(
         height=each("height", height),
         mass=each("mass", mass),
     )
+
+
+# What a focal length, a person's height and a mass can be: unit, least and largest.
+POSSIBLE = {"focal": ("pixels", 0.0, math.inf), "height": ("metres", 0.4, 2.8), "mass": ("kilograms", 3.0, 400.0)}
+
+
+def measured(name: str, value: float) -> float:
+    """A focal length, height or mass. ValueError, with its unit, for what none can be."""
+    unit, least, largest = POSSIBLE[name]
+    if not least < value < largest:
+        within = "above 0" if largest == math.inf else f"between {least:g} and {largest:g}"
+        raise ValueError(f"{name}: expected {unit} {within}, got {value:g}")
+    return float(value)
 
 
 def shared_names(body: ipt.BodyModel, detections: Detections) -> tuple[str, ...]:

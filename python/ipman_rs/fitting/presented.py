@@ -31,7 +31,7 @@ from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
 import ipman_rs.torch as ipt
-from ipman_rs.body import BodyModel, embedded, pose_arrays, poses, safe_npz, safe_pickle
+from ipman_rs.body import BodyModel, embedded, joints, pose_arrays, poses, safe_npz, safe_pickle
 from ipman_rs.ground import Ground
 
 from .problem import Presented, Problem
@@ -41,8 +41,11 @@ Axis = tuple[float, float, float]
 
 NEAR, GEODESIC = 0.02, 0.3  # m: to touch, and from where on along the surface two places are different ones
 ENDINGS = (".npz", ".pkl")
+LARGEST_ANGLE = 4 * np.pi  # a turn and more in a rotation vector are degrees
+FARTHEST = 10.0  # m, of a pelvis above or below its floor
 _Z_UP = ("poses", "fullpose", "root_orient")  # arrays of AMASS and MoYo, whose worlds have z up
-_ABSOLUTE = ("poses", "fullpose", "pose_hand")  # whose fingers are not relative to the mean hand
+_ABSOLUTE = ("poses", "fullpose", "pose_hand", "full_pose")  # whose fingers are not relative to the mean hand
+_HANDS = {"left_hand_pose": joints.LEFT_HAND, "right_hand_pose": joints.RIGHT_HAND}
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,9 +108,16 @@ def load(
         ValueError: no pose of that name, or a file that is missing, damaged, or holds several bodies or none.
     """
     if str(name) in poses.NAMES:
+        if frame is not None or up is not None:
+            raise ValueError(
+                f"pose {name}: is a named pose, of which there is one: leave out --pose-frame and --pose-up"
+            )
         return of_pose(str(name), poses.pose_of(body, str(name)), body, _given(contact, body))
     path = Path(name)
     if path.suffix.lower() not in ENDINGS:
+        if path.exists():
+            what = "is a folder; name the file in it" if path.is_dir() else "expected a file ending in .npz or .pkl"
+            raise ValueError(f"{path}: {what}")
         listed = ", ".join(poses.NAMES)
         raise ValueError(f"no pose {str(name)!r}; there are {listed}, or a file ending in {' '.join(ENDINGS)}")
     return _of_file(_Stored.open(path), body, _given(contact, body), frame, up)
@@ -175,18 +185,30 @@ class _Stored:
     @classmethod
     def open(cls, path: Path) -> _Stored:
         if not path.is_file():
-            raise ValueError(f"{path}: no such file")
+            raise ValueError(f"{path}: {'is a folder; name the file in it' if path.is_dir() else 'no such file'}")
         if path.suffix.lower() == ".npz":
             return cls(path, safe_npz.names(path), lambda name: safe_npz.read(path, name))
         content = safe_pickle.read(path, "presented pose", "a pose of SMPL, SMPL-X or MoYo", tolerant=True)
         names = {name for name in content if isinstance(name, str)}
         return cls(path, names, lambda name: _plain(content[name], f"{path}: {name}"))
 
+    @property
+    def up(self) -> Axis:
+        """Of the world of files with these arrays."""
+        return (0.0, 0.0, 1.0) if self.names & {*_Z_UP} else (0.0, 1.0, 0.0)
+
+    @property
+    def is_absolute(self) -> bool:
+        """Whether fingers are rotations, not relative to the mean hand: AMASS's, MoYo's, and predictions'."""
+        return bool(self.names & {*_ABSOLUTE}) or self.names >= {"names", "body", "pose"}
+
     def first(self, *names: str) -> Array | None:
         """The first of these that is there, as numbers."""
         for name in names:
             if name in self.names:
                 array = np.asarray(self._read(name))
+                if array.dtype.kind == "O" and array.shape == () and array[()] is None:
+                    continue
                 if array.dtype.kind not in "fiub":
                     raise ValueError(f"{self.path}: {name} holds {array.dtype}, not numbers; save plain numbers")
                 return array
@@ -200,7 +222,7 @@ class _Stored:
 
 
 def _plain(value: Any, place: str) -> Any:
-    if isinstance(value, (str, int, float, bool)):
+    if value is None or isinstance(value, (str, int, float, bool)):
         return value
     if isinstance(value, (list, tuple)):
         try:
@@ -209,17 +231,14 @@ def _plain(value: Any, place: str) -> Any:
             raise ValueError(f"{place}: {error}") from None
     try:
         return safe_pickle.as_array(value)
-    except ValueError as error:
-        raise ValueError(f"{place}: {error}") from error
+    except ValueError:
+        raise ValueError(f"{place}: expected numbers, got another kind of object; save it as a numpy array") from None
 
 
 def _of_file(
     stored: _Stored, body: BodyModel, contact: NDArray[np.int64] | None, frame: int | None, up: Axis | None
 ) -> PresentedBody:
-    try:
-        pieces = pose_arrays.read(_without_weights(stored, body))
-    except ValueError as error:
-        raise ValueError(f"{stored.path}: {error}") from None
+    pieces = _hands_turned(stored, body)
     if not pieces:
         listed = ", ".join(sorted(stored.names))[:120] or "nothing"
         raise ValueError(
@@ -228,22 +247,25 @@ def _of_file(
     length = max(len(piece.rotations) for piece in pieces)
     row = _row(stored, length, frame)
     pose = pose_arrays.place(pieces, body.joint_names, length)[row]
-    if not np.isfinite(pose).all():
-        raise ValueError(f"{stored.path}: the pose is not finite")
-    if stored.names & {*_ABSOLUTE}:
+    _check_angles(stored, pose)
+    if stored.is_absolute:
         pose = pose - body.pose_mean
-    weights = [stored.first(f"{side}_hand_pose") for side in ("left", "right")]
-    if body.hands is not None and _are_weights(weights):
-        pose[-30:] = body.hands.from_components(*(each.reshape(-1, each.shape[-1])[0] for each in weights))  # type: ignore[union-attr]
+    notes: list[str] = []
     own = _kind(stored, pieces) == embedded.kind_of(body)
-    notes = [] if own else [f"{stored.path}: is of another body than {body.name}: its floor and contact are not used"]
-    normal, height = _ground(stored) if own else (None, None)
-    default = (0.0, 0.0, 1.0) if stored.names & {*_Z_UP} else (0.0, 1.0, 0.0)
-    normal = np.asarray(up or default, float) if normal is None else normal
-    turn = y_up(normal)
+    if not own and stored.names & {"ground", "ground_height", "contact"}:
+        notes.append(f"{stored.path}: is of another body than {body.name}: its floor and contact are not used")
+    normal, height = _ground(stored, row) if own else (None, None)
+    if normal is not None and up is not None:
+        notes.append(f"{stored.path}: has a ground, whose normal is up: --pose-up is not needed")
+    if normal is None and stored.names >= {"names", "body"} and up is None:
+        raise ValueError(
+            f"{stored.path}: predictions for a data set, whose axes are its own, without a ground: say what points up "
+            "(--pose-up)"
+        )
+    turn = y_up(normal if normal is not None else up or stored.up)
     pose[0] = (turn * Rotation.from_rotvec(pose[0])).as_rotvec()
-    if height is not None:
-        height = _pelvis(body)[1] - (float(normal @ _place(stored, body, row)) - height)
+    if height is not None and normal is not None:
+        height = _above_floor(stored, body, row, normal, height)
     contact_from = "given"
     if contact is None and own and "contact" in stored.names:
         contact, contact_from = _indices(stored.first("contact"), f"{stored.path}: contact", body), "file"
@@ -251,20 +273,42 @@ def _of_file(
     return replace(found, contact_from=contact_from) if contact_from == "file" else found
 
 
-def _without_weights(stored: _Stored, body: BodyModel) -> Callable[..., Array | None]:
-    """`first` of a file, but for hands that are weights of components instead of rotations."""
+def _hands_turned(stored: _Stored, body: BodyModel) -> list[pose_arrays.Piece]:
+    """The pieces of a file's pose. Hands that are weights of principal components (12 in upstream's and RICH's)
+    become rotations of the fingers, or are left out where the body has no components."""
+    weights = {name: stored.first(name) for name in _HANDS}
+    weights = {name: each for name, each in weights.items() if each is not None and _are_weights(each)}
+    try:
+        pieces = pose_arrays.read(lambda *names: None if names[0] in weights else stored.first(*names))
+    except ValueError as error:
+        raise ValueError(f"{stored.path}: {error}") from None
+    if body.hands is None:
+        return pieces
+    for side, (name, fingers) in enumerate(_HANDS.items()):
+        if name in weights:
+            rows = weights[name].reshape(-1, weights[name].shape[-1])
+            try:
+                turned = body.hands.from_components(rows, rows)[:, 15 * side : 15 * side + 15]
+            except ValueError as error:
+                raise ValueError(f"{stored.path}: {name}: {error}") from None
+            pieces.append(pose_arrays.Piece(turned, fingers))
+    return pieces
 
-    def first(*names: str) -> Array | None:
-        found = stored.first(*names)
-        is_hand = len(names) == 1 and names[0] in ("left_hand_pose", "right_hand_pose")
-        return None if is_hand and _are_weights([found]) else found
 
-    return first
+def _are_weights(hand: Array) -> bool:
+    return hand.ndim > 0 and hand.shape[-1] not in (3, 45)
 
 
-def _are_weights(hands: Sequence[Array | None]) -> bool:
-    """Whether hands are weights of principal components: upstream stores 12 a hand, and RICH, too."""
-    return all(hand is not None and hand.ndim > 0 and hand.shape[-1] not in (3, 45) for hand in hands)
+def _check_angles(stored: _Stored, pose: Array) -> None:
+    """ValueError for what are no rotation vectors in radians."""
+    if not np.isfinite(pose).all():
+        raise ValueError(f"{stored.path}: the pose is not finite")
+    largest = float(np.linalg.norm(pose, axis=-1).max())
+    if largest > LARGEST_ANGLE:
+        raise ValueError(
+            f"{stored.path}: the pose looks like degrees: a joint turns by {largest:.4g}; expected rotation vectors in "
+            "radians"
+        )
 
 
 def _row(stored: _Stored, length: int, frame: int | None) -> int:
@@ -277,38 +321,56 @@ def _row(stored: _Stored, length: int, frame: int | None) -> int:
 
 def _kind(stored: _Stored, pieces: Sequence[pose_arrays.Piece]) -> str:
     """What the parameters are of: what the file says, or what its joints tell."""
-    told = stored.word("model", "body", "model_type")
-    if told is not None and told.lower() in (*embedded.NAMES, "smpl", "smplh", "smplx"):
-        return told.lower()
-    joints = {name for piece in pieces for name in piece.joints}
-    if "left_hand" in joints:
+    said = stored.word("model", "body", "model_type")
+    if said is not None and said.lower() in (*embedded.NAMES, "smpl", "smplh", "smplx"):
+        return said.lower()
+    turned = {name for piece in pieces for name in piece.joints}
+    if "left_hand" in turned:
         return "smpl"
-    return "smplh" if "left_index1" in joints and "jaw" not in joints else "smplx"
+    whole = stored.names & {*pose_arrays.WHOLE_POSES}  # AMASS's SMPL+H; pieces without a jaw may be SMPL-X, too
+    return "smplh" if whole and "left_index1" in turned and "jaw" not in turned else "smplx"
 
 
-def _ground(stored: _Stored) -> tuple[Array | None, float | None]:
+def _ground(stored: _Stored, row: int) -> tuple[Array | None, float | None]:
     """Normal and height of the file's floor, or neither."""
     plane = stored.first("ground")
-    if plane is None and {"ground_normal", "ground_height"} <= stored.names:
-        parts = (stored.first("ground_normal"), stored.first("ground_height"))
-        plane = np.concatenate([np.ravel(part) for part in parts if part is not None])
+    if plane is None and "ground_height" in stored.names:
+        height = stored.first("ground_height")
+        normal = stored.first("ground_normal")
+        normal = np.array(stored.up) if normal is None else normal.reshape(-1, 3)[0]
+        plane = None if height is None else np.append(normal, np.ravel(height)[:1])
     if plane is None:
         return None, None
-    plane = np.ravel(plane).astype(float)
-    if plane.shape != (4,) or not np.isfinite(plane).all():
-        raise ValueError(f"{stored.path}: ground: expected a normal and a height (4,), got shape {plane.shape}")
+    if plane.shape[-1:] != (4,) or plane.ndim > 2 or (plane.ndim == 2 and 1 < len(plane) <= row):
+        raise ValueError(f"{stored.path}: ground: expected a normal and a height (4,), or (T, 4), got {plane.shape}")
+    rows = plane.reshape(-1, 4).astype(float)
+    plane = rows[row if len(rows) > 1 else 0]
+    if not np.isfinite(plane).all() or not plane[:3].any():
+        raise ValueError(f"{stored.path}: ground: expected a finite normal that is not 0, and a height, got {plane}")
     ground = Ground(plane[:3], plane[3])
     return np.asarray(ground.normal, float), float(ground.height)
+
+
+def _above_floor(stored: _Stored, body: BodyModel, row: int, normal: Array, height: float) -> float:
+    """Height of the file's floor in the fit's world, m: the root joint stands as high above it as in the file."""
+    above = float(normal @ _place(stored, body, row)) - height
+    if not -FARTHEST < above < FARTHEST:
+        raise ValueError(
+            f"{stored.path}: the pelvis is {above:.4g} m above the file's ground; are transl and ground in metres?"
+        )
+    return float(_pelvis(body)[1]) - above
 
 
 def _place(stored: _Stored, body: BodyModel, row: int) -> Array:
     """Where the pelvis is in the file's world (3,) m."""
     transl, betas = stored.first("transl", "trans"), stored.first("betas")
+    if betas is not None and (betas.ndim == 0 or betas.size == 0 or not np.isfinite(betas).all()):
+        raise ValueError(f"{stored.path}: betas: expected finite numbers (n,) or (T, n), got shape {betas.shape}")
     pelvis = _pelvis(body, None if betas is None else betas.reshape(-1, betas.shape[-1]), row)
     if transl is None:
         return pelvis
-    if transl.shape[-1:] != (3,):
-        raise ValueError(f"{stored.path}: transl: expected (3,) or (T, 3), got {transl.shape}")
+    if transl.shape[-1:] != (3,) or transl.size == 0 or not np.isfinite(transl).all():
+        raise ValueError(f"{stored.path}: transl: expected finite metres (3,) or (T, 3), got shape {transl.shape}")
     rows = transl.reshape(-1, 3).astype(float)
     return pelvis + rows[row if len(rows) > row else 0]
 
@@ -326,6 +388,8 @@ def _given(path: str | Path | None, body: BodyModel) -> NDArray[np.int64] | None
     if path is None:
         return None
     path = Path(path)
+    if path.suffix.lower() not in (*ENDINGS, ".json"):
+        raise ValueError(f"{path}: expected contact in .json, .npz or .pkl, got {path.suffix or 'no ending'}")
     if path.suffix.lower() in ENDINGS:
         stored = _Stored.open(path)
         found = stored.first("contact")
@@ -347,12 +411,13 @@ def _indices(found: Array | None, place: str, body: BodyModel) -> NDArray[np.int
     if found.size == 0:
         return np.zeros(0, np.int64)
     count = body.num_vertices
+    found = found[0] if found.shape == (1, count) else found  # a flag for each vertex of a batch of one
     if found.dtype.kind == "b" or (found.shape == (count,) and np.isin(found, (0, 1)).all()):
         if found.shape != (count,):
             raise ValueError(f"{place}: expected a flag for each of {count} vertices, got shape {found.shape}")
         return np.flatnonzero(found)
-    if found.dtype.kind not in "iuf" or not np.equal(found, np.round(found)).all():
-        raise ValueError(f"{place}: expected indices of vertices, got {found.dtype}")
+    if found.dtype.kind not in "iuf" or not np.isfinite(found).all() or not np.equal(found, np.round(found)).all():
+        raise ValueError(f"{place}: expected indices of vertices, whole numbers")
     vertices = np.unique(found).astype(np.int64)
     if vertices[0] < 0 or vertices[-1] >= count:
         raise ValueError(
