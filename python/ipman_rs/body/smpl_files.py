@@ -40,7 +40,8 @@ def load(
     if names is None:
         raise ValueError(f"{path}: expected 24 (SMPL), 52 (SMPL+H) or 55 (SMPL-X) joints, found {len(parents)}")
     faces = _faces(path, read("f", (-1, 3)), num_vertices)
-    regressor = read("J_regressor", (len(parents), num_vertices))
+    # One layout for all files, and einsum for products: BLAS sums in an order of the layout's.
+    regressor = np.array(read("J_regressor", (len(parents), num_vertices)), order="C")
     shapedirs, expressiondirs = _split_shapes(
         read("shapedirs", (num_vertices, 3, -1)), num_betas, has_face=len(names) == len(joints.SMPLX)
     )
@@ -50,7 +51,7 @@ def load(
         shapedirs=shapedirs,
         expressiondirs=expressiondirs,
         posedirs=read("posedirs", (num_vertices, 3, 9 * (len(parents) - 1))) if "posedirs" in keys else None,
-        J_template=regressor @ v_template,
+        J_template=np.einsum("jv,vc->jc", regressor, v_template),
         J_shapedirs=np.einsum("jv,vck->jck", regressor, shapedirs),
         J_expressiondirs=np.einsum("jv,vck->jck", regressor, expressiondirs),
         rest_rotation=np.tile(np.eye(3), (len(parents), 1, 1)),
