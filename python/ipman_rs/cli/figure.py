@@ -160,7 +160,7 @@ def pull(output: Path, width: float, push_width: float, body: str) -> None:
 @figure.command()
 @click.argument("body", metavar="BODY")
 @_output
-@click.option("--frame", type=click.IntRange(0), default=0, show_default=True, help="Of a sequence, from 0.")
+@click.option("--frame", type=click.IntRange(0), help="Of a sequence, from 0. Default: the first.")
 @click.option("--body", "model", metavar="NAME|PATH", help="Body model, as of `ipman analyze`.")
 @click.option("--up", type=UP, metavar="AXIS", default=None, help="What points up, as of `ipman analyze`.")
 @click.option(
@@ -170,7 +170,7 @@ def pull(output: Path, width: float, push_width: float, body: str) -> None:
 @click.option("--parts", type=click.Path(path_type=Path), metavar="FILE", help="Body parts, as of `ipman analyze`.")
 @_preset
 def com(
-    body: str, output: Path, frame: int, model: str | None, up: tuple[float, float, float] | None, ground: float | None,
+    body: str, output: Path, frame: int | None, model: str | None, up: tuple[float, float, float] | None, ground: float | None,
     parts: Path | None, preset: str,
 ) -> None:  # fmt: skip
     """The formulations of the centre of mass on one body, with the CoP and that of binary contact (Fig. S.3).
@@ -204,7 +204,7 @@ def _millimetres(about: dict[str, Any]) -> list[str]:
 
 
 def _one_body(
-    body: str, frame: int, model: str | None, up: Any, ground: float | None, parts: Path | None
+    body: str, frame: int | None, model: str | None, up: Any, ground: float | None, parts: Path | None
 ) -> tuple[Any, Any, Any, str]:
     """Vertices, template, ground and name."""
     import ipman_rs as ip
@@ -212,6 +212,9 @@ def _one_body(
     from .measure import Request, on_ground
 
     if body in ip.body.poses.NAMES and not Path(body).exists():
+        for option, value in (("--frame", frame), ("--up", up), ("--parts", parts)):
+            if value is not None:
+                raise click.UsageError(f"{option}: is for files; {body} is a named pose, one body with y up")
         posed = ip.load_body(model or "anny")
         return ip.body.posed(posed, body), posed.template, ip.Ground.y_up(ground or 0.0), body
     if not Path(body).suffix and not Path(body).exists():
@@ -223,7 +226,7 @@ def _one_body(
         recording, template, floor, _ = on_ground(path, Request(model=model, up=up, ground=ground, parts=parts))
     except (ValueError, TypeError) as error:
         raise FileError(path, str(error)) from error
-    count = len(recording.vertices)
+    count, frame = len(recording.vertices), frame or 0
     if frame >= count:
         raise click.UsageError(f"--frame: {body} has {count} frames, from 0; there is no frame {frame}")
     return recording.vertices[frame], template, floor, path.stem if count == 1 else f"{path.stem}, frame {frame}"
@@ -242,7 +245,7 @@ def pressure(
     output: Path, name: str, path: Path, split: str | None, options: tuple[tuple[str, Any], ...], models: Path | None,
     frame: str | None, preset: str,
 ) -> None:  # fmt: skip
-    """Estimated beside measured pressure of one frame on a mat, with CoPs and CoM (Fig. 5).
+    """Estimated beside measured pressure of one frame on a mat, with CoPs and CoM (Fig. 6).
 
     IoU and CoP error as in `ipman evaluate --table biomech`: at the preset's α and γ, and at the best of the paper's
     grid for this frame.

@@ -1,4 +1,4 @@
-"""Estimated beside measured pressure of one frame on a mat (the paper's Fig. 5), with CoPs and CoM.
+"""Estimated beside measured pressure of one frame on a mat (the paper's Fig. 6), with CoPs and CoM.
 
 The estimated map is that of the biomechanics protocol (`ipman_rs.evaluation.moyo`): the pressure of the samples over
 the mat, scaled to run from 0 to 1, summed in each cell, scaled again. The numbers also have the protocol's own choice,
