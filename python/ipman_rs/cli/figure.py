@@ -170,8 +170,8 @@ def pull(output: Path, width: float, push_width: float, body: str) -> None:
 @click.option("--parts", type=click.Path(path_type=Path), metavar="FILE", help="Body parts, as of `ipman analyze`.")
 @_preset
 def com(
-    body: str, output: Path, frame: int | None, model: str | None, up: tuple[float, float, float] | None, ground: float | None,
-    parts: Path | None, preset: str,
+    body: str, output: Path, frame: int | None, model: str | None, up: tuple[float, float, float] | None,
+    ground: float | None, parts: Path | None, preset: str,
 ) -> None:  # fmt: skip
     """The formulations of the centre of mass on one body, with the CoP and that of binary contact (Fig. S.3).
 
