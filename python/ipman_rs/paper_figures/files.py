@@ -42,7 +42,7 @@ class PaperFigure:
 def write(figure: PaperFigure, folder: Path) -> list[Path]:
     """Writes the files of a figure, the picture first; their paths. OSError where the folder cannot be written."""
     folder.mkdir(parents=True, exist_ok=True)
-    _settle(figure.picture)
+    settle(figure.picture, DPI)
     contents = {"png": _picture(figure, "png"), "svg": _picture(figure, "svg")}
     record = json.dumps(plain({"figure": figure.name, **figure.numbers}), allow_nan=False, ensure_ascii=False, indent=1)
     contents["json"] = f"{record}\n".encode()
@@ -59,12 +59,12 @@ def write(figure: PaperFigure, folder: Path) -> list[Path]:
     return written
 
 
-def _settle(picture: Figure) -> None:
-    """Lays a figure out and ends that. The solver of matplotlib's layout is not the same in the last digit each time,
+def settle(picture: Figure, dpi: float) -> None:
+    """Lays a figure out for pixels of that size, and ends that. The solver of matplotlib's layout is not the same in the last digit each time,
     and an SVG names its clips after all digits."""
     if picture.get_layout_engine() is None:
         return
-    picture.set_dpi(DPI)
+    picture.set_dpi(dpi)
     picture.draw_without_rendering()
     picture.set_layout_engine("none")
     for axes in picture.axes:
