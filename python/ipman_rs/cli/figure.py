@@ -348,14 +348,16 @@ def compare(
 ) -> None:  # fmt: skip
     """A grid of people: their image, and by each method the body over it, from the side, and its pressure.
 
-    METHOD is a folder of `ipman fit` or `ipman predict`, or, with --data, a file of predictions as `ipman evaluate`
-    reads it; usually two, a baseline and ours. People are found by name. The numbers: margin of support, CoM–CoP
-    distance, BoSE, penetration and hover of each.
+    METHOD is a folder of `ipman fit` or `ipman predict`; or, with --data, a file of predictions as `ipman evaluate`
+    reads it, or the folder of `ipman fit --data` with one. Usually there are two, a baseline and ours. People are found
+    by name; where their image cannot be read they are drawn on white. The numbers: margin of support, CoM–CoP distance,
+    BoSE, penetration and hover of each.
 
     \b
     ipman fit photos/ -o out/x --preset smplify-x && ipman fit photos/ -o out/star --preset ipman-o-star
     ipman figure compare out/x out/star --title SMPLify-X --title 'IPMAN-O*' -o out
     ipman figure compare hmr.npz ours.npz --data rich-ipman --path RICH/ --image-folder RICH/ --models models/ -o out
+    ipman figure compare fit/xmc fit/o --data moyo --path MOYO/ --option camera=1 --models models/ -o out
     """
     from . import console
 
@@ -368,7 +370,7 @@ def compare(
         raise click.UsageError("--title: expected a title for each method that no other has")
     with _one_line_errors(output):
         from ..paper_figures import comparison as made
-        from ..paper_figures.estimated_people import FittedFolder, Predicted
+        from ..paper_figures.estimated_people import PREDICTIONS, FittedFolder, Predicted
 
         found_by: list[tuple[str, Any]] = []
         opened = (
@@ -384,7 +386,8 @@ def compare(
             if opened is None:
                 found_by.append((title, FittedFolder(method, photos, body)))
             else:
-                found_by.append((title, Predicted(method, opened, _models_in(models), images)))
+                file = method / PREDICTIONS if method.is_dir() else method
+                found_by.append((title, Predicted(file, opened, _models_in(models), images)))
         with console.progress("drawing people", len(people) or most) as step:
             found = made.comparison(found_by, people, most, preset, step.to)
         _write(found, output)
@@ -437,18 +440,22 @@ def _models_in(folder: Path | None) -> Models:
 @contextmanager
 def _one_line_errors(output: Path) -> Iterator[None]:
     """Ends the command with one line and exit code 1 where something could not be read or written; a warning about
-    units is one line, too."""
+    units is one line, too, and one about an image is one for each."""
     import ipman_rs as ip
 
+    from ..paper_figures.estimated_people import ImageWarning
     from . import console
 
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("ignore")
-            warnings.simplefilter("always", ip.UnitsWarning)
+            for kind in (ip.UnitsWarning, ImageWarning):
+                warnings.simplefilter("always", kind)
             yield
-        for warning in caught[:1]:
-            console.warn(str(warning.message))
+        units = [str(each.message) for each in caught if issubclass(each.category, ip.UnitsWarning)]
+        images = [str(each.message) for each in caught if issubclass(each.category, ImageWarning)]
+        for said in (*units[:1], *dict.fromkeys(images)):
+            console.warn(said)
     except (FileError, ValueError, ImportError) as error:
         console.error(str(error))
         sys.exit(1)

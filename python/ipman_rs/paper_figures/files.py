@@ -60,8 +60,8 @@ def write(figure: PaperFigure, folder: Path) -> list[Path]:
 
 
 def settle(picture: Figure, dpi: float) -> None:
-    """Lays a figure out for pixels of that size, and ends that. The solver of matplotlib's layout is not the same in the last digit each time,
-    and an SVG names its clips after all digits."""
+    """Lays a figure out for a picture of that dpi, and ends that. The solver of matplotlib's layout is not the same in
+    the last digit each time, and an SVG names its clips after all digits."""
     if picture.get_layout_engine() is None:
         return
     picture.set_dpi(dpi)
