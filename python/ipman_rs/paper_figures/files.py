@@ -68,7 +68,8 @@ def settle(picture: Figure, dpi: float) -> None:
     picture.draw_without_rendering()
     picture.set_layout_engine("none")
     for axes in picture.axes:
-        axes.set_position(np.round(axes.get_position(original=True).bounds, 9), which="original")
+        left, bottom, width, height = (round(float(edge), 9) for edge in axes.get_position(original=True).bounds)
+        axes.set_position((left, bottom, width, height), which="original")
 
 
 def _picture(figure: PaperFigure, form: str) -> bytes:
