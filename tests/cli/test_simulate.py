@@ -7,6 +7,8 @@ import pytest
 from cli_files import strict, walk_parameters
 
 import ipman_rs as ip
+from ipman_rs.cli import falls
+from ipman_rs.cli.falls_compared import _told_apart
 from ipman_rs.simulation import simulate, tip_test
 from ipman_rs.view import colors
 from ipman_rs.view.filmstrip import HEIGHT, WIDTH, turn_across
@@ -138,7 +140,10 @@ def test_two_methods(run, poses, lite_body, tmp_path):
     picture = np.asarray(Image.open(output / "comparison.png").convert("RGB")).astype(int)
     for color in ((0x1F, 0x4E, 0x79), (0xC0, 0x50, 0x4D)):
         assert (np.abs(picture - color).max(axis=-1) < 10).sum() > 300, "a line for either method"
-    assert "moved in 2 s, mm" in (output / "comparison.svg").read_text()
+    words = (output / "comparison.svg").read_text(encoding="utf-8")
+    assert "moved in 2 s, mm" in words
+    assert "A: steady.npz" in words
+    assert "B: poses.npz" in words
 
     early = run("simulate", tmp_path / "steady.npz", "--against", path, "--times", "0.41667")
     assert "stable, %: no verdict before 2 s" in early.out
@@ -204,6 +209,51 @@ def test_a_folder_of_fits(run, tmp_path):
     assert (frames[0]["p0"]["stands"], frames[1]["p0"]["stands"]) == (True, False)
     assert record["comparison"]["bodies"] == 2
     assert frames[0]["p1"]["status"] == []  # a metre above p0's floor, on its own
+
+
+def test_files_of_the_same_name_are_told_apart_in_the_picture(tmp_path):
+    a, b = tmp_path / "ours" / "out" / "predictions.npz", tmp_path / "theirs" / "out" / "predictions.npz"
+    assert _told_apart(a, b) == ("ours/out/predictions.npz", "theirs/out/predictions.npz")
+    assert _told_apart(a, a.parent) == ("predictions.npz", "out")
+    assert _told_apart(a, a)[0].endswith("ours/out/predictions.npz")
+    long = _told_apart(tmp_path / f"{'x' * 90}.npz", a)[0]
+    assert (len(long), long[0], long[-5:]) == (48, "…", "x.npz")
+
+
+@pytest.mark.parametrize("other", ["missing", "broken", "one", "twice", "others"])
+def test_nothing_is_simulated_that_cannot_be_compared(run, other, tmp_path, lite_body, monkeypatch):
+    squat = ip.body.poses.pose("squat")
+    predictions(tmp_path / "a.npz", [squat, squat], ["x", "y"])
+    predictions(tmp_path / "twice.npz", [squat, squat], ["x", "x"])
+    predictions(tmp_path / "others.npz", [squat, squat], ["v", "w"])
+    np.savez(tmp_path / "one.npz", vertices=ip.body.posed(lite_body, "squat")[None], faces=lite_body.faces)
+    (tmp_path / "broken.npz").write_bytes(b"no zip")
+
+    def simulated(*arguments, **options):
+        raise AssertionError("simulated")
+
+    monkeypatch.setattr(falls, "simulate", simulated)
+    done = run("simulate", tmp_path / "a.npz", "--against", tmp_path / f"{other}.npz", "--json")
+    assert done.code == 1
+    record = strict(done.out)
+    assert record["bodies"] == []
+    (failure,) = record["failures"]
+    assert failure["file"].endswith(f"{other}.npz")
+    assert done.err.count("\n") == 1
+
+
+def test_what_was_assumed_is_printed(run, poses, tmp_path):
+    """Once for each file, under the table; a ground that was given is none."""
+    squat = ip.body.poses.pose("squat")
+    predictions(tmp_path / "own.npz", [squat], ["x"], ground=np.array([0.0, 1.0, 0.0, -0.9]))
+    done = run("simulate", poses[0], tmp_path / "own.npz", "--tip-only")
+    assert done.code == 0, done.err
+    first, second = (line for line in done.out.splitlines() if "; --ground" in line or "the file's own" in line)
+    assert "poses.npz: up: y (assumed; --up says otherwise); ground: through the lowest vertex of all frames" in first
+    assert second.endswith("own.npz: ground: the file's own (--up and --ground say otherwise)")
+    given = run("simulate", poses[0], "--tip-only", "--up", "y", "--ground", "-1")
+    assert "assumed" not in given.out
+    assert "lowest vertex" not in given.out
 
 
 def test_what_cannot_be_compared(run, poses, lite_body, tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -273,6 +274,21 @@ def test_a_truth_whose_model_is_missing(regressors, tmp_path):
     code, said = evaluated(*asked, "--regressor", regressors[0])
     assert code == 1
     assert "rich-ipman: its truth is bodies of smpl, to which predicted bodies are compared: --models FOLDER" in said
+
+
+def test_the_gender_of_a_missing_model_is_the_one_that_is_needed(tmp_path):
+    """MoYo's people are female, of SMPL-X; without the file of any gender nothing is posed."""
+    pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+    from miniatures import moyo
+
+    moyo.write(tmp_path)
+    code, said = evaluated("truth", "--table", "moyo", "--path", tmp_path, "-o", tmp_path / "out")
+    assert code == 1
+    assert "smplx (female) needs its model file, SMPLX_FEMALE.npz or .pkl: no folder is named by --models" in said
+    frames = data.open("moyo", tmp_path)[:2]
+    beside = replace(frames, joints=np.zeros((2, 1, 3)), joint_names=("pelvis",))
+    assert Models().posed(beside).without_model == "SMPLX_FEMALE"
+    assert Models().posed(replace(beside, genders=None)).without_model == "SMPLX_NEUTRAL"
 
 
 def test_what_is_asked_of_a_data_set_must_be_there(regressors, tmp_path):

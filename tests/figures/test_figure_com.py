@@ -89,6 +89,9 @@ def test_a_body_in_millimetres(figure, lite, tmp_path):
         ("nonsense", (), 2, "warrior"),
         ("nothing.obj", (), 1, "nothing.obj: there is no such file"),
         ("two.npz", ("--frame", 2), 2, "has 2 frames"),
+        ("plank", ("--frame", 4), 2, "--frame: is for files; plank is a named pose"),
+        ("plank", ("--up", "z"), 2, "--up: is for files"),
+        ("plank", ("--parts", "parts.json"), 2, "--parts: is for files"),
         ("two.npz", ("--frame", 1), 1, "finite"),
     ],
 )

@@ -115,6 +115,53 @@ def test_predictions_of_a_data_set(figure, tmp_path, lite):
     assert "--data" in wrong.err
 
 
+def test_folders_of_predictions_for_moyo(figure, tmp_path):
+    """What `ipman fit --data moyo` leaves, an image that is whole and a damaged one. MoYo's camera is an option."""
+    pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+    import spring_mat
+    from miniatures import moyo
+
+    path, models = spring_mat.write(tmp_path)
+    session = path / moyo.HANDS
+    moyo.cameras(session, "220923")
+    moyo.images(session, spring_mat.NAME, (0, 1), "val")
+    whole, damaged = sorted(session.glob("images/**/*.jpg"))
+    Image.new("RGB", (1028, 752), "#336699").save(whole)
+    true = data.open("moyo", path, camera=1)[:]
+    (tmp_path / "fit").mkdir()
+    np.savez(
+        tmp_path / "fit" / "predictions.npz", names=true.names, pose=true.pose, betas=true.betas, transl=true.transl,
+        body=np.array("smplx"),
+    )  # fmt: skip
+    (tmp_path / "fit" / "fits.json").write_text("{}")
+    words = tmp_path / "fit", "--data", "moyo", "--path", path, "--models", models
+    said = figure("compare", *words, "--option", "camera=1")
+    assert said.code == 0, said.err
+    assert said.numbers["methods"] == ["fit"]
+    assert list(said.numbers["people"]) == true.names.tolist()
+    assert said.err.count("\n") == 1
+    assert f"warning: {true.names[1]} is drawn on white: {damaged}: expected an image" in said.err
+    picture = np.asarray(Image.open(said.folder / "compare.png").convert("RGB")).astype(int)
+    blue = (np.abs(picture - (0x33, 0x66, 0x99)).max(axis=-1) < 12).any(axis=1)
+    assert blue[: len(blue) // 2].any()
+    assert not blue[len(blue) // 2 :].any()
+    unseen = figure("compare", *words)
+    assert unseen.code == 1
+    assert "no camera for it; of moyo one is chosen by --option camera=1" in unseen.err
+    alone = figure("compare", tmp_path / "fit")
+    assert alone.code == 1
+    assert "name that with --data and --path" in alone.err
+
+
+def test_a_damaged_photo_of_a_fitted_folder(figure, methods, tmp_path):
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "bert.jpg").write_bytes(b"")
+    said = figure("compare", *methods, "--photos", tmp_path / "photos")
+    assert said.code == 0, said.err
+    assert said.err.count("\n") == 1  # once, though both methods have him
+    assert "warning: bert is drawn on white: " in said.err
+
+
 def test_some_people(figure, methods, contents):
     said = figure("compare", methods[0], "--person", "bert")
     assert list(said.numbers["people"]) == ["bert"]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,6 +48,17 @@ def test_the_files_of_a_figure(tmp_path, contents):
         assert stored["x"].tolist() == [0, 1, 2]
 
 
+def test_the_layout_has_no_digits_of_the_solver(tmp_path):
+    """It differs in the last digit from run to run, and so would the names in the SVG."""
+    made = drawn()
+    made.picture.set_layout_engine("constrained")
+    paper_figures.write(made, tmp_path)
+    (axes,) = made.picture.axes
+    place = np.array(axes.get_position(original=True).bounds)
+    np.testing.assert_allclose(place, np.round(place, 9), rtol=0, atol=1e-15)
+    assert abs(place[0] - 0.125) > 0.005  # matplotlib's own, without a layout
+
+
 def test_a_folder_that_cannot_be_written(tmp_path, figure):
     (tmp_path / "file").write_text("a file is in the way")
     said = figure("com", "standing", "--body", "anny-lite", out="file/out")
@@ -59,6 +72,15 @@ def test_the_library_loads_nothing_heavy():
     script += "print([m for m in ('matplotlib', 'torch', 'sklearn', 'click') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_numbers_of_the_paper_s_figures(figure):
+    """Fig. 6 of the published paper is the pressure; the guide's table says the same."""
+    docs = (Path(__file__).parents[2] / "docs" / "figures.md").read_text(encoding="utf-8")
+    for name in paper_figures.FIGURES:
+        (row,) = (line for line in docs.splitlines() if line.startswith(f"| `{name}` |"))
+        numbers = re.findall(r"Fig\. \w+(?:\.\d)?", row)
+        assert all(number in figure(name, "--help").out for number in numbers), name
 
 
 @pytest.mark.parametrize("name", paper_figures.FIGURES)

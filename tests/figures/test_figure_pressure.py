@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import ipman_rs as ip
-from ipman_rs import data, evaluation
+from ipman_rs import data, evaluation, paper_figures
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.paper_figures import pressure as made
 
@@ -40,6 +42,31 @@ def test_the_numbers(figure, recording, contents):
     np.testing.assert_allclose(numbers["center_of_pressure"]["measured"][:2], exact[:2], atol=1e-3)
     again = figure("pressure", "--path", path, "--models", models, "--frame", f"{spring_mat.NAME}/00000", out="again")
     assert contents(said.folder) == contents(again.folder)
+
+
+@pytest.mark.parametrize(("pose", "aside"), [("standing", 0.9), ("lying", 0.0)])
+def test_the_picture(pose, aside, tmp_path):
+    """The windows of both maps hold all centres, also of a body beside the mat, whose empty map says so; of a map along
+    the mat, which fills the height, the title keeps off the panels' titles."""
+    path, models = spring_mat.write(tmp_path, pose)
+    pressed = made.of_data_set("moyo", data.open("moyo", path), 0, Models(models))
+    drawn = made.pressure(replace(pressed, vertices=pressed.vertices + (aside, 0.0, 0.0)))
+    paper_figures.write(drawn, tmp_path / "out")
+    _, left, right, _ = drawn.picture.axes
+    assert ("nothing on\nthe mat" in [text.get_text() for text in left.texts]) is (aside > 0)
+    assert not right.texts
+    mat = pressed.measured
+    for axes in (left, right):
+        for kind in ("mass", "pressure"):
+            for center in drawn.numbers[f"center_of_{kind}"].values():
+                if np.isfinite(center).all():
+                    x, y = 100 * float((center - mat.origin) @ mat.e2), 100 * float((center - mat.origin) @ mat.e1)
+                    assert axes.get_xlim()[0] < x < axes.get_xlim()[1]
+                    assert axes.get_ylim()[1] < y < axes.get_ylim()[0]
+    above = drawn.picture.get_suptitle()
+    title = next(text for text in drawn.picture.texts if text.get_text() == above)
+    gap = title.get_window_extent().y0 - left.title.get_window_extent().y1
+    assert gap / drawn.picture.dpi > 0.125  # inches: a line of words
 
 
 def test_the_recording_s_stability(figure, recording):

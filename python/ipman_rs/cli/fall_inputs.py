@@ -25,20 +25,30 @@ PREDICTIONS = "predictions.npz"  # what `ipman predict --data` and `ipman fit --
 
 @dataclass(frozen=True)
 class Bodies:
-    """T bodies on a ground, which is one for all or one for each. names: (T,) where they have any."""
+    """T bodies of a file on a ground, which is one for all or one for each. names: (T,) where they have any."""
 
+    path: Path
     recording: Recording
     template: Any
     ground: ip.Ground
     names: tuple[str, ...] | None
     notes: Sequence[str]
 
+    @property
+    def count(self) -> int:
+        return len(self.recording.vertices)
+
 
 def read_bodies(path: Path, request: Request) -> Bodies:
     """Raises FileError."""
-    if path.is_dir():
-        return _file(path / PREDICTIONS, request) if (path / PREDICTIONS).is_file() else _fits(path, request)
-    return _file(path, request)
+    try:
+        if path.is_dir() and not (path / PREDICTIONS).is_file():
+            return _fits(path, request)
+        return replace(_file(path / PREDICTIONS if path.is_dir() else path, request), path=path)
+    except (ValueError, TypeError) as error:
+        raise FileError(path, str(error)) from error
+    except MemoryError as error:
+        raise FileError(path, "needs more memory than there is; simulate fewer frames at once") from error
 
 
 def _file(path: Path, request: Request) -> Bodies:
@@ -56,7 +66,7 @@ def _file(path: Path, request: Request) -> Bodies:
     if "names" in arrays and arrays["names"].shape != (count,):
         raise FileError(path, f"names have shape {arrays['names'].shape}; expected one for each of {count} bodies")
     names = tuple(arrays["names"].astype(str).tolist()) if "names" in arrays else None
-    return Bodies(recording, template, ground, names, notes)
+    return Bodies(path, recording, template, ground, names, notes)
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
@@ -118,6 +128,7 @@ def _fits(folder: Path, request: Request) -> Bodies:
     heights = [np.broadcast_to(one.ground.height, (count,)) for one, count in zip(each, counts, strict=True)]
     vertices = np.concatenate([np.asarray(one.recording.vertices[:]) for one in each])
     return Bodies(
+        folder,
         replace(first.recording, path=folder, vertices=vertices, seconds=None),
         first.template,
         ip.Ground(np.concatenate(normals), np.concatenate(heights)),

@@ -21,8 +21,7 @@ from ..view.report import safe_names
 from ..view.study import evenly
 from . import console
 from .errors import FileError
-from .fall_inputs import read_bodies
-from .measure import Request
+from .fall_inputs import Bodies
 
 FRAMES = 6  # of a filmstrip
 
@@ -151,8 +150,7 @@ def _number(value: float) -> str:
 
 
 def fall(
-    path: Path,
-    request: Request,
+    bodies: Bodies,
     films: int,
     engine: str,
     shape: str,
@@ -163,9 +161,8 @@ def fall(
     tip_only: bool,
 ) -> Fall:
     """Test the bodies of a file and let them go, a piece of them at a time. Raises FileError."""
+    path, recording, template = bodies.path, bodies.recording, bodies.template
     try:
-        bodies = read_bodies(path, request)
-        recording, template = bodies.recording, bodies.template
         options: dict[str, Any] = {"engine": engine, "shape": shape, "step": step, "friction": friction, "snap": snap}
         tips, runs, done = [], [], 0
         with console.progress(f"letting go {path.name}", len(recording.vertices)) as bar:

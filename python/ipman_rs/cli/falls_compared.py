@@ -10,13 +10,17 @@ from typing import Any
 import numpy as np
 
 from ..evaluation.bootstrap import Interval
+from ..paper_figures.files import settle
 from ..plain import plain
 from ..simulation import VERDICT, Comparison, Means, Simulation, compare
 from ..simulation.comparison import MORE_STABLE_IN_THE_PAPER
 from .errors import FileError
+from .fall_inputs import Bodies
 from .falls import Fall
 
 NAME = "comparison"
+PNG_DPI = 130
+LONGEST = 48  # characters of a file's name in the picture
 
 
 def compare_falls(first: Fall, second: Fall) -> tuple[Comparison, Simulation, Simulation]:
@@ -26,7 +30,7 @@ def compare_falls(first: Fall, second: Fall) -> tuple[Comparison, Simulation, Si
     """
     assert first.run is not None
     assert second.run is not None
-    rows, others, alone = _pairs(first, second)
+    rows, others, alone = pairs(first, second)
     one, other = _rows(first.run, rows), _rows(second.run, others)
     try:
         found = compare(one, other)
@@ -35,8 +39,8 @@ def compare_falls(first: Fall, second: Fall) -> tuple[Comparison, Simulation, Si
     return replace(found, left_out=found.left_out + alone), one, other
 
 
-def _pairs(first: Fall, second: Fall) -> tuple[list[int], list[int], int]:
-    """The rows of either, and how many bodies only one of the two has."""
+def pairs(first: Bodies | Fall, second: Bodies | Fall) -> tuple[list[int], list[int], int]:
+    """The rows of either, and how many bodies only one of the two has. Raises FileError where they cannot be paired."""
     if first.names is None or second.names is None:
         if first.count != second.count:
             what = f"has {second.count} bodies, {first.path} has {first.count}; expected the same people in both"
@@ -126,16 +130,18 @@ def comparison_lines(found: Comparison, first: Fall, second: Fall) -> list[str]:
     return [*lines, f"how many more of A's bodies are stable than of B's: {more}; printed in the paper: {paper}"]
 
 
-def write_comparison(one: Simulation, other: Simulation, output: Path) -> None:
-    """comparison.png and .svg: the share of bodies that moved less than so far, of A and of B. Raises OSError."""
+def write_comparison(one: Simulation, other: Simulation, paths: tuple[Path, Path], output: Path) -> None:
+    """comparison.png and .svg: the share of bodies that moved less than so far, of A and of B, the files of these
+    `paths`. Raises OSError."""
     import matplotlib
     from matplotlib.figure import Figure
 
+    names = _told_apart(*paths)
     known = np.isfinite(one.displacement[:, -1]) & np.isfinite(other.displacement[:, -1])
-    figure = Figure(figsize=(0.6 + 3.6 * len(one.times), 3.2), layout="constrained")
+    figure = Figure(figsize=(0.6 + 3.6 * len(one.times), 3.6), layout="constrained")  # inches
     axes = figure.subplots(1, len(one.times), squeeze=False, sharey=True)[0]
     for k, (axis, seconds) in enumerate(zip(axes, one.times, strict=True)):
-        for run, name, color in ((one, "A", "#1f4e79"), (other, "B", "#c0504d")):
+        for run, name, color in ((one, f"A: {names[0]}", "#1f4e79"), (other, f"B: {names[1]}", "#c0504d")):
             moved = np.sort(1e3 * run.displacement[known, k])
             share = 100 * np.arange(len(moved) + 1) / len(moved)
             axis.step([0.0, *moved], share, where="post", color=color, label=name)
@@ -147,7 +153,21 @@ def write_comparison(one: Simulation, other: Simulation, output: Path) -> None:
         axis.tick_params(labelsize=8)
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("% of bodies that moved less", fontsize=9)
-    axes[0].legend(fontsize=8, loc="upper left")
+    key = figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", fontsize=8, frameon=False)
+    for text in key.get_texts():
+        text.set_parse_math(False)
+    settle(figure, PNG_DPI)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}):
         figure.savefig(output / f"{NAME}.svg", metadata={"Date": None})
-        figure.savefig(output / f"{NAME}.png", dpi=130)
+        figure.savefig(output / f"{NAME}.png", dpi=PNG_DPI)
+
+
+def _told_apart(first: Path, second: Path) -> tuple[str, str]:
+    """The last parts of two paths, as many as it takes to tell them apart, at most the last 48 characters."""
+    one, other = first.resolve().parts, second.resolve().parts
+    least = 1
+    while one[-least:] == other[-least:] and least < max(len(one), len(other)):
+        least += 1
+    names = ("/".join(parts[-least:]) for parts in (one, other))
+    a, b = (name if len(name) <= LONGEST else f"…{name[1 - LONGEST :]}" for name in names)
+    return a, b

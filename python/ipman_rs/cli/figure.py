@@ -160,7 +160,7 @@ def pull(output: Path, width: float, push_width: float, body: str) -> None:
 @figure.command()
 @click.argument("body", metavar="BODY")
 @_output
-@click.option("--frame", type=click.IntRange(0), default=0, show_default=True, help="Of a sequence, from 0.")
+@click.option("--frame", type=click.IntRange(0), help="Of a sequence, from 0. Default: the first.")
 @click.option("--body", "model", metavar="NAME|PATH", help="Body model, as of `ipman analyze`.")
 @click.option("--up", type=UP, metavar="AXIS", default=None, help="What points up, as of `ipman analyze`.")
 @click.option(
@@ -170,8 +170,8 @@ def pull(output: Path, width: float, push_width: float, body: str) -> None:
 @click.option("--parts", type=click.Path(path_type=Path), metavar="FILE", help="Body parts, as of `ipman analyze`.")
 @_preset
 def com(
-    body: str, output: Path, frame: int, model: str | None, up: tuple[float, float, float] | None, ground: float | None,
-    parts: Path | None, preset: str,
+    body: str, output: Path, frame: int | None, model: str | None, up: tuple[float, float, float] | None,
+    ground: float | None, parts: Path | None, preset: str,
 ) -> None:  # fmt: skip
     """The formulations of the centre of mass on one body, with the CoP and that of binary contact (Fig. S.3).
 
@@ -204,7 +204,7 @@ def _millimetres(about: dict[str, Any]) -> list[str]:
 
 
 def _one_body(
-    body: str, frame: int, model: str | None, up: Any, ground: float | None, parts: Path | None
+    body: str, frame: int | None, model: str | None, up: Any, ground: float | None, parts: Path | None
 ) -> tuple[Any, Any, Any, str]:
     """Vertices, template, ground and name."""
     import ipman_rs as ip
@@ -212,6 +212,9 @@ def _one_body(
     from .measure import Request, on_ground
 
     if body in ip.body.poses.NAMES and not Path(body).exists():
+        for option, value in (("--frame", frame), ("--up", up), ("--parts", parts)):
+            if value is not None:
+                raise click.UsageError(f"{option}: is for files; {body} is a named pose, one body with y up")
         posed = ip.load_body(model or "anny")
         return ip.body.posed(posed, body), posed.template, ip.Ground.y_up(ground or 0.0), body
     if not Path(body).suffix and not Path(body).exists():
@@ -223,7 +226,7 @@ def _one_body(
         recording, template, floor, _ = on_ground(path, Request(model=model, up=up, ground=ground, parts=parts))
     except (ValueError, TypeError) as error:
         raise FileError(path, str(error)) from error
-    count = len(recording.vertices)
+    count, frame = len(recording.vertices), frame or 0
     if frame >= count:
         raise click.UsageError(f"--frame: {body} has {count} frames, from 0; there is no frame {frame}")
     return recording.vertices[frame], template, floor, path.stem if count == 1 else f"{path.stem}, frame {frame}"
@@ -242,7 +245,7 @@ def pressure(
     output: Path, name: str, path: Path, split: str | None, options: tuple[tuple[str, Any], ...], models: Path | None,
     frame: str | None, preset: str,
 ) -> None:  # fmt: skip
-    """Estimated beside measured pressure of one frame on a mat, with CoPs and CoM (Fig. 5).
+    """Estimated beside measured pressure of one frame on a mat, with CoPs and CoM (Fig. 6).
 
     IoU and CoP error as in `ipman evaluate --table biomech`: at the preset's α and γ, and at the best of the paper's
     grid for this frame.
@@ -345,14 +348,16 @@ def compare(
 ) -> None:  # fmt: skip
     """A grid of people: their image, and by each method the body over it, from the side, and its pressure.
 
-    METHOD is a folder of `ipman fit` or `ipman predict`, or, with --data, a file of predictions as `ipman evaluate`
-    reads it; usually two, a baseline and ours. People are found by name. The numbers: margin of support, CoM–CoP
-    distance, BoSE, penetration and hover of each.
+    METHOD is a folder of `ipman fit` or `ipman predict`; or, with --data, a file of predictions as `ipman evaluate`
+    reads it, or the folder of `ipman fit --data` with one. Usually there are two, a baseline and ours. People are found
+    by name; where their image cannot be read they are drawn on white. The numbers: margin of support, CoM–CoP distance,
+    BoSE, penetration and hover of each.
 
     \b
     ipman fit photos/ -o out/x --preset smplify-x && ipman fit photos/ -o out/star --preset ipman-o-star
     ipman figure compare out/x out/star --title SMPLify-X --title 'IPMAN-O*' -o out
     ipman figure compare hmr.npz ours.npz --data rich-ipman --path RICH/ --image-folder RICH/ --models models/ -o out
+    ipman figure compare fit/xmc fit/o --data moyo --path MOYO/ --option camera=1 --models models/ -o out
     """
     from . import console
 
@@ -365,7 +370,7 @@ def compare(
         raise click.UsageError("--title: expected a title for each method that no other has")
     with _one_line_errors(output):
         from ..paper_figures import comparison as made
-        from ..paper_figures.estimated_people import FittedFolder, Predicted
+        from ..paper_figures.estimated_people import PREDICTIONS, FittedFolder, Predicted
 
         found_by: list[tuple[str, Any]] = []
         opened = (
@@ -381,7 +386,8 @@ def compare(
             if opened is None:
                 found_by.append((title, FittedFolder(method, photos, body)))
             else:
-                found_by.append((title, Predicted(method, opened, _models_in(models), images)))
+                file = method / PREDICTIONS if method.is_dir() else method
+                found_by.append((title, Predicted(file, opened, _models_in(models), images)))
         with console.progress("drawing people", len(people) or most) as step:
             found = made.comparison(found_by, people, most, preset, step.to)
         _write(found, output)
@@ -434,18 +440,22 @@ def _models_in(folder: Path | None) -> Models:
 @contextmanager
 def _one_line_errors(output: Path) -> Iterator[None]:
     """Ends the command with one line and exit code 1 where something could not be read or written; a warning about
-    units is one line, too."""
+    units is one line, too, and one about an image is one for each."""
     import ipman_rs as ip
 
+    from ..paper_figures.estimated_people import ImageWarning
     from . import console
 
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("ignore")
-            warnings.simplefilter("always", ip.UnitsWarning)
+            for kind in (ip.UnitsWarning, ImageWarning):
+                warnings.simplefilter("always", kind)
             yield
-        for warning in caught[:1]:
-            console.warn(str(warning.message))
+        units = [str(each.message) for each in caught if issubclass(each.category, ip.UnitsWarning)]
+        images = [str(each.message) for each in caught if issubclass(each.category, ImageWarning)]
+        for said in (*units[:1], *dict.fromkeys(images)):
+            console.warn(said)
     except (FileError, ValueError, ImportError) as error:
         console.error(str(error))
         sys.exit(1)

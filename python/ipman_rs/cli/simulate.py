@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from .errors import FileError, one_line
 from .options import GROUND, TIMES, UP
 
 if TYPE_CHECKING:
+    from .fall_inputs import Bodies
     from .falls import Fall
 
 MOST_ROWS = 40
@@ -82,7 +84,8 @@ def simulate(
     stands    tilted by at most 15 degrees at the last time, if that is 2 s or later; else there is no verdict
 
     With --against: the share of stable bodies of both, and the difference and ratio of their displacements, with
-    intervals. Bodies are paired by name where both files have names (predictions, folders of fits), else in order.
+    intervals. Bodies are paired by name where both files have names (predictions, folders of fits), else in order;
+    where they cannot be paired nothing is simulated.
 
     With -o: simulation.json, simulation.npz (with each pose on the way) and a filmstrip PNG of each fall; with
     --against also comparison.png and .svg.
@@ -97,8 +100,16 @@ def simulate(
     Exit code: 0 when all is well, 1 when a file could not be read (the others are), 2 for wrong usage.
     """
     from . import console
+    from .fall_inputs import read_bodies
     from .falls import fall, write_falls
-    from .falls_compared import compare_falls, comparison_lines, comparison_record, comparison_table, write_comparison
+    from .falls_compared import (
+        compare_falls,
+        comparison_lines,
+        comparison_record,
+        comparison_table,
+        pairs,
+        write_comparison,
+    )
     from .measure import Request
 
     if against is not None and (len(bodies) != 1 or options["tip_only"]):
@@ -109,21 +120,32 @@ def simulate(
     films = films if output is not None else 0
     falls: list[Fall] = []
     failures: list[tuple[str, str]] = []
-    for path in (*bodies, *(() if against is None else (against,))):
+
+    @contextmanager
+    def reported() -> Iterator[None]:
         try:
-            falls.append(fall(path, request, films, **options))
-        except FileError as error:
-            failures.append((str(path), error.what))
-            console.error(str(error))
-        except ImportError as error:
-            raise click.ClickException(str(error)) from error
-    compared = None
-    if against is not None and not failures:
-        try:
-            compared = compare_falls(*falls)
+            yield
         except FileError as error:
             failures.append((error.path, error.what))
             console.error(str(error))
+        except ImportError as error:
+            raise click.ClickException(str(error)) from error
+
+    compared = None
+    if against is None:
+        for path in bodies:
+            with reported():
+                falls.append(fall(read_bodies(path, request), films, **options))
+    else:  # what cannot be compared is not simulated
+        both: list[Bodies] = []
+        for path in (*bodies, against):
+            with reported():
+                both.append(read_bodies(path, request))
+        with reported():
+            if not failures:
+                pairs(*both)
+                falls += [fall(each, films, **options) for each in both]
+                compared = compare_falls(*falls)
     record: dict[str, Any] = {"bodies": [one.record() for one in falls]}
     if compared is not None:
         record["comparison"] = comparison_record(compared[0], *falls)
@@ -133,7 +155,7 @@ def simulate(
         try:
             write_falls(falls, output, text)
             if compared is not None:
-                write_comparison(*compared[1:], output)
+                write_comparison(*compared[1:], (falls[0].path, falls[1].path), output)
         except OSError as error:
             console.error(f"{output}: cannot be written ({error.strerror or error}); choose another folder")
             sys.exit(1)
@@ -141,6 +163,10 @@ def simulate(
         click.echo(text)
     elif falls:
         print_falls(falls)
+        for one in falls:
+            assumed = [note for note in one.notes if note.startswith(("up: ", "ground: "))]
+            if assumed:
+                console.say(one_line(f"{one.path}: {'; '.join(assumed)}"))
         for note in dict.fromkeys(one.without_verdict for one in falls if one.without_verdict):
             console.say(note)
         if compared is not None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,8 +26,12 @@ from ipman_rs.view import Study
 from ipman_rs.view.fitted import camera_of
 
 PHOTOS = (".jpg", ".jpeg", ".png")
-RECORD = "fit.json"
+RECORD, PREDICTIONS = "fit.json", "predictions.npz"
 CAMERA = ("camera_rotation", "camera_translation", "focal", "center")
+
+
+class ImageWarning(UserWarning):
+    """An image that is not there or cannot be read; its person is drawn on white."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,11 @@ class FittedFolder:
     def names(self) -> list[str]:
         """Of the people, in the order of their folders. ValueError if there is nobody."""
         found = [record.parent.name for record in sorted(self.path.glob(f"*/{RECORD}"))] if self.path.is_dir() else []
+        if not found and (self.path / PREDICTIONS).is_file():
+            raise ValueError(
+                f"{self.path}: holds the predictions for a data set; name that with --data and --path, for its images "
+                "and cameras"
+            )
         if not found:
             what = "no fitted body in this folder" if self.path.is_dir() else "there is no such folder"
             raise ValueError(f"{self.path}: {what}; expected the output of ipman fit or ipman predict (NAME/{RECORD})")
@@ -83,8 +93,6 @@ class FittedFolder:
 
     def _photo(self, name: str) -> NDArray[np.uint8] | None:
         """The pixels of a person's photo, None where there is none."""
-        from ipman_rs.fitting import photo
-
         record = self.path / name / RECORD
         try:
             source = Path(str(json.loads(record.read_text(encoding="utf-8"))["source"]))
@@ -94,7 +102,18 @@ class FittedFolder:
         stems = dict.fromkeys((name, source.stem))
         places = [folder / f"{stem}{ending}" for folder in folders for stem in stems for ending in PHOTOS]
         places += [source] if source.suffix.lower() in PHOTOS else []
-        return next((photo.read(place) for place in places if place.is_file()), None)
+        return next((_pixels(name, place) for place in places if place.is_file()), None)
+
+
+def _pixels(name: str, place: Path) -> NDArray[np.uint8] | None:
+    """Of a person's image; None, with an `ImageWarning`, where it cannot be read."""
+    from ipman_rs.fitting import photo
+
+    try:
+        return photo.read(place)
+    except ValueError as error:
+        warnings.warn(f"{name} is drawn on white: {error}", ImageWarning, stacklevel=2)
+        return None
 
 
 def _posed(body: BodyModel, arrays: Mapping[str, NDArray[Any]], path: Path) -> NDArray[np.float64]:
@@ -145,8 +164,10 @@ class Predicted:
         if bodies.vertices is None or bodies.model is None:
             raise ValueError(f"{self.path}: has no bodies whose model is here: give --models FOLDER")
         ground = guess.ground if guess.ground is not None else true.ground
-        if ground is None or true.cameras is None:
-            raise ValueError(f"{name}: the data set has no {'ground' if ground is None else 'camera'} for it")
+        if ground is None:
+            raise ValueError(f"{name}: the data set has no ground for it")
+        if true.cameras is None:
+            raise ValueError(f"{name}: the data set has no camera for it; of moyo one is chosen by --option camera=1")
         ground = ip.Ground(np.reshape(ground.normal, (-1, 3))[0], np.ravel(ground.height)[0])
         photo = self._photo(row, true)
         matrix = true.cameras.intrinsics[0]
@@ -169,13 +190,11 @@ class Predicted:
         raise ValueError(f"{self.path}: predicts {name!r}, but the data set has no such frame")
 
     def _photo(self, row: int, true: Frames) -> NDArray[np.uint8] | None:
-        from ipman_rs.fitting import photo
-
         if hasattr(self.data, "image"):  # it brings its images along
             return self.data.image(row)  # type: ignore[attr-defined]
         if true.images is None or not str(true.images[0]):
             return None
-        return photo.read(self.images / str(true.images[0]))
+        return _pixels(str(true.names[0]), self.images / str(true.images[0]))
 
 
 Estimated = FittedFolder | Predicted

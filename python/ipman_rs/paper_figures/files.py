@@ -42,6 +42,7 @@ class PaperFigure:
 def write(figure: PaperFigure, folder: Path) -> list[Path]:
     """Writes the files of a figure, the picture first; their paths. OSError where the folder cannot be written."""
     folder.mkdir(parents=True, exist_ok=True)
+    settle(figure.picture, DPI)
     contents = {"png": _picture(figure, "png"), "svg": _picture(figure, "svg")}
     record = json.dumps(plain({"figure": figure.name, **figure.numbers}), allow_nan=False, ensure_ascii=False, indent=1)
     contents["json"] = f"{record}\n".encode()
@@ -56,6 +57,19 @@ def write(figure: PaperFigure, folder: Path) -> list[Path]:
             file.write(content)
         written.append(path)
     return written
+
+
+def settle(picture: Figure, dpi: float) -> None:
+    """Lays a figure out for a picture of that dpi, and ends that. The solver of matplotlib's layout is not the same in
+    the last digit each time, and an SVG names its clips after all digits."""
+    if picture.get_layout_engine() is None:
+        return
+    picture.set_dpi(dpi)
+    picture.draw_without_rendering()
+    picture.set_layout_engine("none")
+    for axes in picture.axes:
+        left, bottom, width, height = (round(float(edge), 9) for edge in axes.get_position(original=True).bounds)
+        axes.set_position((left, bottom, width, height), which="original")
 
 
 def _picture(figure: PaperFigure, form: str) -> bytes:

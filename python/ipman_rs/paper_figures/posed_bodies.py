@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ipman_rs.body import BodyModel
 from ipman_rs.data.frames import DataSet, Frames
-from ipman_rs.evaluation.tables.models import Models
+from ipman_rs.evaluation.tables.models import Models, file_of
 from ipman_rs.ground import Ground
 
 PIECE = 256  # frames
@@ -54,4 +54,4 @@ def posed_bodies(
 def _lacking(frames: Frames) -> str:
     if frames.body is None or (frames.pose is None and frames.vertices is None):
         return "has no bodies, neither parameters nor vertices of a body model"
-    return f"its bodies need the model file {frames.body.upper()}_NEUTRAL.npz or .pkl: give --models FOLDER"
+    return f"its bodies need the model file {file_of(frames)}.npz or .pkl: give --models FOLDER"

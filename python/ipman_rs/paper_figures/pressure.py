@@ -1,4 +1,4 @@
-"""Estimated beside measured pressure of one frame on a mat (the paper's Fig. 5), with CoPs and CoM.
+"""Estimated beside measured pressure of one frame on a mat (the paper's Fig. 6), with CoPs and CoM.
 
 The estimated map is that of the biomechanics protocol (`ipman_rs.evaluation.moyo`): the pressure of the samples over
 the mat, scaled to run from 0 to 1, summed in each cell, scaled again. The numbers also have the protocol's own choice,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.floating]
 
 CELL = (460, 560)  # pixels
-AROUND = 0.08  # m of the mat that are shown around what presses
+AROUND, NEAR = 0.08, 0.03  # m that are shown around what presses, and around a centre
 PRESSED, FAINT = 0.1, 0.02  # of the largest: what presses, and what is left white
 
 
@@ -134,7 +134,7 @@ def pressure(pressed: Pressed, preset: str = "paper-r") -> PaperFigure:
         "center_of_pressure": {"estimated": center, "measured": pressed.center},
         "margin_m": study.numbers["margin"][0],
     }
-    rows, columns = _shown(maps, mat.cell)
+    rows, columns = _shown(maps, mat, (mass, center, pressed.mass, pressed.center))
     figure = new_figure(7.6, 4.0)
     wide = float(np.clip(np.ptp(columns) / np.ptp(rows), 0.35, 1.0))
     body, left, right = figure.subplots(1, 3, width_ratios=(CELL[0] / CELL[1], wide, wide))
@@ -149,6 +149,7 @@ def pressure(pressed: Pressed, preset: str = "paper-r") -> PaperFigure:
     words = f"IoU {numbers['iou']:.2f}, CoP {1e3 * numbers['cop_error_m']:.0f} mm off"
     left.set_title("estimated", size=WORDS, color=colors.INK)
     right.set_title("measured", size=WORDS, color=colors.INK)
+    figure.get_layout_engine().set(h_pad=0.08)  # type: ignore[union-attr]
     figure.suptitle(f"{pressed.name}\n{words}", size=WORDS, color=colors.INK, parse_math=False)
     _write_key(figure, (left, right))
     return PaperFigure("pressure", figure, numbers, maps)
@@ -178,14 +179,17 @@ def _scaled(values: Array) -> Array:
     return (values - values.min()) / (span if span else 1.0)
 
 
-def _shown(maps: dict[str, Array], cell: float) -> tuple[Array, Array]:
-    """The first and the last m along the rows and the columns that are drawn: around what presses, within the mat."""
+def _shown(maps: dict[str, Array], mat: PressureMaps, points: tuple[Array, ...]) -> tuple[Array, Array]:
+    """The first and the last m along the rows and the columns that are drawn: around what presses on the mat by either
+    map, and around these points, which may lie beside it."""
     both = np.maximum(maps["estimated"], maps["measured"])
+    known = [point - mat.origin for point in points if np.isfinite(point).all()]
     limits = []
-    for axis, count in ((1, both.shape[0]), (0, both.shape[1])):
-        pressed = np.flatnonzero(both.max(axis=axis) > PRESSED) * cell
-        ends = np.array([pressed[0] - AROUND, pressed[-1] + cell + AROUND])
-        limits.append(ends.clip(0, count * cell))
+    for axis, count, along in ((1, both.shape[0], mat.e1), (0, both.shape[1], mat.e2)):
+        pressed = np.flatnonzero(both.max(axis=axis) > PRESSED) * mat.cell
+        ends = np.array([pressed[0] - AROUND, pressed[-1] + mat.cell + AROUND]).clip(0, count * mat.cell)
+        places = [float(offset @ along) for offset in known]
+        limits.append(np.array([min(ends[0], min(places) - NEAR), max(ends[1], max(places) + NEAR)]))
     return limits[0], limits[1]
 
 
@@ -195,6 +199,10 @@ def _draw_map(axes: Axes, mat: PressureMaps, values: Array, points: tuple[Array,
     height, width = mat.values.shape
     shown = np.where(values > FAINT, values, np.nan)
     axes.imshow(shown, cmap=_heat(), vmin=0, vmax=1, extent=(0, width * cm, height * cm, 0), interpolation="nearest")
+    axes.plot(*_edge(width * cm, height * cm), color=colors.GRID, linewidth=1.0)
+    if not np.isfinite(shown).any():
+        words: dict[str, Any] = {"transform": axes.transAxes, "ha": "center", "va": "center", "color": colors.MUTED}
+        axes.text(0.5, 0.5, "nothing on\nthe mat", size=WORDS, **words)
     for point, color in zip(points, (colors.COM, colors.COP), strict=True):
         if np.isfinite(point).all():
             offset = point - mat.origin
@@ -206,6 +214,11 @@ def _draw_map(axes: Axes, mat: PressureMaps, values: Array, points: tuple[Array,
     axes.set_xlabel("cm", size=WORDS - 1, color=colors.INK)
     for side in axes.spines.values():
         side.set_color(colors.GRID)
+
+
+def _edge(width: float, height: float) -> tuple[list[float], list[float]]:
+    """The outline of the mat."""
+    return [0, width, width, 0, 0], [0, 0, height, height, 0]
 
 
 def _heat() -> Colormap:

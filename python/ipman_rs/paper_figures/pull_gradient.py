@@ -27,7 +27,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.floating]
 
-REACH = 0.5  # m, of the heights, in steps of 1 mm
+REACH = 0.5  # m, of the heights, or a multiple for wide terms
+STEPS = 500  # of the heights: 1 mm each where they reach 0.5 m
+TAIL = 2.5  # widths: from 2.30 of them on, a tenth of the peak is left
+PEAK = float(np.arctanh(1 / np.sqrt(3)))  # widths: where tanh(x) / cosh²(x) is largest, tanh²(x) = 1/3
 CLAIM = (0.15, 0.20)  # m: the paper calls the gradient minimal beyond
 ASKED = (0.10, 0.15, 0.20, 0.30)  # m
 LITTLE = 0.1  # of the peak
@@ -43,22 +46,25 @@ def pull_gradient(
     """L_pull and its gradient over height; a floating and a sinking `body` of `ipman_rs.load_body`, each point in the
     colour of its own term's gradient. alpha1, beta1: weights; alpha2, beta2: widths, m."""
     weights = positive("alpha1", alpha1), positive("alpha2", alpha2), positive("beta1", beta1), positive("beta2", beta2)
-    heights = np.arange(round(REACH * 1000) + 1) / 1000
+    reach = REACH * max(1, int(np.ceil(TAIL * max(alpha2, beta2) / REACH)))
+    heights = np.arange(STEPS + 1) * (1000 * reach / STEPS) / 1000
     pull, pull_slope = engine_curve(heights, *weights)[0]
     push, push_slope = engine_curve(-heights, *weights)[1]
-    peak = int(pull_slope.argmax())
-    late = np.flatnonzero(pull_slope[peak:] < LITTLE * pull_slope[peak])
+    top = PEAK * alpha2
+    steepest, *asked = engine_curve(np.array([top, *ASKED]), *weights)[0][1]
+    late = heights[(heights > top) & (pull_slope < LITTLE * steepest)]
+    beyond = pull_slope[heights >= CLAIM[1]].max() if top <= CLAIM[1] else steepest
     numbers = {
         "alpha1": alpha1,
         "alpha2_m": alpha2,
         "beta1": beta1,
         "beta2_m": beta2,
         "claim": "the paper: the gradient of L_pull is minimal beyond 15 to 20 cm",
-        "peak_m": heights[peak],
-        "peak_gradient_per_m": pull_slope[peak],
-        "share_of_peak": {f"{height:g}": _at(height, heights, pull_slope) / pull_slope[peak] for height in ASKED},
-        "below_a_tenth_of_the_peak_beyond_m": heights[peak + late[0]] if len(late) else None,
-        "claim_holds": bool(_at(CLAIM[1], heights, pull_slope) < LITTLE * pull_slope[peak]),
+        "peak_m": top,
+        "peak_gradient_per_m": steepest,
+        "share_of_peak": {f"{height:g}": slope / steepest for height, slope in zip(ASKED, asked, strict=True)},
+        "below_a_tenth_of_the_peak_beyond_m": late[0],
+        "claim_holds": bool(beyond < LITTLE * steepest),
     }
     table = [
         {"height_m": f"{h:.3f}", "pull": p, "pull_gradient_per_m": dp, "push_below": q, "push_gradient_below_per_m": dq}
@@ -71,7 +77,7 @@ def pull_gradient(
     for axes, lift, word in ((middle, MOVED, "floats"), (right, -MOVED, "sinks")):
         show_pixels(axes, _moved_body(body, lift, paints))
         axes.set_title(f"{word}: {abs(100 * lift):.0f} cm", size=WORDS, color=colors.INK)
-    _draw_bars(figure, (middle, right), (pull_slope.max(), np.abs(push_slope).max()))
+    _draw_bars(figure, (middle, right), (steepest, np.abs(push_slope).max()))
     return PaperFigure("pull", figure, numbers, table=table)
 
 
@@ -98,15 +104,11 @@ def engine_curve(
     return found[0], found[1]
 
 
-def _at(height: float, heights: Array, values: Array) -> float:
-    return float(np.interp(height, heights, values))
-
-
 def _draw_curve(axes: Axes, heights: Array, pull: Array, slope: Array, numbers: dict[str, Any]) -> None:
     peak = numbers["peak_gradient_per_m"]
     cm = 100 * heights
     axes.axvspan(100 * CLAIM[0], 100 * CLAIM[1], color="#f5e6c8", linewidth=0, zorder=0)
-    axes.axvspan(100 * CLAIM[1], 100 * REACH, color="#faf4e6", linewidth=0, zorder=0)
+    axes.axvspan(100 * CLAIM[1], cm[-1], color="#faf4e6", linewidth=0, zorder=0)
     axes.plot(cm, pull / numbers["alpha1"], color=PULL, linewidth=1.8, label="L_pull / α1")
     axes.plot(cm, slope / peak, color=SERIES[1], linewidth=2.2, label="its gradient, of the largest")
     for height, share in numbers["share_of_peak"].items():
@@ -117,10 +119,10 @@ def _draw_curve(axes: Axes, heights: Array, pull: Array, slope: Array, numbers: 
                 f"{100 * share:.0f} % at {at:.0f} cm", (at, share), (9, 11), textcoords="offset points", size=WORDS - 1
             )
     words = {"size": WORDS - 1, "color": "#8a6d3b", "ha": "center"}
-    axes.text(50 * (CLAIM[1] + REACH) + 2, 0.66, "the paper: “minimal”\nbeyond 15–20 cm", **words)
+    axes.text(50 * CLAIM[1] + 0.5 * cm[-1] + 2, 0.66, "the paper: “minimal”\nbeyond 15–20 cm", **words)
     title = f"α2 = {numbers['alpha2_m']:g} m: steepest at {100 * numbers['peak_m']:.1f} cm"
     plot_style(axes, title, "height above the ground, cm", "share")
-    axes.set(xlim=(0, 100 * REACH), ylim=(0, 1.2))
+    axes.set(xlim=(0, cm[-1]), ylim=(0, 1.2))
     axes.legend(fontsize=WORDS - 1, frameon=False, loc="upper right", ncols=2)
 
 

@@ -96,10 +96,9 @@ def define(
     body would be held against joints of another definition, or where the truth is bodies whose model is missing.
     """
     if truth.without_model is not None and estimate.vertices is not None and estimate.given is None:
-        kind = truth.without_model
         raise ValueError(
-            f"{data}: its truth is bodies of {kind}, to which predicted bodies are compared: --models FOLDER with "
-            f"{kind.upper()}_NEUTRAL.npz or .pkl"
+            f"{data}: its truth is bodies of {truth.kind}, to which predicted bodies are compared: --models FOLDER "
+            f"with {truth.without_model}.npz or .pkl"
         )
     makers = _makers(truth, estimate, regressors, data)
     if makers is None:

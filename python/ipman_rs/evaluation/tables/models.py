@@ -31,7 +31,7 @@ class Bodies:
     own: NDArray[Any] | None  # the joints of the posed body model
     given: NDArray[Any] | None  # the joints that the frames name themselves: measured, or predicted without a body
     given_names: tuple[str, ...]
-    without_model: str | None = None  # the kind of a pose that has no model here, beside given joints
+    without_model: str | None = None  # such as SMPLX_FEMALE: of a pose that has no model here, beside given joints
 
     @property
     def own_names(self) -> tuple[str, ...]:
@@ -76,14 +76,15 @@ class Models:
         files = self.files("smplx")
         return ip.load_body(files[0]).hands if files else None
 
-    def template_of(self, kind: str) -> BodyModel:
-        """The model whose faces, parts and samples all bodies of a kind share, whatever their gender."""
+    def template_of(self, kind: str, wanted: str = "neutral") -> BodyModel:
+        """The model whose faces, parts and samples all bodies of a kind share, whatever their gender. ValueError, with
+        the file of the `wanted` gender, if there is none."""
         if kind in embedded.NAMES:
             return ip.load_body(kind)
         for gender in GENDERS:
             if self._found(kind, gender) is not None:
                 return self.get(kind, gender)
-        return self.get(kind)
+        return self.get(kind, wanted)
 
     def has(self, kind: str) -> bool:
         """Whether there is a model of that kind, of some gender."""
@@ -99,10 +100,10 @@ class Models:
         that there is and its model is not."""
         vertices, own, kind = frames.vertices, None, frames.body
         needed = vertices is None and frames.joints is None
-        model = None if kind is None or not (needed or self.has(kind)) else self.template_of(kind)
+        model = None if kind is None or not (needed or self.has(kind)) else self.template_of(kind, _genders(frames)[0])
         if frames.pose is not None and kind is not None and model is not None and vertices is None:
             vertices, own = self._skinned(frames, kind)
-        lacking = kind if frames.pose is not None and vertices is None else None
+        lacking = file_of(frames) if frames.pose is not None and vertices is None else None
         return Bodies(kind, model, vertices, own, frames.joints, tuple(frames.joint_names or ()), lacking)
 
     def _skinned(self, frames: Frames, kind: str) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -130,9 +131,8 @@ class Models:
         found = self._found(kind, gender)
         if found is not None:
             return found
-        name = f"{kind.upper()}_{gender.upper()}"
         where = "no folder is named by --models" if self.folder is None else f"there is none under {self.folder}"
-        raise ValueError(f"the body {kind} ({gender}) needs its model file, {name}.npz or .pkl: {where}")
+        raise ValueError(f"the body {kind} ({gender}) needs its model file, {_stem(kind, gender)}.npz or .pkl: {where}")
 
     def _found(self, kind: str, gender: str) -> Path | None:
         if self.folder is None:
@@ -140,6 +140,20 @@ class Models:
         stems = [f"{kind}_{gender}", *([_DOWNLOADED[gender]] if kind == "smpl" else [])]
         files = sorted(path for path in self.folder.rglob("*") if path.suffix.lower() in _ENDINGS)
         return next((path for stem in stems for path in files if path.stem.lower().startswith(stem)), None)
+
+
+def file_of(frames: Frames) -> str | None:
+    """The model file that these frames need first, without its ending, such as SMPLX_FEMALE; None without a body."""
+    return None if frames.body is None else _stem(frames.body, _genders(frames)[0])
+
+
+def _stem(kind: str, gender: str) -> str:
+    return f"{kind.upper()}_{gender.upper()}"
+
+
+def _genders(frames: Frames) -> list[str]:
+    """Of the people, each once."""
+    return ["neutral"] if frames.genders is None or not len(frames) else np.unique(frames.genders).tolist()
 
 
 def _on_joints(pose: NDArray[Any], model: BodyModel) -> NDArray[Any]:
