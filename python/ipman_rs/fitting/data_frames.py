@@ -24,7 +24,8 @@ from .camera import Camera
 from .detected import shared_names
 from .detections import Detections
 from .landmarks import Landmarks
-from .presented import PresentedBody, of_pose, touching, y_up
+from .presented import PresentedBody, of_pose, touching
+from .presented_files import y_up
 from .problem import Problem
 from .start import level_camera
 
@@ -123,7 +124,7 @@ def presented_of(frame: Frames, own: Bodies, body: BodyModel) -> tuple[Presented
     if floor is not None and not same:
         lowest = float(np.asarray(body(pose).vertices)[:, 1].min())
         shift[1] = floor - lowest
-    found = of_pose(name, pose, body, contact, None if floor is None else floor - float(shift[1]))
+    found = of_pose(name, pose, body, contact, "mesh", None if floor is None else floor - float(shift[1]))
     return found, World(whole.turn, shift)
 
 

@@ -1,15 +1,8 @@
-"""The presented pose (SMPLify-XMC): the pose that a person was shown and imitates, by its name or from a file.
+"""The presented pose (SMPLify-XMC): the pose that a person was shown and imitates, by its name or from a file
+(`presented_files`).
 
-A file (.npz, .pkl) has the pose of one body under the names of AMASS, the smplx package or MoYo (`body.pose_arrays`)
-and, where it knows them,
-
-    betas (n,), transl or trans (3,)      shape, and place in the file's world
-    ground (4,)                           the normal and the height of its floor; or ground_normal, ground_height
-    contact                               the vertices that touch: indices, pairs of them, or a flag for each vertex
-    model, body                           what the parameters are of, where the joints do not say
-
-Ground and contact belong to one body model: they count if that is the one which is fitted. Otherwise the floor lies
-under the presented body, and contact is found on it: vertices within `NEAR` of opposite surface.
+Where a file knows no floor, or is of another body than the one that is fitted, the floor lies under the presented body;
+where it knows no contact, that is found on the presented body: vertices within `NEAR` of opposite surface.
 
 The fit's world has y up and its origin where the body's parameters have theirs, so IPMAN-O's R^b = I and t^b = 0 mean
 the body as presented: the root keeps its rotation, but for the turn that brings the file's up to y.
@@ -17,9 +10,7 @@ the body as presented: the root keeps its rotation, but for the turn that brings
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,25 +18,16 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
 import ipman_rs.torch as ipt
-from ipman_rs.body import BodyModel, embedded, joints, pose_arrays, poses, safe_npz, safe_pickle
-from ipman_rs.ground import Ground
+from ipman_rs.body import BodyModel, poses
 
+from . import presented_files
+from .presented_files import ENDINGS, Array, Axis
 from .problem import Presented, Problem
 
-Array = NDArray[Any]
-Axis = tuple[float, float, float]
-
 NEAR, GEODESIC = 0.02, 0.3  # m: to touch, and from where on along the surface two places are different ones
-ENDINGS = (".npz", ".pkl")
-LARGEST_ANGLE = 4 * np.pi  # a turn and more in a rotation vector are degrees
-FARTHEST = 10.0  # m, of a pelvis above or below its floor
-_Z_UP = ("poses", "fullpose", "root_orient")  # arrays of AMASS and MoYo, whose worlds have z up
-_ABSOLUTE = ("poses", "fullpose", "pose_hand", "full_pose")  # whose fingers are not relative to the mean hand
-_HANDS = {"left_hand_pose": joints.LEFT_HAND, "right_hand_pose": joints.RIGHT_HAND}
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,14 +44,6 @@ class PresentedBody:
     contact_from: str
     height: float | None = None
     notes: tuple[str, ...] = ()
-
-    @property
-    def fingerprint(self) -> str:
-        """A hash of all that a fit depends on."""
-        digest = hashlib.sha256(repr((self.source, self.height)).encode())
-        for array in (self.pose, self.contact):
-            digest.update(np.ascontiguousarray(array).tobytes())
-        return digest.hexdigest()
 
     def vertices(self, body: BodyModel) -> NDArray[np.float64]:
         """The mean body (V, 3) m in this pose, where the fit's world has it."""
@@ -107,12 +81,13 @@ def load(
     Raises:
         ValueError: no pose of that name, or a file that is missing, damaged, or holds several bodies or none.
     """
+    given = None if contact is None else presented_files.read_contact(Path(contact), body)
     if str(name) in poses.NAMES:
         if frame is not None or up is not None:
             raise ValueError(
                 f"pose {name}: is a named pose, of which there is one: leave out --pose-frame and --pose-up"
             )
-        return of_pose(str(name), poses.pose_of(body, str(name)), body, _given(contact, body))
+        return of_pose(str(name), poses.pose_of(body, str(name)), body, given)
     path = Path(name)
     if path.suffix.lower() not in ENDINGS:
         if path.exists():
@@ -120,7 +95,10 @@ def load(
             raise ValueError(f"{path}: {what}")
         listed = ", ".join(poses.NAMES)
         raise ValueError(f"no pose {str(name)!r}; there are {listed}, or a file ending in {' '.join(ENDINGS)}")
-    return _of_file(_Stored.open(path), body, _given(contact, body), frame, up)
+    found = presented_files.read(path, body, frame, up)
+    contact_from = "file" if given is None else "given"
+    known = found.contact if given is None else given
+    return of_pose(str(path), found.pose, body, known, contact_from, found.height, found.notes)
 
 
 def of_pose(
@@ -128,11 +106,11 @@ def of_pose(
     pose: NDArray[np.floating],
     body: BodyModel,
     contact: NDArray[np.int64] | None = None,
+    contact_from: str = "given",
     height: float | None = None,
     notes: Sequence[str] = (),
 ) -> PresentedBody:
-    """A pose (J, 3) in a world with y up; contact is found on the mean body where it is not given."""
-    contact_from = "given"
+    """A pose (J, 3) in a world with y up; contact is found on the mean body where it is not known."""
     if contact is None:
         contact, contact_from = touching(body, pose), "mesh"
     notes = [*notes]
@@ -164,263 +142,3 @@ def present(problem: Problem, bodies: Sequence[PresentedBody], stays: bool) -> P
         up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(count, 3)
         ground = ipt.Ground(up, torch.tensor([each.floor(body) for each in bodies], dtype=torch.float64))
     return replace(problem, presented=Presented(pose[:, 1:], touching, pose[:, 0]), ground=ground)
-
-
-def y_up(normal: Array) -> Rotation:
-    """The smallest turn that brings a direction (3,) to y."""
-    normal = np.asarray(normal, float) / np.linalg.norm(normal)
-    axis, cosine = np.cross(normal, [0.0, 1.0, 0.0]), float(normal[1])
-    sine = float(np.linalg.norm(axis))
-    if sine == 0.0:
-        return Rotation.from_rotvec([0.0, 0.0, 0.0 if cosine > 0 else np.pi])
-    return Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine))
-
-
-class _Stored:
-    """The numbers of a file by name; nothing in it is executed."""
-
-    def __init__(self, path: Path, names: set[str], read: Callable[[str], Any]) -> None:
-        self.path, self.names, self._read = path, names, read
-
-    @classmethod
-    def open(cls, path: Path) -> _Stored:
-        if not path.is_file():
-            raise ValueError(f"{path}: {'is a folder; name the file in it' if path.is_dir() else 'no such file'}")
-        if path.suffix.lower() == ".npz":
-            return cls(path, safe_npz.names(path), lambda name: safe_npz.read(path, name))
-        content = safe_pickle.read(path, "presented pose", "a pose of SMPL, SMPL-X or MoYo", tolerant=True)
-        names = {name for name in content if isinstance(name, str)}
-        return cls(path, names, lambda name: _plain(content[name], f"{path}: {name}"))
-
-    @property
-    def up(self) -> Axis:
-        """Of the world of files with these arrays."""
-        return (0.0, 0.0, 1.0) if self.names & {*_Z_UP} else (0.0, 1.0, 0.0)
-
-    @property
-    def is_absolute(self) -> bool:
-        """Whether fingers are rotations, not relative to the mean hand: AMASS's, MoYo's, and predictions'."""
-        return bool(self.names & {*_ABSOLUTE}) or self.names >= {"names", "body", "pose"}
-
-    def first(self, *names: str) -> Array | None:
-        """The first of these that is there, as numbers."""
-        for name in names:
-            if name in self.names:
-                array = np.asarray(self._read(name))
-                if array.dtype.kind == "O" and array.shape == () and array[()] is None:
-                    continue
-                if array.dtype.kind not in "fiub":
-                    raise ValueError(f"{self.path}: {name} holds {array.dtype}, not numbers; save plain numbers")
-                return array
-        return None
-
-    def word(self, *names: str) -> str | None:
-        for name in names:
-            if name in self.names:
-                return str(self._read(name))
-        return None
-
-
-def _plain(value: Any, place: str) -> Any:
-    if value is None or isinstance(value, (str, int, float, bool)):
-        return value
-    if isinstance(value, (list, tuple)):
-        try:
-            return np.array(value)
-        except ValueError as error:
-            raise ValueError(f"{place}: {error}") from None
-    try:
-        return safe_pickle.as_array(value)
-    except ValueError:
-        raise ValueError(f"{place}: expected numbers, got another kind of object; save it as a numpy array") from None
-
-
-def _of_file(
-    stored: _Stored, body: BodyModel, contact: NDArray[np.int64] | None, frame: int | None, up: Axis | None
-) -> PresentedBody:
-    pieces = _hands_turned(stored, body)
-    if not pieces:
-        listed = ", ".join(sorted(stored.names))[:120] or "nothing"
-        raise ValueError(
-            f"{stored.path}: holds {listed}; expected a pose such as global_orient with body_pose, or pose"
-        )
-    length = max(len(piece.rotations) for piece in pieces)
-    row = _row(stored, length, frame)
-    pose = pose_arrays.place(pieces, body.joint_names, length)[row]
-    _check_angles(stored, pose)
-    if stored.is_absolute:
-        pose = pose - body.pose_mean
-    notes: list[str] = []
-    own = _kind(stored, pieces) == embedded.kind_of(body)
-    if not own and stored.names & {"ground", "ground_height", "contact"}:
-        notes.append(f"{stored.path}: is of another body than {body.name}: its floor and contact are not used")
-    normal, height = _ground(stored, row) if own else (None, None)
-    if normal is not None and up is not None:
-        notes.append(f"{stored.path}: has a ground, whose normal is up: --pose-up is not needed")
-    if normal is None and stored.names >= {"names", "body"} and up is None:
-        raise ValueError(
-            f"{stored.path}: predictions for a data set, whose axes are its own, without a ground: say what points up "
-            "(--pose-up)"
-        )
-    turn = y_up(normal if normal is not None else up or stored.up)
-    pose[0] = (turn * Rotation.from_rotvec(pose[0])).as_rotvec()
-    if height is not None and normal is not None:
-        height = _above_floor(stored, body, row, normal, height)
-    contact_from = "given"
-    if contact is None and own and "contact" in stored.names:
-        contact, contact_from = _indices(stored.first("contact"), f"{stored.path}: contact", body), "file"
-    found = of_pose(str(stored.path), pose, body, contact, height, notes)
-    return replace(found, contact_from=contact_from) if contact_from == "file" else found
-
-
-def _hands_turned(stored: _Stored, body: BodyModel) -> list[pose_arrays.Piece]:
-    """The pieces of a file's pose. Hands that are weights of principal components (12 in upstream's and RICH's)
-    become rotations of the fingers, or are left out where the body has no components."""
-    weights = {name: stored.first(name) for name in _HANDS}
-    weights = {name: each for name, each in weights.items() if each is not None and _are_weights(each)}
-    try:
-        pieces = pose_arrays.read(lambda *names: None if names[0] in weights else stored.first(*names))
-    except ValueError as error:
-        raise ValueError(f"{stored.path}: {error}") from None
-    if body.hands is None:
-        return pieces
-    for side, (name, fingers) in enumerate(_HANDS.items()):
-        if name in weights:
-            rows = weights[name].reshape(-1, weights[name].shape[-1])
-            try:
-                turned = body.hands.from_components(rows, rows)[:, 15 * side : 15 * side + 15]
-            except ValueError as error:
-                raise ValueError(f"{stored.path}: {name}: {error}") from None
-            pieces.append(pose_arrays.Piece(turned, fingers))
-    return pieces
-
-
-def _are_weights(hand: Array) -> bool:
-    return hand.ndim > 0 and hand.shape[-1] not in (3, 45)
-
-
-def _check_angles(stored: _Stored, pose: Array) -> None:
-    """ValueError for what are no rotation vectors in radians."""
-    if not np.isfinite(pose).all():
-        raise ValueError(f"{stored.path}: the pose is not finite")
-    largest = float(np.linalg.norm(pose, axis=-1).max())
-    if largest > LARGEST_ANGLE:
-        raise ValueError(
-            f"{stored.path}: the pose looks like degrees: a joint turns by {largest:.4g}; expected rotation vectors in "
-            "radians"
-        )
-
-
-def _row(stored: _Stored, length: int, frame: int | None) -> int:
-    if frame is None and length > 1:
-        raise ValueError(f"{stored.path}: holds {length} poses; say which is presented (--pose-frame, from 0)")
-    if not 0 <= (frame or 0) < length:
-        raise ValueError(f"{stored.path}: frame: expected 0 to {length - 1}, got {frame}")
-    return frame or 0
-
-
-def _kind(stored: _Stored, pieces: Sequence[pose_arrays.Piece]) -> str:
-    """What the parameters are of: what the file says, or what its joints tell."""
-    said = stored.word("model", "body", "model_type")
-    if said is not None and said.lower() in (*embedded.NAMES, "smpl", "smplh", "smplx"):
-        return said.lower()
-    turned = {name for piece in pieces for name in piece.joints}
-    if "left_hand" in turned:
-        return "smpl"
-    whole = stored.names & {*pose_arrays.WHOLE_POSES}  # AMASS's SMPL+H; pieces without a jaw may be SMPL-X, too
-    return "smplh" if whole and "left_index1" in turned and "jaw" not in turned else "smplx"
-
-
-def _ground(stored: _Stored, row: int) -> tuple[Array | None, float | None]:
-    """Normal and height of the file's floor, or neither."""
-    plane = stored.first("ground")
-    if plane is None and "ground_height" in stored.names:
-        height = stored.first("ground_height")
-        normal = stored.first("ground_normal")
-        normal = np.array(stored.up) if normal is None else normal.reshape(-1, 3)[0]
-        plane = None if height is None else np.append(normal, np.ravel(height)[:1])
-    if plane is None:
-        return None, None
-    if plane.shape[-1:] != (4,) or plane.ndim > 2 or (plane.ndim == 2 and 1 < len(plane) <= row):
-        raise ValueError(f"{stored.path}: ground: expected a normal and a height (4,), or (T, 4), got {plane.shape}")
-    rows = plane.reshape(-1, 4).astype(float)
-    plane = rows[row if len(rows) > 1 else 0]
-    if not np.isfinite(plane).all() or not plane[:3].any():
-        raise ValueError(f"{stored.path}: ground: expected a finite normal that is not 0, and a height, got {plane}")
-    ground = Ground(plane[:3], plane[3])
-    return np.asarray(ground.normal, float), float(ground.height)
-
-
-def _above_floor(stored: _Stored, body: BodyModel, row: int, normal: Array, height: float) -> float:
-    """Height of the file's floor in the fit's world, m: the root joint stands as high above it as in the file."""
-    above = float(normal @ _place(stored, body, row)) - height
-    if not -FARTHEST < above < FARTHEST:
-        raise ValueError(
-            f"{stored.path}: the pelvis is {above:.4g} m above the file's ground; are transl and ground in metres?"
-        )
-    return float(_pelvis(body)[1]) - above
-
-
-def _place(stored: _Stored, body: BodyModel, row: int) -> Array:
-    """Where the pelvis is in the file's world (3,) m."""
-    transl, betas = stored.first("transl", "trans"), stored.first("betas")
-    if betas is not None and (betas.ndim == 0 or betas.size == 0 or not np.isfinite(betas).all()):
-        raise ValueError(f"{stored.path}: betas: expected finite numbers (n,) or (T, n), got shape {betas.shape}")
-    pelvis = _pelvis(body, None if betas is None else betas.reshape(-1, betas.shape[-1]), row)
-    if transl is None:
-        return pelvis
-    if transl.shape[-1:] != (3,) or transl.size == 0 or not np.isfinite(transl).all():
-        raise ValueError(f"{stored.path}: transl: expected finite metres (3,) or (T, 3), got shape {transl.shape}")
-    rows = transl.reshape(-1, 3).astype(float)
-    return pelvis + rows[row if len(rows) > row else 0]
-
-
-def _pelvis(body: BodyModel, betas: Array | None = None, row: int = 0) -> Array:
-    """The root joint (3,) m, about which a body turns, of the mean shape or of betas (n or 1, b)."""
-    if betas is None:
-        return body.J_template[0]
-    count = min(betas.shape[1], body.num_betas)
-    return body.J_template[0] + body.J_shapedirs[0, :, :count] @ betas[row if len(betas) > row else 0, :count]
-
-
-def _given(path: str | Path | None, body: BodyModel) -> NDArray[np.int64] | None:
-    """The vertices of a contact file."""
-    if path is None:
-        return None
-    path = Path(path)
-    if path.suffix.lower() not in (*ENDINGS, ".json"):
-        raise ValueError(f"{path}: expected contact in .json, .npz or .pkl, got {path.suffix or 'no ending'}")
-    if path.suffix.lower() in ENDINGS:
-        stored = _Stored.open(path)
-        found = stored.first("contact")
-        if found is None:
-            listed = ", ".join(sorted(stored.names))[:120]
-            raise ValueError(f"{path}: expected an array contact, it has {listed or 'nothing'}")
-        return _indices(found, f"{path}: contact", body)
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        found = np.array(content["contact"] if isinstance(content, dict) else content)
-    except (OSError, ValueError, KeyError) as error:
-        raise ValueError(f"{path}: expected a list of vertices (.json), or contact in .npz or .pkl: {error}") from None
-    return _indices(found, f"{path}: contact", body)
-
-
-def _indices(found: Array | None, place: str, body: BodyModel) -> NDArray[np.int64]:
-    """Vertices as ascending indices, from indices, pairs of them, or a flag for each vertex."""
-    found = np.zeros(0, int) if found is None else np.asarray(found)
-    if found.size == 0:
-        return np.zeros(0, np.int64)
-    count = body.num_vertices
-    found = found[0] if found.shape == (1, count) else found  # a flag for each vertex of a batch of one
-    if found.dtype.kind == "b" or (found.shape == (count,) and np.isin(found, (0, 1)).all()):
-        if found.shape != (count,):
-            raise ValueError(f"{place}: expected a flag for each of {count} vertices, got shape {found.shape}")
-        return np.flatnonzero(found)
-    if found.dtype.kind not in "iuf" or not np.isfinite(found).all() or not np.equal(found, np.round(found)).all():
-        raise ValueError(f"{place}: expected indices of vertices, whole numbers")
-    vertices = np.unique(found).astype(np.int64)
-    if vertices[0] < 0 or vertices[-1] >= count:
-        raise ValueError(
-            f"{place}: expected vertices 0 to {count - 1} of {body.name}, got {vertices[0]} to {vertices[-1]}"
-        )
-    return vertices
