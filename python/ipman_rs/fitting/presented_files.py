@@ -39,8 +39,11 @@ _HANDS = {"left_hand_pose": joints.LEFT_HAND, "right_hand_pose": joints.RIGHT_HA
 
 @dataclass(frozen=True, eq=False)
 class StoredPose:
-    """pose (J, 3): rotation vectors on the joints of a body, root first, in a world with y up. height: m, of the floor in
-    it, whose origin is where the body's parameters have theirs. contact (n,): vertices. None: not known."""
+    """A pose of a file on the joints of a body.
+
+    pose (J, 3): rotation vectors, the root first, in a world with y up. height: m, of the floor in that world, whose
+    origin is where the body's parameters have theirs. contact (n,): the vertices that touch. None: not known.
+    """
 
     pose: NDArray[np.float64]
     height: float | None
