@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel
+from ipman_rs.body.embedded import kind_of
 from ipman_rs.body.joint_regressors import JointRegressor
 from ipman_rs.data import DataSet
 
@@ -28,7 +29,6 @@ from .model.made import made
 from .model.trained_weights import read_trained
 from .posing import HIPS, REGRESSED_HIPS, Posing, check_regressor
 from .sources import BadSample, Images
-from .sources.images import body_kind
 from .trainer.config import Config, config
 
 Array = NDArray[np.floating]
@@ -109,7 +109,7 @@ class Trained:
         if not rows:
             raise ValueError("data: none of its images can be read")
         found = {key: np.array(column) for key, column in zip(PREDICTED, zip(*rows, strict=True), strict=True)}
-        return {**found, "body": np.array(body_kind(body))}
+        return {**found, "body": np.array(kind_of(body))}
 
     @torch.no_grad()
     def predict(self, image: Any, box: Sequence[float], focal: float | None = None, pitch: float = 0.0) -> Prediction:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ipman_rs.body import BodyModel, rotations
-from ipman_rs.body.embedded import NAMES
+from ipman_rs.body.embedded import kind_of
 from ipman_rs.data import DataSet, Frames
 
 from ..augment import Augmentation, Augmenting, Pixels, cut, follow, normalised, to_crop
@@ -27,7 +27,6 @@ Array = NDArray[np.floating]
 SHARED = tuple(f"{side}_{name}" for side in ("left", "right") for name in (
     "hip", "knee", "ankle", "shoulder", "elbow", "wrist",
 ))  # fmt: skip
-KINDS = {24: "smpl", 52: "smplh", 55: "smplx"}  # of a model file, by its joints
 
 
 class Images:
@@ -162,7 +161,7 @@ class Images:
 
     def _is_own(self, name: str | None) -> bool:
         """Whether parameters of the body `name` are those of this model."""
-        return name == body_kind(self.body)
+        return name == kind_of(self.body)
 
     def _image(self, frame: Frames, row: int) -> Any:
         """A PIL image: the data set's own, or the file that the frame names."""
@@ -175,11 +174,6 @@ class Images:
             raise BadSample(f"{frame.names[0]}: no image")
         with Image.open(self.folder / str(frame.images[0])) as image:
             return image.convert("RGB")
-
-
-def body_kind(body: BodyModel) -> str:
-    """By which name data sets and predictions call the parameters of a model: "smpl", "smplh", "smplx", or its own."""
-    return body.name if body.name in NAMES else KINDS.get(body.num_joints, body.name)
 
 
 def _named(
