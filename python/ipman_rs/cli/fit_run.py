@@ -142,8 +142,9 @@ def problem_of(
     where = {"focal": settings.focal, "pitch": settings.pitch, "ground": settings.ground}
     where |= {} if settings.camera is None else {"camera": settings.camera}
     problem = detected.problem(body, seen, **where, height=settings.height, mass=settings.mass)
-    stays = settings.config.start.get("search") == "camera"
-    return problem if imitated is None else presented.present(problem, [imitated], stays)
+    if imitated is None:
+        return problem
+    return presented.present(problem, [imitated], settings.config.moves_camera)
 
 
 def _refused(item: Item, body: ipt.BodyModel) -> bool:

@@ -43,6 +43,11 @@ class Config:
     terms: Mapping[str, Mapping[str, Any]]
     start: Mapping[str, Any]
 
+    @property
+    def moves_camera(self) -> bool:
+        """Whether the body stays in the frame in which it is presented, and the camera is placed around it."""
+        return self.start.get("search") == "camera"
+
 
 def weighs(config: Config, *terms: str) -> bool:
     """Whether any stage has a weight for any of these terms."""

@@ -39,11 +39,11 @@ from .fit import fit
 from .landmarks import known
 from .problem import Problem
 from .result import Result, parameters, results
+from .terms.measured_shape import DENSITY
 from .variables import full_pose
 
 PIECE = 64  # frames: fitted side by side
 PREDICTIONS, RECORD = "predictions.npz", "fits.json"
-DENSITY = 985.0  # kg/m³
 _COLUMNS = ("names", "pose", "betas", "transl", "genders", "ground")
 
 Progress = Callable[[int], None]
@@ -129,11 +129,6 @@ class DataFit:
     def imitates(self) -> bool:
         return weighs(self.config, "presented_pose", "presented_contact")
 
-    @property
-    def stays(self) -> bool:
-        """Whether the body stays in the presented frame, and the camera moves."""
-        return self.config.start.get("search") == "camera"
-
     def begin(self) -> None:
         """Makes the folder. ValueError where it holds other fits, or something that all frames need is missing."""
         first = self.data[slice(0, 1)]
@@ -142,11 +137,11 @@ class DataFit:
         body = self.model(self._gender(first))
         if self.imitates and self.pose is None and first.pose is None:
             raise ValueError(f"{self.source.name}: has no poses to present; give one with --pose")
-        if first.cameras is None and not self.stays:
+        if first.cameras is None and not self.config.moves_camera:
             raise ValueError(f"{self.source.name}: has no cameras here, and the preset needs them")
         self._presented_to_all(body)
         if weighs(self.config, "measured_shape") and self.height is None and self.mass is None:
-            self.sizes([first], [self._gender(first)])
+            self.size(first)
         self.folder.mkdir(parents=True, exist_ok=True)
         file = self.folder / "made_of.json"
         if file.exists():
@@ -256,7 +251,7 @@ class DataFit:
             for frame in frames:
                 name = str(frame.names[0])
                 try:
-                    _check_camera(frame, self.stays)
+                    _check_camera(frame, self.config.moves_camera)
                     found = self._keypoints(frame)
                     if found is None:
                         if frame.images is None or not str(frame.images[0]):
@@ -294,11 +289,11 @@ class DataFit:
         body = self.model(gender)
         frames = [each.frame for each in seen]
         shown, worlds = self._presented(frames, body)
-        sizes = self.sizes(frames, [gender] * len(frames)) if weighs(self.config, "measured_shape") else None
+        sizes = [self.size(frame) for frame in frames] if weighs(self.config, "measured_shape") else None
         model = ipt.BodyModel(body)
         problem = data_frames.problem_of(model, frames, join([each.detections for each in seen]), worlds, sizes)
         if shown is not None:
-            problem = presented.present(problem, shown, self.stays)
+            problem = presented.present(problem, shown, self.config.moves_camera)
         problem, variables = start.begin(problem, self.config.start)
         found = fit(problem, variables, self.config)
         for row, result in enumerate(results(found, self.config, variables)):
@@ -312,13 +307,13 @@ class DataFit:
         whole = [World.of(frame) for frame in frames]
         shown = self._presented_to_all(body)
         if shown is not None:
-            return [shown] * len(frames), [_on_floor(world, frame, shown.floor(body), self.stays)
+            return [shown] * len(frames), [_on_floor(world, frame, shown.floor(body), self.config.moves_camera)
                                            for world, frame in zip(whole, frames, strict=True)]  # fmt: skip
         if not self.imitates:
             return None, whole
         found = [data_frames.presented_of(frame, self.bodies.posed(frame), body) for frame in frames]
         worlds = [world for _, world in found]
-        return [each for each, _ in found], worlds if self.stays else whole
+        return [each for each, _ in found], worlds if self.config.moves_camera else whole
 
     def _presented_to_all(self, body: BodyModel) -> presented.PresentedBody | None:
         """The pose that all are presented, if there is one. Raises ValueError."""
@@ -326,11 +321,8 @@ class DataFit:
             return None
         return presented.load(self.pose, body, contact=self.contact, frame=self.pose_frame, up=self.pose_up)
 
-    def sizes(self, frames: Sequence[Frames], genders: Sequence[str]) -> list[tuple[float, float]]:
-        """Height, m, and mass, kg, of each person: as given, or of the data set's own body in its zero pose."""
-        return [self._size(frame) for frame, _ in zip(frames, genders, strict=True)]
-
-    def _size(self, frame: Frames) -> tuple[float, float]:
+    def size(self, frame: Frames) -> tuple[float, float]:
+        """Height, m, and mass, kg, of a person: as given, or of the data set's own body in its zero pose."""
         if self.height is not None and self.mass is not None:
             return self.height, self.mass
         if frame.pose is None or frame.body is None:
