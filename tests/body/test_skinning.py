@@ -72,8 +72,9 @@ def test_single_precision_is_as_good_as_plain_torch(model, width):
     )
     with dispatch._reference_path():
         plain = largest_error(with_gradients(single, given), exact)
-    # Both are rounding, which is luck in the last bits: a fifth more, or one unit in the last place, counts as equal.
-    assert all(a <= max(1.2 * b, 1.2e-7) for a, b in zip(got, plain, strict=True)), (got, plain)
+    # Both are the largest of many roundings, whose order differs by processor and BLAS: such maxima differ by up to
+    # half between processors (1.33 was seen). An error of the formula would be 1e4 times as large.
+    assert all(a <= max(2 * b, 2.4e-7) for a, b in zip(got, plain, strict=True)), (got, plain)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-8, 1.0, np.pi - 1e-7, np.pi, 2 * np.pi, 7.0])
