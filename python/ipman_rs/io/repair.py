@@ -57,13 +57,11 @@ def without_repeated(mesh: Mesh) -> Mesh:
     faces = mesh.faces
     flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
     kept = np.flatnonzero(~flat)
-    first = np.argmin(faces[kept], axis=1)[:, None]
-    turned = np.take_along_axis(faces[kept], (first + [0, 1, 2]) % 3, axis=1)  # from the lowest index
-    again = len(turned) - len(_unique_rows(turned))
+    first = _first_of_equal_faces(faces[kept])
+    again = len(kept) - len(first)
     if not flat.any() and not again:
         return mesh
-    if again:
-        kept = kept[np.sort(_unique_rows(turned))]
+    kept = kept[first]
     face_map = kept if mesh.face_map is None else mesh.face_map[kept]
     mesh = replace(mesh, faces=faces[kept], face_map=face_map)
     if flat.any():
@@ -73,12 +71,24 @@ def without_repeated(mesh: Mesh) -> Mesh:
     return mesh
 
 
-def _unique_rows(rows: NDArray[np.generic]) -> Indices:
-    """The place of the first of each distinct row."""
+def _first_of_equal_faces(faces: Indices) -> Indices:
+    """The place of the first of each distinct face, ascending; a face may begin at any of its corners."""
+    lowest = np.argmin(faces, axis=1)[:, None]
+    turned = np.take_along_axis(faces, (lowest + [0, 1, 2]) % 3, axis=1)
+    edge = np.sort(turned[:, 0] * (faces.max(initial=0) + 1) + turned[:, 1])
+    if (edge[1:] != edge[:-1]).all():  # equal faces share their directed edges, which a surface has once
+        return np.arange(len(faces))
+    return np.sort(_distinct(turned)[0])
+
+
+def _distinct(rows: NDArray[np.generic]) -> tuple[Indices, Indices]:
+    """The place of the first of each distinct row, and which of these each row is: np.unique, ten times as fast."""
     order = np.lexsort(rows.T[::-1])
     new = np.ones(len(rows), bool)
     new[1:] = (rows[order[1:]] != rows[order[:-1]]).any(axis=1)
-    return order[new]
+    number = np.empty(len(rows), np.int64)
+    number[order] = np.cumsum(new) - 1
+    return order[new], number
 
 
 def welded(mesh: Mesh) -> Mesh:
@@ -87,41 +97,38 @@ def welded(mesh: Mesh) -> Mesh:
     Where that leaves open edges, vertices of those edges that lie within WELD of the mesh's size are merged, too.
     ValueError where faces share no edges even then.
     """
-    if not len(mesh.faces) or not _open(mesh.faces).any():
+    if not len(_open_edges(mesh.faces)):
         return mesh
-    _, first, inverse = np.unique(mesh.vertices + 0.0, axis=0, return_index=True, return_inverse=True)
+    first, number = _distinct(mesh.vertices + 0.0)
     if len(first) < len(mesh.vertices):
         merged = len(mesh.vertices) - len(first)
-        mesh = _merged(mesh, first[inverse.reshape(-1)])
+        mesh = without_repeated(_merged(mesh, first[number]))
         mesh = mesh.noting(f"{text.counted(merged, 'vertex', 'vertices')} that lie on each other were merged")
-    border = np.unique(_edges(mesh.faces)[_open(mesh.faces)])
+    border = np.unique(_open_edges(mesh.faces))
     tolerance = WELD * float(np.ptp(mesh.vertices[np.isfinite(mesh.vertices).all(axis=1)], axis=0).max(initial=0.0))
     if len(border) and np.isfinite(mesh.vertices[border]).all() and 0.0 < tolerance < np.inf:
         target = np.arange(len(mesh.vertices))
         target[border] = border[_nearby(mesh.vertices[border], tolerance)]
-        count = len(target) - len(np.unique(target))
-        if count:
+        merged = int((target != np.arange(len(target))).sum())
+        if merged:
             mesh = without_repeated(_merged(mesh, target)).noting(
-                f"{text.counted(count, 'vertex', 'vertices')} within {tolerance:.1g} of another were merged"
+                f"{text.counted(merged, 'vertex', 'vertices')} within {tolerance:.1g} of another were merged"
             )
-    share = _open(mesh.faces).mean() if len(mesh.faces) else 1.0
-    if len(mesh.faces) > 2 and share > SOUP:
-        what = f"its faces share no vertices ({share:.0%} of the edges belong to one face), so there is no surface"
+    share = len(_open_edges(mesh.faces)) / max(3 * len(mesh.faces), 1)
+    if share > SOUP and len(mesh.faces) > 2:
+        what = f"its faces share no vertices ({share:.0%} of their edges have no neighbour), so there is no surface"
         raise ValueError(f"{what}; merge its vertices by distance first (MeshLab, Blender)")
     return mesh
 
 
-def _edges(faces: Indices) -> Indices:
-    """(3 F, 2) the edges of each face, lower vertex first."""
-    return np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-
-
-def _open(faces: Indices) -> NDArray[np.bool_]:
-    """(3 F,) whether an edge of `_edges` has a face on one side only."""
-    edges = _edges(faces)
-    key = edges[:, 0] * (faces.max(initial=0) + 1) + edges[:, 1]
-    _, inverse, uses = np.unique(key, return_inverse=True, return_counts=True)
-    return uses[inverse] == 1
+def _open_edges(faces: Indices) -> Indices:
+    """(E, 2) the edges that have a face on one side only, lower vertex first."""
+    width = faces.max(initial=0) + 1
+    low, high = np.minimum(faces, np.roll(faces, -1, axis=1)), np.maximum(faces, np.roll(faces, -1, axis=1))
+    key = np.sort((low * width + high).reshape(-1))
+    differs = np.concatenate([[True], key[1:] != key[:-1], [True]])
+    single = key[differs[1:] & differs[:-1]]
+    return np.stack(np.divmod(single, width), axis=1)
 
 
 def _merged(mesh: Mesh, target: Indices) -> Mesh:
