@@ -30,6 +30,7 @@ class Document:
     def __init__(self, content: bytes, folder: Path) -> None:
         self.json, self._binary = _chunks(content)
         self._folder = folder
+        self._lists: dict[str, list[dict[str, Any]]] = {}
         self._buffers: dict[int, bytes] = {}
         self._arrays: dict[int, NDArray[Any]] = {}
         self.size = len(self._binary or b"")  # bytes of the buffers that have been read
@@ -41,16 +42,18 @@ class Document:
                 raise ValueError(f"it needs the extension {text.listed([name])}, which is not read; export it without")
 
     def all(self, kind: str) -> list[dict[str, Any]]:
-        found = self.json.get(kind, [])
-        if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
-            raise ValueError(f"its {kind} are no list of objects")
-        return found
+        if kind not in self._lists:
+            listed = self.json.get(kind, [])
+            if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
+                raise ValueError(f"its {kind} are no list of objects")
+            self._lists[kind] = listed
+        return self._lists[kind]
 
     def one(self, kind: str, index: Any) -> dict[str, Any]:
-        found = self.all(kind)
-        if type(index) is not int or not 0 <= index < len(found):
-            raise ValueError(f"it names {text.listed([index])} of {len(found)} {kind}")
-        return found[index]
+        listed = self.all(kind)
+        if type(index) is not int or not 0 <= index < len(listed):
+            raise ValueError(f"it names {text.listed([index])} of {len(listed)} {kind}")
+        return listed[index]
 
     def array(self, index: Any) -> NDArray[Any]:
         """(count, components) of an accessor: float64, or whole numbers that are not normalised."""
