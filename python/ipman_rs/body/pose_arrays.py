@@ -38,8 +38,8 @@ PIECES: dict[str, tuple[tuple[str, ...], ...]] = {
     "pose_eye": (SMPLX[23:25],),
 }
 _WHOLE = (SMPL, BODY, SMPLH, SMPLX)
-_VECTORS, _MATRICES, _COLUMNS, _QUATERNIONS = "rotation vectors", "rotation matrices", "6D rotations", "quaternions"
-_WIDTHS = {_VECTORS: 3, _MATRICES: 9, _COLUMNS: 6, _QUATERNIONS: 4}
+_VECTORS, _MATRICES, COLUMNS, _QUATERNIONS = "rotation vectors", "rotation matrices", "6D rotations", "quaternions"
+_WIDTHS = {_VECTORS: 3, _MATRICES: 9, COLUMNS: 6, _QUATERNIONS: 4}
 _ORDERS = {"_wxyz": (1, 2, 3, 0), "_xyzw": (0, 1, 2, 3)}  # where x, y, z and w of a quaternion are
 _ORTHONORMAL = 1e-3  # how far rounded rotation matrices are off
 NAMES = tuple(
@@ -235,7 +235,7 @@ def _vectors(name: str, form: str, rows: Array, order: tuple[int, ...] | None) -
     return vectors
 
 
-_IDENTITY = {_MATRICES: np.eye(3).ravel(), _COLUMNS: np.eye(3)[:2].ravel()}
+_IDENTITY = {_MATRICES: np.eye(3).ravel(), COLUMNS: np.eye(3)[:2].ravel()}
 
 
 def _from_columns(name: str, rows: Array) -> Array:
@@ -253,5 +253,5 @@ def _from_columns(name: str, rows: Array) -> Array:
 
 def _are_rotations(matrices: Array) -> bool:
     matrices = matrices.astype(np.float64)
-    off = np.abs(matrices @ matrices.swapaxes(-1, -2) - np.eye(3)).max(initial=0)
-    return bool(off < _ORTHONORMAL and (np.linalg.det(matrices) > 0).all())
+    off = np.abs(np.matmul(matrices, matrices.swapaxes(-1, -2)) - np.eye(3)).max(initial=0)
+    return bool(off < _ORTHONORMAL and np.all(np.linalg.det(matrices) > 0))

@@ -156,7 +156,13 @@ def _read_parameters(stored: _Npz, model: str, unit: float, degrees: bool, rate:
     betas, shape = _betas(stored, body, len(pose), amass or easymocap)
     expression, face = _expression(stored, body, len(pose))
     seconds, findings = _seconds(stored, len(pose), rate)
-    findings = [*_angles(pieces, degrees), *_places(stored, trans, seconds), *findings, *_gender(stored, body, model)]
+    findings = [
+        *_columns(pieces),
+        *_angles(pieces, degrees),
+        *_places(stored, trans, seconds),
+        *findings,
+        *_gender(stored, body, model),
+    ]
     if easymocap:
         trans = _about_the_origin(stored, body, betas, trans, degrees)
     _pass_over_repeated(stored, pieces)
@@ -304,6 +310,15 @@ def _angles(pieces: Sequence[pose_arrays.Piece], degrees: bool) -> list[Finding]
         if found:
             return found
     return judge.degrees([piece.rotations[judge.evenly(len(piece.rotations))] for piece in vectors]) if degrees else []
+
+
+def _columns(pieces: Sequence[pose_arrays.Piece]) -> list[Finding]:
+    """Six numbers for a rotation are two columns of a matrix here; nothing in them tells columns from rows."""
+    names = [piece.name for piece in pieces if piece.form == pose_arrays.COLUMNS]
+    if not names:
+        return []
+    said = f"{', '.join(names)}: taken as the first two columns of matrices; PyTorch3D writes their first two rows"
+    return [Finding("odd", said, "save rotation vectors or matrices if these are rows")]
 
 
 def _places(stored: _Npz, trans: np.ndarray | None, seconds: np.ndarray | None) -> list[Finding]:

@@ -1,10 +1,10 @@
 """AMASS: motion capture as bodies, in `.npz` files.
 
-    CMU/01/01_01_poses.npz            SMPL+H: poses (F, 156), betas (16,) or (F, 16), trans (F, 3) m, mocap_framerate, gender
+    CMU/01/01_01_poses.npz            SMPL+H: poses (F, 156), betas (16,), trans (F, 3) m, mocap_framerate, gender
     CMU/01/01_01_stageii.npz          SMPL-X: poses (F, 165), betas (16,), trans, mocap_frame_rate, gender
 
-The folder of all of AMASS, or of any of its data sets, or one file; shape.npz and *_stagei.npz are passed over. Of the
-files only the headers are read when it is opened, and a sample of the frames.
+betas may have a row for each frame, too. The folder of all of AMASS, or of any of its data sets, or one file; shape.npz
+and *_stagei.npz are passed over. Of the files only the headers are read when it is opened, and a sample of the frames.
 
 World: metres, z up, the floor at z = 0 (fitted by each capture, so by some centimetres). 60 to 250 Hz by file:
 `frame_rate=30` takes the nearest earlier frame of each thirtieth of a second. Hands are absolute: load the body with

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 
-from .check import AXES, SAMPLE, Finding, place, size_of_body, upright
+from .check import AXES, BODY, SAMPLE, Finding, place, size_of_body, upright
 
 MASS = (1.0, 650.0)  # kg: the heaviest person known weighed 635
 USUAL_MASS = (2.5, 250.0)  # kg
@@ -65,10 +65,22 @@ def bodies(vertices: Array, template: BodyTemplate, normal: Array, *, up_is_said
     found = size_of_body("vertices", vertices)
     if found[0].level == "wrong":
         return found
+    found += _sizes(vertices)
     away = place("vertices", vertices.mean(axis=1)) or _height(vertices, normal)
     if up_is_said:
         return found + away
     return found + away + (_stance(vertices, template, normal) or _shape(vertices, template, normal))
+
+
+def _sizes(vertices: Array) -> list[Finding]:
+    """Of bodies that span something else than the others."""
+    spans = np.linalg.norm(np.ptp(vertices, axis=1), axis=-1)
+    odd = spans[(spans < BODY[0]) | (spans > BODY[1])]
+    if not len(odd):
+        return []
+    verb = "spans" if len(odd) == 1 else "span up to"
+    said = f"vertices: {len(odd)} of {len(spans)} bodies {verb} {odd.max():.4g}, expected {BODY[0]} to {BODY[1]} metres"
+    return [Finding("odd", said)]
 
 
 def evenly(count: int, most: int = SAMPLE) -> NDArray[np.int64]:
