@@ -112,7 +112,7 @@ def test_bad_items_leave_the_others_as_they_are(fit, tmp_path, standing):
     folder = tmp_path / "inputs"
     folder.mkdir()
     files.write(folder / "good.json", standing)
-    files.write(folder / "nan.json", np.where(np.arange(33)[:, None] == 3, np.nan, standing))
+    files.write(folder / "nan.json", np.where(np.arange(132).reshape(33, 4) == 13, np.nan, standing))
     files.write(folder / "zero.json", standing * [1, 1, 1, 0])
     files.write(folder / "nobody.json", np.zeros((0, 4)))
     files.write(folder / "few.json", np.where(np.arange(33)[:, None] < 29, standing * [1, 1, 1, 0], standing))

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...data.judge import RELATIVE
 from ..detections import Array, Detections
 from . import coco, coco_wholebody, mediapipe, mmpose, openpose
 from .layouts import Layout
@@ -26,7 +27,6 @@ FORMATS: dict[str, ModuleType] = {
     "coco": coco,
     "mediapipe": mediapipe,
 }
-RELATIVE = 3.0  # a point farther from the image than its size is in pixels: so is every person of some pixels
 
 __all__ = ["FORMATS", "read"]
 
@@ -55,6 +55,10 @@ def read(
     notes = confidences(images)
     rows, told = _rows(images, person, source)
     sizes = [image.size if given is None else given for image, _ in rows]
+    said = {image.size for image, _ in rows if image.size is not None and given is not None} - {given}
+    if given is not None and said:
+        other = " and ".join(f"{width:g} × {height:g}" for width, height in sorted(said)[:3])
+        notes.append(f"the file says that its image has {other} pixels; {given[0]:g} × {given[1]:g} were given")
     if None in sizes and any(size is not None for size in sizes):
         raise ValueError(f"{source}: some images have a width and height and others have none; give image_size")
     points, scaled = _pixels([one.points for _, one in rows], sizes, reader, source)

@@ -90,9 +90,7 @@ def named(names: Sequence[Any], place: str) -> None:
     """ValueError if a file says of its points that the first is no nose: then the order is none of `LAYOUTS`."""
     if names and str(names[0]).lower() != "nose":
         said = ", ".join(str(name) for name in names[:3])
-        raise ValueError(
-            f"{place}: expected {counts(LAYOUTS)} points from the nose on, got {len(names)}: {said[:80]}, …"
-        )
+        raise ValueError(f"{place}: expected {counts(LAYOUTS)} points from the nose on, got {said[:80]}, …")
 
 
 def person(entry: Any, place: str) -> Person:
@@ -104,6 +102,10 @@ def person(entry: Any, place: str) -> Person:
     else:
         points, notes = _points(entry, f"{place}: keypoints")
     names = LAYOUTS[len(points)][1]
+    corner = (points[:, :2] == 0).all(axis=1) & (points[:, 2] > 0)
+    if corner.any():  # where trackers put what they did not find
+        points[corner, 2] = 0.0
+        notes = (*notes, "points at 0, 0 taken as not seen")
     unused = [key for key in ELSE if entry.get(key) and not (key in PARTS and "foot_kpts" in entry)]
     unused += [FACE] if len(points) in (133, 136) else []
     track = next((track_of(entry[key]) for key in TRACKS if key in entry), None)
@@ -170,7 +172,7 @@ def _columns(given: dict[str, Any], place: str) -> Array:
 
 def _flags(points: Array) -> Array:
     """Points with COCO's flags as scores; a label of 0, 1 or 2 is no measure of confidence."""
-    if np.isin(points[:, 2], (0, 1, 2)).all():
+    if np.isin(points[~np.isnan(points[:, 2]), 2], (0, 1, 2)).all():
         points[:, 2] = points[:, 2].clip(0, 1)
     return points
 

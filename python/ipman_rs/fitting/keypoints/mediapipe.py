@@ -17,6 +17,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .layouts import MEDIAPIPE_33 as NAMES
 from .people import Array, Image, Person, numbers, scored, size_of, width_height
 
@@ -115,6 +117,7 @@ def _people(given: dict[str, Any], place: str) -> list[Person | str]:
             four, notes = _points(points, where)
             world = _points(worlds[index], f"{place}: {world_key}")[0] if worlds else None
             if world is not None:
+                world = np.nan_to_num(world)
                 world[:, 3] = world[:, 3].clip(0, 1)
             found.append(Person(NAMES, four[:, [0, 1, 3]], world, notes=notes, unused=unused))
         except ValueError as error:

@@ -90,35 +90,43 @@ def counts(layouts: Mapping[int, tuple[str, Layout]]) -> str:
 
 
 def finite(points: Array, place: str) -> Array:
-    """Points (K, C) of finite numbers: one without x and y was not seen, and becomes zeros. ValueError for others."""
-    if points.shape[1] > 1:
-        points[np.isnan(points[:, :2]).all(axis=1)] = 0.0
-    wrong = np.argwhere(~np.isfinite(points))
+    """Points (K, C) of finite numbers, or of none at all: without x and y a point is NaN. ValueError for others."""
+    missing = np.isnan(points[:, :2]).all(axis=1)
+    wrong = np.argwhere(~np.isfinite(points) & ~missing[:, None])
     if len(wrong):
         row, column = wrong[0]
         raise ValueError(f"{place}: point {row}: expected finite numbers, got {points[row, column]}")
-    if abs(points).max(initial=0) > 1e9:
-        raise ValueError(f"{place}: expected pixels, got numbers up to {abs(points).max():g}")
+    largest = abs(points[~missing]).max(initial=0)
+    if largest > 1e9:
+        raise ValueError(f"{place}: expected pixels, got numbers up to {largest:g}")
+    points[missing] = np.nan
     return points
 
 
 def scored(points: Array, place: str) -> Array:
     """Points (K, 3) whose third number can be a score. ValueError for others."""
-    least, most = points[:, 2].min(), points[:, 2].max()
+    scores = points[~np.isnan(points[:, 2]), 2]
+    if not len(scores):
+        return points
+    least, most = scores.min(), scores.max()
     if least < SURELY_NO_SCORE[0] or most > SURELY_NO_SCORE[1]:
         raise ValueError(f"{place}: expected confidences of 0 to 1, got {least:g} to {most:g}")
     return points
 
 
 def confidences(images: Sequence[Image]) -> list[str]:
-    """Bring the scores of a whole file to 0 to 1, and say what that took."""
+    """Bring the scores of a whole file to 0 to 1, 0 for points without numbers, and say what that took."""
     people = [person for image in images for person in image.usable.values()]
+    missing = sum(int(np.isnan(person.points[:, 2]).sum()) for person in people)
+    notes = [f"{missing} points without numbers taken as not seen"] if missing else []
+    for person in people:
+        person.points[np.isnan(person.points[:, 2])] = 0.0
     most = max((float(person.points[:, 2].max()) for person in people), default=0.0)
     for person in people:
         person.points[:, 2] = (person.points[:, 2] / (most if most > CLIPPED else 1.0)).clip(0, 1)
     if most > CLIPPED:
-        return [f"scores up to {most:.3g}, not 1: divided by that"]
-    return [f"scores up to {most:.3g} cut off at 1"] if most > 1.005 else []
+        return [*notes, f"scores up to {most:.3g}, not 1: divided by that"]
+    return [*notes, f"scores up to {most:.3g} cut off at 1"] if most > 1.005 else notes
 
 
 def size_of(given: Mapping[str, Any], place: str) -> tuple[float, float] | None:
