@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import random
 
@@ -260,6 +259,7 @@ MEDIAPIPE = {
     "tasks of JavaScript": {"landmarks": [landmarks(visibility=0.9)], "worldLandmarks": [landmarks(visibility=0.9)]},
     "by names": {"landmarks": NAMED},
     "frames": {"frames": [{"frame_index": 0, "landmarks": landmarks(visibility=0.9)}]},
+    "frames by name": {"frame_0": {"landmarks": landmarks(visibility=0.9)}, "frame_1": {}},
     "frames, one empty": [{"pose_landmarks": landmarks(visibility=0.9)}, {"pose_landmarks": None}, None],
     "a bare list": landmarks(visibility=0.9),
     "a list of people": [landmarks(visibility=0.9)],
@@ -370,12 +370,15 @@ def test_formats_name_their_points_once():
         assert {name.replace("left", "right") for name in named} <= set(named)
 
 
-ODD = [None, True, -1, 0, 10**400, 1e308, float("nan"), "", "x", [], {}, [[]], {"x": 1}, [[[1]]], [None]]
+DEEP: list = []
+for _ in range(200):
+    DEEP = [DEEP]
+ODD = [DEEP, None, True, -1, 0, 10**400, 1e308, float("nan"), "", "x", [], {}, [[]], {"x": 1}, [[[1]]], [None]]
 
 
 def damaged(content, rng):
     """The content with one to three values replaced, removed or moved."""
-    content = copy.deepcopy(content)
+    content = json.loads(json.dumps(content))
     for _ in range(rng.randint(1, 3)):
         nodes, todo = [], [content]
         while todo:
@@ -386,12 +389,13 @@ def damaged(content, rng):
         node = rng.choice(nodes[: rng.choice([1, 3, 10, len(nodes)])]) if nodes else content
         keys = list(node) if isinstance(node, dict) else list(range(len(node)))
         if not keys:
-            return rng.choice(ODD)
+            return 3
         key = rng.choice(keys)
         if rng.random() < 0.3:
             del node[key]
         else:
-            node[key] = copy.deepcopy(rng.choice([*ODD, node[key], [node[key]], {"keypoints": node[key]}]))
+            odd = rng.choice([*ODD, node[key], [node[key]], {"keypoints": node[key]}])
+            node[key] = json.loads(json.dumps(odd))
     return content
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from . import layouts
 from .layouts import COCO_17 as NAMES
 from .layouts import Layout
-from .people import Array, Image, Person, array, counts, each, finite, numbers, scored, size_of, track_of
+from .people import Array, Image, Person, array, counts, each, finite, numbers, plain, scored, size_of, track_of
 
 LAYOUTS: dict[int, tuple[str, Layout]] = {
     17: ("COCO", NAMES),
@@ -48,13 +48,15 @@ def images(content: Any, source: str) -> list[Image]:
             continue
         identity = entry.get("image_id")
         if identity is not None and not isinstance(identity, (int, float, str)):
-            raise ValueError(f"{source}: annotations[{index}]: image_id: expected a number or a name, got {identity!r}")
+            raise ValueError(
+                f"{source}: annotations[{index}]: image_id: expected a number or a name, got {plain(identity)}"
+            )
         grouped.setdefault(identity, []).append((index, entry))
     found = []
     for identity, people in grouped.items():
         about = described.get(identity, {})
         label = about.get("file_name", identity)
-        place = source if label is None else f"{source}: {label}"
+        place = source if label is None else f"{source}: {plain(label)}"
         read = [each([entry], lambda entry, _, index=index: person(entry, f"{source}: annotations[{index}]"), source)[0]
                 for index, entry in people]  # fmt: skip
         found.append(Image(place, read, size_of(about, place)))
@@ -88,9 +90,9 @@ def _described(content: Any, source: str) -> dict[Any, dict[str, Any]]:
 
 def named(names: Sequence[Any], place: str) -> None:
     """ValueError if a file says of its points that the first is no nose: then the order is none of `LAYOUTS`."""
-    if names and str(names[0]).lower() != "nose":
-        said = ", ".join(str(name) for name in names[:3])
-        raise ValueError(f"{place}: expected {counts(LAYOUTS)} points from the nose on, got {said[:80]}, …")
+    if names and plain(names[0]).lower() != "nose":
+        said = ", ".join(plain(name) for name in names[:3])
+        raise ValueError(f"{place}: expected {counts(LAYOUTS)} points from the nose on, got {said}, …")
 
 
 def person(entry: Any, place: str) -> Person:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from .layouts import MEDIAPIPE_33 as NAMES
-from .people import Array, Image, Person, numbers, scored, size_of, width_height
+from .people import Array, Image, Person, numbers, plain, scored, size_of, width_height
 
 FORMAT = "mediapipe-pose"
 IMAGE_KEYS = ("landmarks", "pose_landmarks", "poseLandmarks", "landmark", "normalized_landmarks", "normalizedLandmarks")
@@ -51,11 +51,11 @@ def images(content: Any, source: str) -> list[Image]:
 
 
 def _frames(content: Any) -> list[Any]:
-    """The images of a file: an object each with one of the keys, or a list of points or of people."""
+    """The images of a file: objects with one of the keys, in a list or by name, or lists of points or of people."""
     if isinstance(content, dict):
         if _has_landmarks(content):
             return [content]
-        inside = next((content[key] for key in AROUND if isinstance(content.get(key), list)), [])
+        inside = next((content[key] for key in AROUND if isinstance(content.get(key), list)), [*content.values()])
         return inside if _are_frames(inside) else []
     if not isinstance(content, list) or not content:
         return []
@@ -69,7 +69,7 @@ def _has_landmarks(content: Any) -> bool:
 
 
 def _are_frames(content: list[Any]) -> bool:
-    """A frame in which nobody was found may be null or empty."""
+    """Whether these are images; one in which nobody was found may be null or empty."""
     return any(map(_has_landmarks, content)) and all(not frame or isinstance(frame, dict) for frame in content)
 
 
@@ -89,7 +89,7 @@ def _size(given: dict[str, Any], place: str) -> tuple[float, float] | None:
     if isinstance(size, (dict, list)):
         return size_of(size, place) if isinstance(size, dict) else width_height(size, place)
     if size is not None:
-        raise ValueError(f"{place}: image_size: expected width and height, got {str(size)[:40]}")
+        raise ValueError(f"{place}: image_size: expected width and height, got {plain(size)}")
     return size_of(given, place)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from . import coco
-from .people import Image, each
+from .people import Image, each, plain
 
 NAMES = coco.NAMES
 AROUND = ("instance_info", "predictions", "frames")
@@ -26,7 +26,7 @@ def images(content: Any, source: str) -> list[Image]:
         _check_names(content.get("meta_info"), source)
     found = []
     for label, people in _frames(content) or []:
-        place = source if label is None else f"{source}: frame {label}"
+        place = source if label is None else f"{source}: frame {plain(label)}"
         if people is not None and not isinstance(people, list):
             raise ValueError(f"{place}: instances: expected a list, got {type(people).__name__}")
         found.append(Image(place, each(people or [], coco.person, f"{place}: instances")))

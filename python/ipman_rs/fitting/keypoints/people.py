@@ -91,7 +91,7 @@ def counts(layouts: Mapping[int, tuple[str, Layout]]) -> str:
 
 def finite(points: Array, place: str) -> Array:
     """Points (K, C) of finite numbers, or of none at all: without x and y a point is NaN. ValueError for others."""
-    missing = np.isnan(points[:, :2]).all(axis=1)
+    missing = np.isnan(points[:, 0]) & np.isnan(points[:, 1])
     wrong = np.argwhere(~np.isfinite(points) & ~missing[:, None])
     if len(wrong):
         row, column = wrong[0]
@@ -143,6 +143,11 @@ def width_height(value: Any, place: str) -> tuple[float, float]:
     if not (width > 0 and height > 0):
         raise ValueError(f"{place}: image_size: expected width and height above 0, got {width:g} and {height:g}")
     return width, height
+
+
+def plain(value: Any) -> str:
+    """What a file says, for labels and errors: lists and objects, which may be deep, only by what they are."""
+    return str(value)[:80] if isinstance(value, (str, int, float)) else type(value).__name__
 
 
 def track_of(value: Any) -> int | str | None:
