@@ -294,6 +294,18 @@ def test_points_of_another_image_size(fit, tmp_path, standing):
     assert any("lie outside the image" in note for note in said.report["bodies"][0]["fit"]["notes"])
 
 
+def test_a_photo_of_another_size(fit, tmp_path, standing):
+    from PIL import Image
+
+    Image.new("RGB", (96, 128)).save(tmp_path / "small.png")
+    path = files.write(tmp_path / "anna.json", standing)
+    photo = ("--image", tmp_path / "small.png")
+    notes = fit(path, *photo).report["bodies"][0]["fit"]["notes"]
+    assert "the file says that its image has 480 × 640 pixels; 96 × 128 were given" in notes[0]
+    notes = fit(path, *photo, "--image-size", "480x640").report["bodies"][0]["fit"]["notes"]
+    assert "the photo has 96 × 128 pixels, --image-size says 480 × 640" in notes[0]
+
+
 def test_a_video_of_mmpose(fit, tmp_path, standing):
     """Three frames, of which the second shows nobody: two bodies, or one over time."""
     from ipman_rs.fitting.keypoints import coco, mediapipe

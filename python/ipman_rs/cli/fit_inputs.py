@@ -72,7 +72,8 @@ def items(path: Path, reading: Reading) -> list[Item]:
     from ..fitting import keypoints
 
     try:
-        found = keypoints.read(path, person=reading.person, image_size=_size(reading))
+        size, odd = _size(reading)
+        found = keypoints.read(path, person=reading.person, image_size=size)
     except ValueError as error:
         raise FileError(path, _advice(str(error))) from error
     if found.image_size is None:
@@ -85,7 +86,7 @@ def items(path: Path, reading: Reading) -> list[Item]:
         Item(f"{path.stem}_{number}" if many else path.stem, path, one.sources[0], one, reading.photo, list(one.notes))
         for number, one in enumerate(people)
     ]
-    made[0].notes += notes
+    made[0].notes += notes + odd
     return made
 
 
@@ -124,13 +125,18 @@ def look(item: Item) -> None:
     item.notes += item.seen.notes
 
 
-def _size(reading: Reading) -> tuple[float, float] | None:
-    if reading.image_size is not None or reading.photo is None:
-        return reading.image_size
+def _size(reading: Reading) -> tuple[tuple[float, float] | None, list[str]]:
+    """The image's size as given, or the photo's, and a note where the two differ."""
+    if reading.photo is None:
+        return reading.image_size, []
     from ..fitting import photo
 
     height, width = photo.read(reading.photo).shape[:2]
-    return float(width), float(height)
+    size, given = (float(width), float(height)), reading.image_size
+    if given is None or given == size:
+        return size, []
+    said = f"{reading.photo}: the photo has {width} × {height} pixels, --image-size says {given[0]:g} × {given[1]:g}"
+    return given, [said]
 
 
 def _advice(what: str) -> str:

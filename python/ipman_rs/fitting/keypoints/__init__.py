@@ -54,13 +54,7 @@ def read(
     images: list[Image] = reader.images(content, source)
     notes = confidences(images)
     rows, told = _rows(images, person, source)
-    sizes = [image.size if given is None else given for image, _ in rows]
-    said = {image.size for image, _ in rows if image.size is not None and given is not None} - {given}
-    if given is not None and said:
-        other = " and ".join(f"{width:g} × {height:g}" for width, height in sorted(said)[:3])
-        notes.append(f"the file says that its image has {other} pixels; {given[0]:g} × {given[1]:g} were given")
-    if None in sizes and any(size is not None for size in sizes):
-        raise ValueError(f"{source}: some images have a width and height and others have none; give image_size")
+    sizes, other = _sizes([image for image, _ in rows], given, source)
     points, scaled = _pixels([one.points for _, one in rows], sizes, reader, source)
     worlds = [one.world for _, one in rows if one.world is not None]
     if worlds and len(worlds) < len(rows):
@@ -69,7 +63,7 @@ def read(
     names = tuple(dict.fromkeys(name for _, one in rows for name in one.names if name is not None))
     layouts = [one.names for _, one in rows]
     flat, deep = _named(points, layouts, names), _named(worlds, layouts, names) if worlds else None
-    notes += scaled + _assumed(images)
+    notes += other + scaled + _assumed(images)
     return Detections(
         names,
         flat[..., :2],
@@ -168,6 +162,20 @@ def _tracked(
         raise ValueError(f"{source}: expected a point with confidence above 0 in track {track}, all have 0")
     said = f"took number {track}, in {len(rows)} of {len(images)} images"
     return rows, [f"{source}: {len(tracks)} people followed over time; {said}"]
+
+
+def _sizes(
+    images: Sequence[Image], given: tuple[float, float] | None, source: str
+) -> tuple[list[tuple[float, float] | None], list[str]]:
+    """The images' sizes, the given one before the file's own, and a note where these differ."""
+    known = {image.size for image in images if image.size is not None}
+    if given is None:
+        if known and any(image.size is None for image in images):
+            raise ValueError(f"{source}: some images have a width and height and others have none; give image_size")
+        return [image.size for image in images], []
+    said = " and ".join(f"{width:g} × {height:g}" for width, height in sorted(known - {given})[:3])
+    other = f"the file says that its image has {said} pixels; {given[0]:g} × {given[1]:g} were given"
+    return [given] * len(images), [other] if said else []
 
 
 def _pixels(
