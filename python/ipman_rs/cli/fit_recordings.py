@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,8 +44,9 @@ class Pace:
 
 def fitted(recording: Recording, settings: Settings, pace: Pace, output: Path, resume: bool) -> Study:
     """Fit a recording, write its folder and measure it. Raises FileError."""
-    kept(recording, settings, pace, output, resume)
-    return _measured(recording, output / recording.name, settings)
+    record = kept(recording, settings, pace, output, resume)
+    study = _measured(recording, output / recording.name, settings)
+    return replace(study, notes=(*study.notes, *record.get("notes", ())))
 
 
 def kept(
@@ -157,9 +158,10 @@ def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
         found = fit_sequence(problem, variables, settings.config, **told)
     assert problem.points is not None
     median = (found.candidate.projected - problem.points).norm(dim=-1).median()
-    record: dict[str, Any] = {"frames_left_out": unseen, "median_error_px": _number(median)}
+    notes = list(dict.fromkeys(note for item in items for note in item.notes))
+    record: dict[str, Any] = {"frames_left_out": unseen, "median_error_px": _number(median), "notes": notes}
     if imitated is not None:
-        record |= {"presented": imitated.record(body.body), "notes": [*imitated.notes]}
+        record |= {"presented": imitated.record(body.body), "notes": [*notes, *imitated.notes]}
     return found, {}, record, rate
 
 
