@@ -186,9 +186,12 @@ def broken(tmp_path, load, **changes):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"kind": 7}, "force plate 1: TYPE: expected one of 2, 3, 4, got type 7"),
+        (
+            {"kind": 7},
+            "force plate 1: TYPE: expected one of 1, 2, 3, 4, got type 7 .a Kistler plate",
+        ),
         ({"kind": 3}, "force plate 1: CHANNEL: expected 8 of the 6 channels, got 1, 2, 3, 4, 5, 6"),
-        ({"force_unit": "V"}, "ANALOG:UNITS: expected N, got 'v': is the plate calibrated"),
+        ({"force_unit": "V"}, "ANALOG:UNITS: expected N, got 'V': is the plate calibrated"),
         ({"size": 1000}, "CORNERS: expected a plate of a decimetre to two metres, got 600 × 400 m; looks like milli"),
         ({"size": 0}, "CORNERS: expected a plate of a decimetre to two metres, got 0 × 0 m"),
     ],

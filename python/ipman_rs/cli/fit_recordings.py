@@ -121,8 +121,8 @@ def _fit_markers(recording: Recording, settings: Settings, pace: Pace, person: P
     sites = {name: site if isinstance(site, str) else asdict(site) for name, site in found.sites.items()}
     record = {"mean_marker_error_m": _number(np.nanmean(errors)), "marker_errors_m": each, "unknown": [*found.unknown]}
     times = found.tracks.times
-    rate = float(1 / np.median(np.diff(times))) if len(times) > 1 else 1.0
-    return found.fit, {"times": times}, {**record, "sites": sites}, rate
+    rate = found.tracks.rate or 1.0
+    return found.fit, {"times": times}, {**record, "notes": [*tracks.notes], "sites": sites}, rate
 
 
 def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
