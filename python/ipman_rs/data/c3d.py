@@ -156,6 +156,8 @@ def markers(path: str | os.PathLike[str], up: str | None = None, subject: str | 
     no markers, or has those of several people of whom none is chosen.
     """
     found = read(path)
+    if not found.names and "ROTATION" in found.parameters:
+        raise ValueError(f"{path}: expected markers, it has rotations of segments only, as Theia writes them")
     computed = set(found._computed)
     rest = [column for column in range(len(found.names)) if column not in computed]
     notes = list(found.notes)

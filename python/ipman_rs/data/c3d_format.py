@@ -88,10 +88,12 @@ class _Numbers:
     def reals(self, place: int, count: int) -> Array:
         if self.processor != DEC:
             kind = ">f4" if self.processor == MIPS else "<f4"
-            return np.frombuffer(self.data, kind, count, place).astype(np.float64)
+            with np.errstate(invalid="ignore"):  # NaN that signals
+                return np.frombuffer(self.data, kind, count, place).astype(np.float64)
         words = np.frombuffer(self.data, "<u2", 2 * count, place).reshape(-1, 2).astype(np.uint32)
         bits = (words[:, 0] << 16) | words[:, 1]  # the halves change places, and the exponent is larger by 2
-        return np.where(bits & 0x7F800000, bits.view(np.float32).astype(np.float64) / 4, 0.0)
+        with np.errstate(invalid="ignore"):
+            return np.where(bits & 0x7F800000, bits.view(np.float32).astype(np.float64) / 4, 0.0)
 
     def count(self, place: int) -> int:
         """A number of two bytes that is never negative."""
@@ -133,16 +135,16 @@ def _records(numbers: _Numbers, place: int, end: int, notes: list[str]) -> Itera
         if offset == 0:
             return
         place = after + offset
-        if stop > place or (_is_record(numbers.data, stop, end) and not _is_record(numbers.data, place, end)):
+        if stop > place or (_begins(numbers.data, stop, end) and not _begins(numbers.data, place, end)):
             notes.append(f"the parameter {name} says wrongly where the next one is; read one after the other")
             place = stop
     raise ValueError(f"expected a C3D file: more than {MOST_RECORDS} parameters")
 
 
-def _is_record(data: bytes, place: int, end: int) -> bool:
-    """Whether a parameter, or the end of all, can be here: it begins with the length of a readable name."""
+def _begins(data: bytes, place: int, end: int) -> bool:
+    """Whether a parameter can begin here: with the length of a readable name."""
     if place >= end or data[place] == 0:
-        return place <= end
+        return False
     length = data[place] if data[place] < 128 else 256 - data[place]
     name = data[place + 2 : place + 2 + length]
     return place + 2 + length < end and all(32 < byte < 127 for byte in name)
@@ -179,34 +181,37 @@ def _text(data: bytes) -> str:
 
 
 def _layout(numbers: _Numbers, header: list[int], parameters: Parameters, notes: list[str]) -> tuple[int, _Layout]:
-    """Where the frames begin, and how they are stored: as the parameters say, or else as the header does."""
-    block = header[8] or _count(parameters, "POINT", "DATA_START") or 0
-    start = (block - 1) * BLOCK
-    if block < 2 or start > len(numbers.data):
+    """Where the frames begin, and how they are stored: as the parameters say, or else as the header does.
+
+    ValueError where the two disagree and the file's size does not tell which of them is right.
+    """
+    blocks = [block for block in (header[8], _count(parameters, "POINT", "DATA_START")) if block]
+    starts = [(block - 1) * BLOCK for block in dict.fromkeys(blocks)]
+    if not starts or min(starts) < BLOCK or min(starts) > len(numbers.data):
         raise ValueError("expected a C3D file: it ends before its frames; is the download complete?")
-    _, points, analogs, *_ = header
-    real = bool(np.signbit(numbers.reals(12, 1)[0]))
-    scale = _first(parameters, "POINT", "SCALE")
-    channels, samples = _count(parameters, "ANALOG", "USED"), header[9]
-    used = _count(parameters, "POINT", "USED")
+    points, analogs = header[1], header[2]
+    scale, real = _first(parameters, "POINT", "SCALE"), bool(np.signbit(numbers.reals(12, 1)[0]))
+    channels, used = _count(parameters, "ANALOG", "USED"), _count(parameters, "POINT", "USED")
     said = _Layout(
         points if used is None else used,
-        analogs if channels is None or (channels and analogs % channels == 0) else channels * samples,
+        analogs if channels is None or (channels and analogs % channels == 0) else channels * header[9],
         real if scale is None else scale < 0,
     )
-    whole = _Layout(points, analogs, real)
-    if said == whole:
-        return start, said
-    available = len(numbers.data) - start
-    for each in (said, whole):
-        needed = each.size * max(_said_frames(header, parameters), default=0)
-        if 0 <= available - needed < 2 * BLOCK:  # the last block is filled up
-            notes.append(f"header and parameters disagree; read with {each.points} points, {each.analogs} samples")
-            return start, each
-    raise ValueError(
-        f"expected a C3D file: its header has {whole.points} points and {whole.analogs} analogue samples a frame, its "
-        f"parameters have {said.points} and {said.analogs}"
-    )
+    possible = [(start, each) for each in dict.fromkeys((said, _Layout(points, analogs, real))) for start in starts]
+    if len(possible) == 1:
+        return possible[0]
+    frames = max(_said_frames(header, parameters), default=0)
+    filled = [  # the last block is filled up
+        (start, each) for start, each in possible if 0 <= len(numbers.data) - start - frames * each.size < BLOCK
+    ]
+    if len(filled) != 1:
+        raise ValueError(
+            f"expected a C3D file: its header has {points} points and {analogs} analogue samples a frame from block "
+            f"{header[8]} on, its parameters have {said.points} and {said.analogs} from block {blocks[-1]} on"
+        )
+    start, each = filled[0]
+    notes.append(f"header and parameters disagree; it is read with {each.points} points and {each.analogs} samples")
+    return start, each
 
 
 def _said_frames(header: list[int], parameters: Parameters) -> list[int]:
@@ -237,10 +242,11 @@ def _frames(available: int, layout: _Layout, header: list[int], parameters: Para
     said, held = _said_frames(header, parameters), available // layout.size
     if max(said, default=0) > held:
         raise ValueError(f"expected {max(said)} frames as it says, got {held}: is the download complete?")
-    if not said or (header[4] == LARGEST_COUNT and not _more_frames(parameters)):
-        notes.append(f"it does not say how many frames it has; {held} fit into it")
-        return held
-    if min(said) < max(said):
+    if not said:
+        raise ValueError("expected a C3D file: it does not say how many frames it has")
+    if LARGEST_COUNT - header[3] < max(said) <= LARGEST_COUNT == header[4] and not _more_frames(parameters):
+        notes.append(f"the first {max(said)} frames are read: it does not say how many more there are")
+    elif min(said) < max(said):
         notes.append(f"it says {min(said)} and {max(said)} frames; {max(said)} are read")
     return max(said)
 

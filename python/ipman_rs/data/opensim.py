@@ -39,6 +39,7 @@ BESIDE = 0.5  # m: a centre of mass farther than that outside the markers is in 
 # ground_force_vx beside ground_torque_x; ground_force_1_vx beside ground_force_1_mx; f1_1 beside p1_1 and m1_1.
 OPENSIM_FORCE = re.compile(r"(.*)vx$")
 C3D_FORCE = re.compile(r"f(\d+)_1$")
+BMCLAB_FORCE = re.compile(r"([LR])GRF_X$")  # beside LCOP_X and LFREEMOMENT_Y, y up
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ def storage(path: str | os.PathLike[str]) -> Storage:
     rows = [(number, line.split()) for number, line in enumerate(lines[first:], first + 1) if line.strip()]
     if not rows:
         raise ValueError(f"{path}: expected a line of column names after the header, the file ends there")
-    labels, table = rows[0][1], rows[1:]
+    labels, table = _labels(lines[rows[0][0] - 1], rows), rows[1:]
     twice = _twice(labels)
     if labels[0].lower() != "time" or twice:
         told = f"the column {twice!r} twice" if twice else f"{labels[0]!r} first"
@@ -97,6 +98,12 @@ def storage(path: str | os.PathLike[str]) -> Storage:
     degrees = {"yes": True, "no": False}.get(str(said.get("indegrees", "")).lower())
     columns = dict(zip(labels[1:], numbers.T[1:], strict=True))
     return Storage(numbers[:, 0], columns, degrees, str(path), tuple(notes))
+
+
+def _labels(line: str, rows: list[tuple[int, list[str]]]) -> list[str]:
+    """The columns' names, which may have blanks in them where tabs part them."""
+    by_tabs = [label.strip() for label in line.strip().split("\t")]
+    return by_tabs if len(rows) > 1 and len(by_tabs) == len(rows[1][1]) else rows[0][1]
 
 
 def _twice(labels: list[str]) -> str | None:
@@ -134,7 +141,8 @@ def _said(header: list[str]) -> dict[str, int | str]:
 
 def has_plates(table: Storage) -> bool:
     """Whether there are ground forces in it."""
-    return any(OPENSIM_FORCE.match(name) or C3D_FORCE.match(name) for name in table.columns)
+    kinds = (OPENSIM_FORCE, C3D_FORCE, BMCLAB_FORCE)
+    return any(kind.match(name) for name in table.columns for kind in kinds)
 
 
 def has_center_of_mass(table: Storage) -> bool:
@@ -166,7 +174,12 @@ def plates(table: Storage, unit: str = "m", up: str = "y") -> ForcePlates:
 
 def _wrench(table: Storage, name: str) -> tuple[Array, Array, Array] | None:
     """Force, point and moment of the plate whose first column this is."""
-    adapter = C3D_FORCE.match(name)
+    adapter, bmclab = C3D_FORCE.match(name), BMCLAB_FORCE.match(name)
+    if bmclab:
+        f, p = ([f"{bmclab[1]}{kind}_{axis}" for axis in "XYZ"] for kind in ("GRF", "COP"))
+        free = table.columns.get(f"{bmclab[1]}FREEMOMENT_Y", np.zeros(len(table)))
+        moment = np.stack([0 * free, free, 0 * free], axis=1)
+        return table.vectors((f[0], f[1], f[2])), table.vectors((p[0], p[1], p[2])), moment
     if adapter:
         f, p, m = ([f"{letter}{adapter[1]}_{axis}" for axis in (1, 2, 3)] for letter in "fpm")
     else:

@@ -80,7 +80,7 @@ def tracks(
     sample, for two people, if nothing was seen, and for infinite coordinates.
     """
     if up not in TO_Y_UP:
-        raise ValueError(f"up: expected x, y or z, got {up!r}")
+        raise ValueError(f"{source}: up: expected x, y or z, got {up!r}")
     if points.size == 0:
         raise ValueError(f"{source}: expected markers and samples, got {points.shape[1]} and {points.shape[0]}")
     if np.isinf(points).any():

@@ -78,11 +78,12 @@ def _is_number(text: str) -> bool:
 def _names(line: str) -> tuple[list[str], list[str]]:
     """The markers' names: by the places of their columns, "" of one without a name; and those that are not blank."""
     cells = [cell.strip() for cell in line.rstrip().split("\t")]
-    if len(cells) < 3:
+    if len([cell for cell in cells if cell]) < 3:
         words = line.split()[2:]
         return words, words
-    filled = [cell for cell in cells[2:] if cell]
-    places = cells[2:]
+    second = [place for place, cell in enumerate(cells) if cell][1]  # Time
+    places = cells[second + 1 :]
+    filled = [cell for cell in places if cell]
     while places and not places[0]:  # doubled tabs before the first name
         places.pop(0)
     if any(places[place] for place in range(len(places)) if place % 3):  # a column a name, or tabs as they came
@@ -118,10 +119,12 @@ def _table_of(
 def _table(rows: Sequence[tuple[int, str]], markers: int, said: int | None, source: str) -> _Table:
     """`markers` have names, `said` are in the file by its header."""
     width = 2 + 3 * markers
-    split = _split([line for _, line in rows], width)
+    split, tabs = _split([line for _, line in rows], width)
     widest = max(map(len, split), default=width)
     for (number, _), cells in zip(rows, split, strict=True):
-        wrong = len(cells) < LEAST or (widest > width and (len(cells) < widest or (widest - width) % 3))
+        wrong = len(cells) < (LEAST if tabs else width) or (
+            widest > width and (len(cells) < widest or (widest - width) % 3)
+        )
         expected = f"expected {width} columns for {markers} markers"
         if wrong or (widest < width and said != markers):
             raise ValueError(f"{source}: line {number}: {expected}, got {len(cells)}")
@@ -131,8 +134,8 @@ def _table(rows: Sequence[tuple[int, str]], markers: int, said: int | None, sour
     return _Table(filled, [number for number, _ in rows], (whole - 2) // 3, short)
 
 
-def _split(lines: Sequence[str], width: int) -> list[list[str]]:
-    """The columns of each row, parted by tabs, or by blanks where tabs are doubled, mixed with blanks, or missing.
+def _split(lines: Sequence[str], width: int) -> tuple[list[list[str]], bool]:
+    """The columns of each row, and whether single tabs part them, or blanks: tabs doubled, mixed with blanks, missing.
 
     Tabs are believed where the empty columns between them are whole markers that were not seen.
     """
@@ -140,12 +143,13 @@ def _split(lines: Sequence[str], width: int) -> list[list[str]]:
     widest = max(map(len, by_tabs), default=width)
     fits = all(len(cells) >= LEAST for cells in by_tabs) and (widest <= width or (widest - width) % 3 == 0)
     if fits and all(_whole(cells) for cells in by_tabs):
-        return by_tabs
+        return by_tabs, True
     by_blanks = [line.split() for line in lines]
     counts = {len(words) for words in by_blanks}
     if len(counts) == 1 and (count := counts.pop()) >= width and (count - width) % 3 == 0:
-        return by_blanks
-    return by_tabs if any("\t" in line for line in lines) else by_blanks
+        return by_blanks, False
+    tabs = any("\t" in line for line in lines)
+    return (by_tabs if tabs else by_blanks), tabs
 
 
 def _trimmed(cells: list[str], width: int) -> list[str]:
