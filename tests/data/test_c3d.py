@@ -68,7 +68,7 @@ def test_more_than_255_points_and_more_frames_than_two_bytes_count(tmp_path):
 
 def test_real_files_as_ezc3d_reads_them(shared):
     """To the bit; not btk_type1.C3D, of whose analogue samples ezc3d knows nothing, so that it shifts the points."""
-    ezc3d = pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+    ezc3d = pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
     files = [shared("c3d") / "walking2.c3d", *shared("motion").glob("**/*.c3d")]
     assert len(files) == 6
     for path in files:

@@ -141,7 +141,8 @@ def test_what_stands_for_no_gap(read):
 @pytest.mark.parametrize(
     ("units", "metres"),
     [("mm", 1e-3), ("MM", 1e-3), ("millimeters", 1e-3), ("Millimetres", 1e-3), ("mill", 1e-3), ("mete", 1.0),
-     ("m", 1.0), ("meter", 1.0), ("Meters", 1.0), ("cm", 0.01), ("centimeters", 0.01), ("inches", 0.0254), ("(mm)", 1e-3)],
+     ("m", 1.0), ("meter", 1.0), ("Meters", 1.0), ("cm", 0.01), ("centimeters", 0.01), ("inches", 0.0254),
+     ("(mm)", 1e-3)],
 )  # fmt: skip
 def test_spellings_of_units(read, units, metres):
     np.testing.assert_allclose(read(text(ROWS, units=units)).points, ROWS * metres, rtol=1e-12)

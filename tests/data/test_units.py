@@ -29,9 +29,10 @@ def test_forces(unit, expected):
 @pytest.mark.parametrize(
     ("unit", "expected"),
     [("Nmm", 1e-3), ("N-mm", 1e-3), ("N.mm", 1e-3), ("N*mm", 1e-3), ("N·mm", 1e-3), ("N⋅mm", 1e-3), ("N mm", 1e-3),
-     ("ntmm", 1e-3), ("nt-mm", 1e-3), ("NewtonMillimeters", 1e-3), ("Newton-mm", 1e-3), ("Ncm", 0.01), ("Nm", 1), ("NM", 1), ("N m", 1),
-     ("N·m", 1), ("ntm", 1), ("Newton meters", 1), ("Newton-metres", 1), ("Newtons meter", 1), ("kNm", 1000),
-     ("Nmete", 1), ("m-Newton", 1), ("", None), ("N", None), ("nt", None), ("mm", None), ("V", None), ("N/m", None), ("mN", None)],
+     ("ntmm", 1e-3), ("nt-mm", 1e-3), ("NewtonMillimeters", 1e-3), ("Newton-mm", 1e-3), ("Ncm", 0.01), ("Nm", 1),
+     ("NM", 1), ("N m", 1), ("N·m", 1), ("ntm", 1), ("Newton meters", 1), ("Newton-metres", 1), ("Newtons meter", 1),
+     ("kNm", 1000), ("Nmete", 1), ("m-Newton", 1), ("", None), ("N", None), ("nt", None), ("mm", None), ("V", None),
+     ("N/m", None), ("mN", None)],
 )  # fmt: skip
 def test_moments(unit, expected):
     found = newton_metres(unit)
