@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     "--person", type=int, metavar="N",
     help="Which person of an image, from 0, or which track of a file that follows people. Default: the most visible.",
 )  # fmt: skip
+@click.option("--subject", metavar="NAME", help="Whose markers (NAME:LASI), where a marker file has several people's.")
 @click.option("--obj", is_flag=True, help="Write meshes as .obj, too, not only as .glb.")
 @click.option(
     "--pictures", type=click.IntRange(0), default=8, show_default=True, help="Draw the first N items (seconds each)."
@@ -125,7 +126,7 @@ def fit(
     """Fit a body to each photo, set of keypoints or marker recording, with intuitive physics.
 
     INPUT is a photo (.png .jpg; needs the extra photo), a keypoint file (.json of OpenPose, MMPose, AlphaPose, COCO
-    or MediaPipe), a marker file (.trc, or .c3d with the extra c3d), or a folder of them. Every person is fitted for
+    or MediaPipe), a marker file (.trc, .c3d), or a folder of them. Every person is fitted for
     themselves, but for the frames of a --sequence; of several in one image one is taken. In OUTPUT every item gets a
     folder with its parameters (.npz, for `ipman analyze`), mesh (.glb), fit.json and pictures; report.html and
     report.json tell of all.
