@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..files import regular
 from .errors import FileError
 
 if TYPE_CHECKING:
@@ -170,4 +171,4 @@ def identity(item: Item, options: str) -> str:
 
 
 def _bytes(path: Path | None) -> bytes:
-    return b"" if path is None else path.read_bytes()
+    return b"" if path is None else regular(path).read_bytes()

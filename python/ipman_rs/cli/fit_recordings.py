@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..body import safe_npz
+from ..files import read_json
 from . import console
 from .errors import FileError
 from .fit_outputs import RECORD, complete, write_files
@@ -72,7 +73,7 @@ def kept(
             raise FileError(recording.paths[0], str(error)) from error
         record = {"name": recording.name, "source": recording.source, **told, **_stages(found)}
         record |= {"preset": _preset(recording, settings), "shape_from": person or "itself", "identity": identity}
-        write_files(folder, {f"{recording.name}.npz": {**_arrays(found, rate), **arrays}}, record)
+        record = write_files(folder, {f"{recording.name}.npz": {**_arrays(found, rate), **arrays}}, record)
     return record
 
 
@@ -92,7 +93,7 @@ def person_of(folder: Path) -> Person:
 
 
 def _record(folder: Path) -> dict[str, Any]:
-    return json.loads((folder / RECORD).read_text(encoding="utf-8"))
+    return read_json(folder / RECORD)
 
 
 def _preset(recording: Recording, settings: Settings) -> str:
@@ -194,8 +195,7 @@ def _measured(recording: Recording, folder: Path, settings: Settings) -> Study:
     from .measure import Request, measure
 
     path = folder / f"{recording.name}.npz"
-    with np.load(path, allow_pickle=False) as stored:
-        height = float(stored["ground_height"][0]) if "ground_height" in stored.files else None
+    height = float(safe_npz.read(path, "ground_height")[0]) if "ground_height" in safe_npz.names(path) else None
     return measure(path, Request(model=settings.model, ground=height))
 
 

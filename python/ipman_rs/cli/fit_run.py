@@ -82,8 +82,7 @@ def run(items: list[Item], settings: Settings, output: Path, resume: bool) -> di
                 told["presented"] = imitated.record(body.body)
                 item.notes += imitated.notes
             told |= {"flags": item.flags, "notes": item.notes, "identity": hashes[item.name]}
-            write_item(item, result, body.body, output / item.name, told, settings.obj)
-            records[item.name] = {"name": item.name, "source": item.source, **told}
+            records[item.name] = write_item(item, result, body.body, output / item.name, told, settings.obj)
     return records
 
 
