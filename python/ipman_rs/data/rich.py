@@ -23,7 +23,6 @@ Where it comes from: the project's own site, RICH.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -37,6 +36,7 @@ from numpy.typing import NDArray
 from ipman_rs.body import safe_pickle
 from ipman_rs.body.hands import Hands
 from ipman_rs.body.joints import SMPLX
+from ipman_rs.files import read_json
 from ipman_rs.ground import Ground
 from ipman_rs.io.read_mesh import read_points
 
@@ -347,11 +347,11 @@ def ground(mesh: Path, to_world: Path) -> Ground:
 
 def _transform(file: Path) -> tuple[Array, Array, float]:
     """R, t and c of world = c · X R + t."""
+    said = read_json(file)
     try:
-        said = json.loads(file.read_text(encoding="utf-8"))
         rotation, translation = np.array(said["R"], float), np.array(said["t"], float).reshape(3)
         scale = float(np.array(said["c"], float).reshape(()))
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (ValueError, LookupError, TypeError, OverflowError) as error:
         raise ValueError(f"{file}: expected R, t and c of the way to the scan's world: {error!r}") from None
     if rotation.shape != (3, 3) or np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3:
         raise ValueError(f"{file}: R: expected a rotation (3, 3), got {rotation.tolist()}")
