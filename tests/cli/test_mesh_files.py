@@ -49,6 +49,7 @@ def test_a_loose_vertex_is_no_part_of_the_body(run, tmp_path, lite_body, standin
     for name in ("stray", "whole"):
         done = run("simulate", tmp_path / f"{name}.obj", "-o", tmp_path / name)
         assert done.code == 0, done.err
+        assert ("1 vertex that no face uses left out" in done.out) == (name == "stray")
         (body,) = strict((tmp_path / name / "simulation.json").read_text(encoding="utf-8"))["bodies"]
         fallen[name] = [frame["stands"] for frame in frames(body)], [frame["margin"] for frame in frames(body)]
     assert fallen["stray"] == fallen["whole"]

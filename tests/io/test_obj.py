@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 import trimesh
@@ -108,3 +110,12 @@ def test_damage_is_one_line(read, content, said):
         read(content)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_special_files_are_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe.obj")
+    (tmp_path / "zero.obj").symlink_to("/dev/zero")
+    (tmp_path / "folder.obj").mkdir()
+    for name, said in (("pipe", "a pipe"), ("zero", "a device"), ("folder", "a folder"), ("none", "no such file")):
+        with pytest.raises(ValueError, match=f"{name}.obj: .*{said}"):
+            read_mesh(tmp_path / f"{name}.obj")
