@@ -23,6 +23,7 @@ from ipman_rs import __version__, data
 from ipman_rs.body import safe_npz
 from ipman_rs.data import check, judge
 from ipman_rs.data.frames import DataSet, Frames
+from ipman_rs.files import being_written, read_json, write_whole
 from ipman_rs.ground import Ground
 from ipman_rs.volume import mass_properties
 
@@ -30,7 +31,6 @@ from . import predictions as predicted
 from .columns import Columns, columns
 from .joints import Definition, Regressors, define
 from .models import Models
-from .rows import being_written
 
 PIECE = 4096  # frames: some seconds of work, and small in memory
 WEIGHED = 16  # bodies
@@ -167,7 +167,7 @@ class Job:
         self.place.mkdir(parents=True, exist_ok=True)
         file = self.place / "made_of.json"
         if file.exists():
-            self._compare(json.loads(file.read_text()))
+            self._compare(read_json(file))
         if self.predictions != TRUTH and len(self.estimates) < len(self.data) and not self.partial:
             raise ValueError(
                 f"{self.predictions}: has {len(self.estimates):,} frames, but the data set {self.source.name} has "
@@ -175,8 +175,7 @@ class Job:
             )
         _ = self.flags
         _ = self.definition
-        with being_written(file) as out:
-            out.write((json.dumps(self.made_of, indent=1) + "\n").encode())
+        write_whole(file, json.dumps(self.made_of, indent=1) + "\n")
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
@@ -245,7 +244,8 @@ class Job:
     def key(self) -> str:
         return hashlib.sha256(json.dumps(self.made_of, sort_keys=True).encode()).hexdigest()
 
-    def _compare(self, stored: dict[str, Any]) -> None:
+    def _compare(self, stored: Any) -> None:
+        stored = stored if isinstance(stored, dict) else {}
         names = {**stored, **self.made_of}
         other = [name for name in names if stored.get(name) != self.made_of.get(name)]
         if other:
