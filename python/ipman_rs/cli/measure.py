@@ -25,7 +25,7 @@ from .parameters import read_npz
 from .parts import match_body, read_parts
 from .recording import Recording
 
-SAMPLED_VERTICES = 3_000_000  # of the bodies that are judged: 256 of the embedded one
+SAMPLED_VERTICES = 800_000  # of the bodies that are judged: 65 of the embedded one, a fraction of a second
 WEIGHED = 16  # bodies
 LISTED = 12  # names of arrays
 
