@@ -118,7 +118,7 @@ def _bodies() -> list[Kind]:
     from ipman_rs.body import joint_regressors
     from ipman_rs.cli.measure import read
     from ipman_rs.data import open as open_data
-    from ipman_rs.fitting import presented_files
+    from ipman_rs.fitting import presented, presented_files
 
     body = ip.load_body("anny-lite")
     pose = np.zeros((2, body.num_joints, 3), np.float32)
@@ -139,7 +139,7 @@ def _bodies() -> list[Kind]:
         Kind("amass_data.npz", _written(amass.motion, "a.npz", frames=3), damage.of_npz, recorded),
         Kind("smpl.npz", _written(models.smpl, "a.npz"), damage.of_npz, ip.load_body),
         Kind("pose.npz", npz(poses=np.zeros((2, 156)), trans=np.zeros((2, 3)), contact=np.array([1, 2])), damage.of_npz,
-             lambda path: (presented_files.load(path, body), presented_files.read_contact(path, body))),
+             lambda path: (presented.load(path, body), presented_files.read_contact(path, body))),
         Kind("contact.json", b'{"contact": [1, 2, 3]}', damage.of_json,
         lambda path: presented_files.read_contact(path, body)),
         Kind("regressor.npy", _written(np.save, "a.npy", np.zeros((17, 9))), damage.of_npy, joint_regressors.read),
@@ -219,7 +219,7 @@ def _pickles() -> list[Kind]:
     from miniatures import threedpw
 
     from ipman_rs.body import safe_pickle
-    from ipman_rs.fitting import presented_files
+    from ipman_rs.fitting import presented
 
     def arrays(path: Path) -> Any:
         content = safe_pickle.read(path, "sequence", "a file", tolerant=True)
@@ -235,7 +235,7 @@ def _pickles() -> list[Kind]:
         Kind("two.pkl", pickle.dumps(plain, 2), damage.of_pickle, arrays),
         Kind("five.pkl", pickle.dumps(plain, 5), damage.of_pickle, arrays),
         Kind("threedpw.pkl", threedpw.pickled(threedpw.content(frames=2)), damage.of_pickle, arrays),
-        Kind("pose.pkl", pickle.dumps(plain, 2), damage.of_pickle, lambda path: presented_files.load(path, body)),
+        Kind("pose.pkl", pickle.dumps(plain, 2), damage.of_pickle, lambda path: presented.load(path, body)),
         Kind("smpl.pkl", pickle.dumps(plain, 2), damage.of_pickle, ip.load_body),
     ]
 
@@ -340,6 +340,22 @@ def _on_the_command_line(kind: Kind, path: Path) -> None:
         raise Wrong(f"{kind.name}: ipman {kind.command[0]} ended with {done.exit_code}: {done.output[-200:]!r}")
 
 
+def _warm_up() -> None:
+    """Reads every undamaged file, and tries every command once: what children need is then imported."""
+    with tempfile.TemporaryDirectory(prefix="fuzz") as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for kind in kinds():
+            path = Path(folder) / kind.name
+            path.write_bytes(kind.content)
+            try:
+                kind.read(path)
+            except (ValueError, FileError) as error:
+                print(f"the undamaged file is refused: {error}", file=sys.stderr)
+            path.write_bytes(b"")
+            if kind.command:
+                _on_the_command_line(kind, path)
+
+
 if __name__ == "__main__":
-    kinds()
+    _warm_up()
     run(case, (__doc__ or "").splitlines()[0])
