@@ -49,9 +49,9 @@ def test_numpy_options(function, option, has_zero):
 
 def test_refusals_are_short_and_name_the_argument():
     with pytest.raises(ValueError, match=r"^num_samples: expected 1 to 10000000, got .{1,90}$"):
-        ip.BodyTemplate(BODY.vertices, BODY.faces, num_samples=10**300)
+        ip.BodyTemplate(BODY.v_template, BODY.faces, num_samples=10**300)
     with pytest.raises(TypeError, match="^num_samples: "):
-        ip.BodyTemplate(BODY.vertices, BODY.faces, num_samples=np.timedelta64(10))  # type: ignore[arg-type]
+        ip.BodyTemplate(BODY.v_template, BODY.faces, num_samples=np.timedelta64(10))  # type: ignore[arg-type]
     for density in (1e308, 0.0, -1.0, np.nan, 1e-320):
         with pytest.raises(ValueError, match="^density: "):
             ip.mass_properties(VERTICES, BODY.template, density)
@@ -62,9 +62,9 @@ def test_coordinates_at_the_end_of_the_range_leak_no_warnings():
         warnings.simplefilter("error", RuntimeWarning)
         warnings.simplefilter("ignore", ip.UnitsWarning)
         for vertices in (
-            VERTICES * 1e308,
+            VERTICES.astype(float) * 5e307,
             np.where(VERTICES > 0, 1.7e308, -1.7e308),
-            VERTICES.astype(np.longdouble) * 1e400,
+            VERTICES.astype(np.longdouble) * np.longdouble("1e400"),
         ):
             ip.analyze(vertices, BODY.template, GROUND)
             ip.binary_center_of_pressure(vertices, BODY.template, GROUND)
@@ -112,10 +112,10 @@ def test_special_tensors_are_refused_by_name(kind):
             ipt.Ground(vertices) if kind != "None" else ipt.Ground(None)
 
 
-@pytest.mark.parametrize("weight", NO_NUMBERS)
-def test_weights_that_no_gradient_survives(weight):
-    with pytest.raises(ValueError, match="^weights: pull: "):
-        ipt.IntuitivePhysicsLoss(BODY.template, weights={"pull": weight})
+def test_weights_that_no_gradient_survives():
+    for weight in NO_NUMBERS:
+        with pytest.raises(ValueError, match="^weights: pull: "):
+            ipt.IntuitivePhysicsLoss(BODY.template, weights={"pull": weight})
 
 
 def test_weights_and_masks_of_other_kinds():

@@ -166,7 +166,7 @@ def kills(name: str, count: int, seed: int, progress: Callable[[str], None] = pr
         if whole.code != 0:
             return [f"{name}: the uninterrupted run ended with {whole.code}: {whole.said[-500:]}"]
         for number in range(count):
-            shutil.rmtree(folder / "out")
+            shutil.rmtree(folder / "out", ignore_errors=True)
             after = whole.seconds * draw.uniform(0.05, 0.95)
             killed = run(folder, words, after)
             completed += killed.code == 0

@@ -14,6 +14,7 @@ import ipman_rs as ip
 from .. import view
 from ..analysis import PIECE
 from ..body.sequence import pieces
+from ..files import regular
 from . import console
 from .errors import FileError
 from .meshes import read_mesh
@@ -83,9 +84,10 @@ def on_ground(path: Path, request: Request) -> tuple[Recording, Any, ip.Ground, 
 
 def read(path: Path, model: str | None) -> Recording:
     """The bodies in a file, by the ending of its name."""
-    if not path.is_file():
-        what = "is a folder; name the files in it" if path.is_dir() else "there is no such file"
-        raise FileError(path, what)
+    try:
+        regular(path)
+    except ValueError as error:
+        raise FileError(path, str(error)) from None
     if path.stat().st_size == 0:
         raise FileError(path, "is empty; export it again")
     if path.suffix.lower() == ".npz":
