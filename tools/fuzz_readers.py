@@ -79,11 +79,11 @@ def kinds() -> list[Kind]:
 
 def _meshes() -> list[Kind]:
     from ipman_rs.cli import mesh_files
-    from ipman_rs.cli.measure import read
+    from ipman_rs.cli.measure import Request, read
     from ipman_rs.cli.parts import read_parts
 
     def mesh(path: Path) -> Any:
-        return read(path, None)
+        return read(path, Request())
 
     def parts(path: Path) -> Any:
         return read_parts(path, FACES, None)
@@ -116,7 +116,7 @@ def _bodies() -> list[Kind]:
     from miniatures import amass, models
 
     from ipman_rs.body import joint_regressors
-    from ipman_rs.cli.measure import read
+    from ipman_rs.cli.measure import Request, read
     from ipman_rs.data import open as open_data
     from ipman_rs.fitting import presented, presented_files
 
@@ -124,7 +124,7 @@ def _bodies() -> list[Kind]:
     pose = np.zeros((2, body.num_joints, 3), np.float32)
 
     def parameters(path: Path) -> Any:
-        return read(path, None)
+        return read(path, Request())
 
     def recorded(path: Path) -> Any:
         return open_data("amass", path)[:]

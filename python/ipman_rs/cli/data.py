@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from ..data import Finding
 
-SIGNS = {"ok": ("ok", "green"), "missing": ("missing", "yellow"), "wrong": ("wrong", "red")}
+SIGNS = {"ok": ("ok", "green"), "odd": ("odd", "yellow"), "missing": ("missing", "yellow"), "wrong": ("wrong", "red")}
 
 
 @click.group()
@@ -99,7 +99,7 @@ def _findings(module: ModuleType, path: Path) -> list[Finding]:
 
 
 def _complete(findings: list[Finding]) -> bool:
-    return all(each.level == "ok" for each in findings)
+    return all(each.level in ("ok", "odd") for each in findings)
 
 
 def _print(findings: list[Finding], dataset: str) -> None:
@@ -124,5 +124,5 @@ def _print(findings: list[Finding], dataset: str) -> None:
     if _complete(findings):
         console.print(f"\n{dataset}: complete and right", markup=False)
     else:
-        said = f"{counts['missing']} missing, {counts['wrong']} wrong, {counts['ok']} ok"
+        said = ", ".join(f"{counts[level]} {level}" for level in ("missing", "wrong", "odd", "ok") if counts[level])
         console.print(f"\n{dataset}: {said}; `ipman data layout {dataset}` says what is expected", markup=False)

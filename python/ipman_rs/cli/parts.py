@@ -17,15 +17,20 @@ if TYPE_CHECKING:
 _HELP = "expected JSON {part: [vertex ids]}, or one label a face as .json, .npy or .npz (face_parts)"
 
 
-def read_parts(path: Path, faces: np.ndarray, vertex_map: np.ndarray | None) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Labels (F,) and part names from a file. ``vertex_map`` takes the file's vertex ids to those of ``faces``."""
+def read_parts(
+    path: Path, faces: np.ndarray, vertex_map: np.ndarray | None, face_map: np.ndarray | None = None
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Labels (F,) and part names from a file. ``vertex_map`` takes the mesh file's vertex ids to those of ``faces``,
+    −1 to none; ``face_map`` (F,) is the mesh file's triangle of each face."""
     try:
-        return _read(path, faces, vertex_map)
+        return _read(path, faces, vertex_map, face_map)
     except ValueError as error:
         raise FileError(path, f"{error}; {_HELP}") from error
 
 
-def _read(path: Path, faces: np.ndarray, vertex_map: np.ndarray | None) -> tuple[np.ndarray, tuple[str, ...]]:
+def _read(
+    path: Path, faces: np.ndarray, vertex_map: np.ndarray | None, face_map: np.ndarray | None
+) -> tuple[np.ndarray, tuple[str, ...]]:
     regular(path)
     names: list[str] | None = None
     if path.suffix.lower() == ".json":
@@ -43,6 +48,8 @@ def _read(path: Path, faces: np.ndarray, vertex_map: np.ndarray | None) -> tuple
         labels = _labels(path, safe_npz.read_npy(path))
     else:
         raise FileError(path, _HELP)
+    if face_map is not None and len(labels) > face_map.max():
+        labels = labels[face_map]
     if len(labels) != len(faces):
         raise FileError(path, f"has {len(labels)} labels for {len(faces)} faces; expected one label a face")
     used, labels = np.unique(labels, return_inverse=True)
@@ -74,8 +81,9 @@ def _from_vertices(
         if ids.min() < 0 or ids.max() >= count:
             bad = ids[(ids < 0) | (ids >= count)][0]
             raise FileError(path, f"part {name!r} names vertex {bad} of {count}; is it the file of another mesh?")
+        ids = ids if vertex_map is None else vertex_map[ids]
         member = np.zeros(int(faces.max()) + 1, dtype=bool)
-        member[ids if vertex_map is None else vertex_map[ids]] = True
+        member[ids[ids >= 0]] = True
         votes[:, part] = member[faces].sum(axis=1)
     used, labels = np.unique(votes.argmax(axis=1), return_inverse=True)
     names = (*map(str, content), "rest")

@@ -31,11 +31,15 @@ DS = TypeVar("DS", bound=DataSet)
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that `ipman data check` tells: what was found, and what to do about it."""
+    """One thing that was found about data, and what to do about it; `option` of a command mends it where one does.
 
-    level: Literal["ok", "missing", "wrong"]
+    odd: unusual, but possible. missing: not there. wrong: cannot be a person, or cannot be right.
+    """
+
+    level: Literal["ok", "odd", "missing", "wrong"]
     what: str
     advice: str = ""
+    option: str = ""
 
 
 def demand(path: str | os.PathLike[str], findings: Iterable[Finding]) -> None:
@@ -137,12 +141,13 @@ def size_of_body(what: str, points: NDArray[Any]) -> list[Finding]:
     if low <= extent <= high:
         return [Finding("ok", f"{what}: metres (a body spans {extent:.2f})")]
     if low * 1e3 <= extent <= high * 1e3:
-        unit, advice = "looks like millimetres", "divide by 1000"
+        unit, advice, option = "looks like millimetres", "divide by 1000", "--units mm"
     elif low * 1e2 <= extent <= high * 1e2:
-        unit, advice = "looks like centimetres", "divide by 100"
+        unit, advice, option = "looks like centimetres", "divide by 100", "--units cm"
     else:
-        unit, advice = "no unit of length fits a person", ""
-    return [Finding("wrong", f"{what}: {unit}: a body spans {extent:.4g}, expected {low} to {high} metres", advice)]
+        unit, advice, option = "no unit of length fits a person", "", "--units UNIT"
+    said = f"{what}: {unit}: a body spans {extent:.4g}, expected {low} to {high} metres"
+    return [Finding("wrong", said, advice, option)]
 
 
 def place(what: str, positions: NDArray[Any]) -> list[Finding]:
@@ -152,7 +157,7 @@ def place(what: str, positions: NDArray[Any]) -> list[Finding]:
     if not len(distance) or np.median(distance) <= WORLD:
         return []
     said = f"{what}: looks like millimetres: {np.median(distance):.4g} from the origin, expected up to {WORLD:g} metres"
-    return [Finding("wrong", said, "divide by 1000")]
+    return [Finding("wrong", said, "divide by 1000", "--units mm")]
 
 
 def radians(what: str, pose: NDArray[Any]) -> list[Finding]:
@@ -162,7 +167,7 @@ def radians(what: str, pose: NDArray[Any]) -> list[Finding]:
     if not len(largest) or np.median(largest) <= 2 * np.pi:
         return []
     said = f"{what}: looks like degrees: rotations by up to {largest.max():.4g}, expected radians"
-    return [Finding("wrong", said, "multiply by π/180")]
+    return [Finding("wrong", said, "multiply by π/180", "--degrees")]
 
 
 def upright(what: str, up: NDArray[Any], ground: Ground) -> list[Finding]:
@@ -186,7 +191,8 @@ def upright(what: str, up: NDArray[Any], ground: Ground) -> list[Finding]:
     if np.abs(mean).max() < 0.6 or agreement > 0.3:
         return []
     said = f"{what}: looks like {AXES[axis]} up: heads lie that way from the feet, but up is said to be {expected}"
-    return [Finding("wrong", said, "these are other axes than the data set's own: were they turned or not turned?")]
+    advice = "these are other axes than the data set's own: were they turned or not turned?"
+    return [Finding("wrong", said, advice, f"--up {AXES[axis].lstrip('+')}")]
 
 
 def stance(frames: Frames, ground: Ground) -> list[Finding]:

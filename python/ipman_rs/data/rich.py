@@ -38,6 +38,7 @@ from ipman_rs.body.hands import Hands
 from ipman_rs.body.joints import SMPLX
 from ipman_rs.files import read_json
 from ipman_rs.ground import Ground
+from ipman_rs.io.read_mesh import read_points
 
 from . import naming, safe_xml, sequences
 from .check import Finding
@@ -324,14 +325,12 @@ def ground(mesh: Path, to_world: Path) -> Ground:
 
     ValueError, naming the file, for what is missing or damaged, or a ground that is not level in a world that is z up.
     """
-    import trimesh
-
     try:
-        points = np.asarray(trimesh.load(mesh, process=False).vertices, np.float64)  # type: ignore[union-attr]
-    except Exception as error:  # of any type
-        raise ValueError(f"{mesh}: expected a mesh: {error}") from None
-    if len(points) < 3 or not np.isfinite(points).all():
-        raise ValueError(f"{mesh}: expected three vertices or more, finite, got {len(points)}")
+        points = read_points(mesh)
+    except ValueError as error:
+        raise ValueError(f"{mesh}: expected a mesh: {str(error).removeprefix(f'{mesh}: ')}") from error
+    if len(points) < 3:
+        raise ValueError(f"{mesh}: expected three vertices or more, got {len(points)}")
     if np.abs(points).max() > 1000:
         raise ValueError(f"{mesh}: looks like millimetres: vertices up to {np.abs(points).max():.4g} from the origin")
     middle = points.mean(axis=0)

@@ -283,7 +283,10 @@ class DataFit:
             raise ValueError(f"no keypoint file {places[0]}")
         size = data_frames.image_size(frame)
         given = None if size is None else (float(size[0]), float(size[1]))
-        return keypoints.read(place, image_size=given)
+        found = keypoints.read(place, image_size=given)
+        if len(found) > 1:
+            raise ValueError(f"{place}: expected the keypoints of one frame, got {len(found)} images")
+        return found
 
     def _fitted(self, seen: Sequence[Seen], gender: str) -> Iterator[dict[str, Any]]:
         body = self.model(gender)

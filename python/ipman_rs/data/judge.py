@@ -1,0 +1,260 @@
+"""The judge that every door asks: can what came in be a person, and which option mends it if not?
+
+Every function takes what it judges, a few hundred rows are enough, and gives findings. `admit` refuses what is wrong
+in one line that names the option that mends it, and hands back in words what is odd.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ipman_rs.ground import Ground
+from ipman_rs.template import BodyTemplate
+
+from .check import AXES, BODY, SAMPLE, Finding, place, size_of_body, upright
+
+MASS = (1.0, 650.0)  # kg: the heaviest person known weighed 635
+USUAL_MASS = (2.5, 250.0)  # kg
+MARKER_ERROR = 0.1  # m in the mean: with more, the body is not the one that the markers were on
+USUAL_MARKER_ERROR = 0.03
+USUAL_RATE = (5.0, 2000.0)  # frames a second
+USUAL_SPEED = 15.0  # m/s: nobody runs so fast
+USUAL_HEIGHT = 10.0  # m from the origin of the world, up or down
+SMALLEST_TURN = 0.12  # rad, 7 degrees: the largest turn in a pose of a person is larger
+LIES = 0.4  # of its length: a body whose height is less
+NEAR = 0.15  # m: what is within it of the lowest point can carry the body
+
+SURE = 0.5  # confidence of a keypoint
+FEWEST_POINTS = 4  # of a person in an image that say something about them
+RELATIVE = 3.0  # a keypoint no farther from the image's corner is a share of its size, not pixels
+FLAT = 0.01  # breadth of a person's keypoints by their length: none is on one line
+AROUND = 0.1  # of the image's size: how far detectors guess points outside it
+SMALL_PERSON = 24.0  # pixels
+
+Array = NDArray[np.floating[Any]]
+
+
+class NoPerson(ValueError):
+    """What came in cannot be a person; the message names the option that mends it."""
+
+
+def admit(path: str | os.PathLike[str], findings: Iterable[Finding], force: bool = False) -> tuple[str, ...]:
+    """What is odd, in words. Raises NoPerson, naming the file, for what is wrong; with `force` that is odd, too."""
+    findings = list(findings)
+    wrong = [each for each in findings if each.level == "wrong"]
+    if wrong and not force:
+        said = ". ".join(_advised(each) for each in wrong)
+        raise NoPerson(f"{path}: {said} (--force: it is right as it is)")
+    return tuple(_advised(each) for each in findings if each.level in ("odd", "wrong"))
+
+
+def _advised(finding: Finding) -> str:
+    named = finding.option.split()[-1:]
+    ending = "says otherwise" if named and named[0].isupper() else "if so"  # --units UNIT, and --units mm
+    mends = f"{finding.option} {ending}" if finding.option else finding.advice
+    return f"{finding.what}; {mends}" if mends else finding.what
+
+
+def bodies(vertices: Array, template: BodyTemplate, normal: Array, *, up_is_said: bool = False) -> list[Finding]:
+    """Size, place and stance of bodies (T, V, 3) of one template; `normal` (3,) points up.
+
+    `up_is_said`: by the user, who knows: then no stance is wrong.
+    """
+    vertices = np.asarray(vertices, np.float64)
+    vertices = vertices[np.isfinite(vertices).all(axis=(1, 2))]
+    if not len(vertices):
+        return []
+    found = size_of_body("vertices", vertices)
+    if found[0].level == "wrong":
+        return found
+    found += _sizes(vertices)
+    away = place("vertices", vertices.mean(axis=1)) or _height(vertices, normal)
+    if up_is_said:
+        return found + away
+    return found + away + (_stance(vertices, template, normal) or _shape(vertices, template, normal))
+
+
+def _sizes(vertices: Array) -> list[Finding]:
+    """Of bodies that span something else than the others."""
+    spans = np.linalg.norm(np.ptp(vertices, axis=1), axis=-1)
+    odd = spans[(spans < BODY[0]) | (spans > BODY[1])]
+    if not len(odd):
+        return []
+    verb = "spans" if len(odd) == 1 else "span up to"
+    said = f"vertices: {len(odd)} of {len(spans)} bodies {verb} {odd.max():.4g}, expected {BODY[0]} to {BODY[1]} metres"
+    return [Finding("odd", said)]
+
+
+def evenly(count: int, most: int = SAMPLE) -> NDArray[np.int64]:
+    """Up to `most` numbers from 0 to count − 1, evenly spaced: the bodies that are looked at."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
+
+
+def _height(vertices: Array, normal: Array) -> list[Finding]:
+    """Of bodies in a world whose origin is far below or above them."""
+    height = float(np.median((vertices @ Ground(normal).normal).min(axis=-1)))
+    if abs(height) <= USUAL_HEIGHT:
+        return []
+    side = "above" if height > 0 else "below"
+    return [Finding("odd", f"vertices: {abs(height):.4g} m {side} the origin of their world", option="--units cm")]
+
+
+def _stance(vertices: Array, template: BodyTemplate, normal: Array) -> list[Finding]:
+    """Of bodies whose parts have names: where the head is from the lower legs."""
+    points = {word: _of_parts(template, word) for word in ("head", "lower_leg", "forearm", "torso")}
+    if not all(len(index) for index in points.values()):
+        return []
+    ways = vertices[:, points["head"]].mean(axis=1) - vertices[:, points["lower_leg"]].mean(axis=1)
+    ground = Ground(normal)
+    heights = vertices @ ground.normal
+    low = {word: heights[:, index].min(axis=1) - heights.min(axis=1) for word, index in points.items()}
+    on_hands_and_feet = (np.maximum(low["forearm"], low["lower_leg"]) < NEAR) & (low["torso"] > NEAR)
+    if len(vertices) > 1:
+        return upright("bodies", ways[~on_hands_and_feet], ground) or [Finding("ok", "bodies: upright and not")]
+    way = ways[0] / np.linalg.norm(ways[0])
+    axis = _axis(way)
+    if way @ ground.normal < -0.5:
+        if way @ ground.normal < -0.8 and low["head"][0] < 1e-3 and low["forearm"][0] > NEAR:
+            return [Finding("wrong", "stands on its head, with its feet in the air", option=f"--up {axis}")]
+        return [Finding("odd", "its head is below its feet", option=f"--up {axis}")]
+    if abs(way @ ground.normal) < 0.35 and not on_hands_and_feet[0]:
+        return [Finding("odd", "lies: its head is beside its feet", option=f"--up {axis}")]
+    return [Finding("ok", "bodies: heads are above feet")]
+
+
+def _shape(vertices: Array, template: BodyTemplate, normal: Array) -> list[Finding]:
+    """Of bodies whose parts nobody knows: how low they are, and whether they end below as a head does."""
+    first, normal = vertices[0], Ground(normal).normal
+    height = first @ normal
+    extent = np.ptp(first, axis=0)
+    axis = int(extent.argmax())
+    if np.ptp(height) < LIES * extent[axis] and abs(normal[axis]) < 0.5:
+        said = f"lies: {np.ptp(height):.2f} m high and {extent[axis]:.2f} m long"
+        return [Finding("odd", said, option="--up AXIS")]
+    middle = float(np.median(height[np.unique(template.faces)]) - height.min()) / max(float(np.ptp(height)), 1e-9)
+    below, above = (_ends(first, height, normal, end) for end in ("low", "high"))
+    if below == 1 and above == 2 and middle < 0.5:
+        return [Finding("odd", "its head seems to be below its feet", option=f"--up {_axis(-normal)}")]
+    return []
+
+
+def _ends(points: Array, height: Array, normal: Array, end: str) -> int:
+    """How many pieces are left of a body where all but its lowest or highest eighth is cut off: 1, or 2 for more."""
+    span = float(np.ptp(height))
+    there = height < height.min() + span / 8 if end == "low" else height > height.max() - span / 8
+    flat = points[there] - np.outer(height[there], normal)
+    way = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[2][0]
+    along = np.sort(flat @ way)
+    return 1 + int(len(along) > 1 and bool(np.diff(along).max() > 0.03 * span))
+
+
+def _of_parts(template: BodyTemplate, word: str) -> NDArray[np.int64]:
+    """The vertices of the parts with this word in their names."""
+    wanted = [part for part, name in enumerate(template.part_names) if word in name]
+    return np.unique(template.faces[np.isin(template.face_parts, wanted)])
+
+
+def _axis(way: Array) -> str:
+    """The axis, as `--up` takes it, that is nearest to a direction."""
+    return AXES[int(np.concatenate([way, -way]).argmax())].lstrip("+")
+
+
+def mass(kilograms: float) -> list[Finding]:
+    """Whether a body's mass can be a person's."""
+    if not np.isfinite(kilograms) or USUAL_MASS[0] <= kilograms <= USUAL_MASS[1]:
+        return []
+    if kilograms <= 0:
+        said = f"a body of {kilograms:.4g} kg"
+        return [Finding("wrong", said, "is its surface closed, and do its faces point outwards?")]
+    level = "odd" if MASS[0] <= kilograms <= MASS[1] else "wrong"
+    return [Finding(level, f"a person of {kilograms:.4g} kg", option="--units UNIT")]
+
+
+def rate(hertz: float) -> list[Finding]:
+    """Whether frames a second can be those of a recording."""
+    if np.isfinite(hertz) and USUAL_RATE[0] <= hertz <= USUAL_RATE[1]:
+        return []
+    level = "odd" if np.isfinite(hertz) and hertz > 0 else "wrong"
+    return [Finding(level, f"{hertz:.4g} frames a second", option="--rate HZ")]
+
+
+def speed(what: str, positions: Array, seconds: Array | None) -> list[Finding]:
+    """Whether people at positions (T, 3) m move as people do; `seconds` (T,) where they are known."""
+    if seconds is None or len(positions) < 2 or len(positions) != len(seconds):
+        return []
+    moved = np.linalg.norm(np.diff(np.asarray(positions, np.float64), axis=0), axis=-1) / np.diff(seconds)
+    usual = float(np.median(moved[np.isfinite(moved)])) if np.isfinite(moved).any() else 0.0
+    if usual <= USUAL_SPEED:
+        return []
+    said = f"{what}: moves at {usual:.4g} m/s in the median, expected up to {USUAL_SPEED:g}"
+    return [Finding("odd", said, "is its unit (--units) or its rate (--rate) another?")]
+
+
+def degrees(rotations: Sequence[Array]) -> list[Finding]:
+    """Whether rotation vectors (T, n, 3) that were said to be degrees, in radians here, were so."""
+    largest = [np.linalg.norm(np.asarray(each, np.float64), axis=-1).max(axis=-1) for each in rotations]
+    largest = max((float(np.median(each[np.isfinite(each)])) for each in largest if np.isfinite(each).any()), default=0)
+    if not 0 < largest <= SMALLEST_TURN:
+        return []
+    said = f"the pose: with --degrees no joint turns by more than {np.degrees(largest):.2g} degrees"
+    return [Finding("odd", said, "is it in radians?")]
+
+
+def marker_error(metres: float) -> list[Finding]:
+    """Whether a body was found for the markers, by their mean distance from it."""
+    if metres <= USUAL_MARKER_ERROR:
+        return []
+    level = "odd" if metres <= MARKER_ERROR else "wrong"
+    said = f"markers lie {1e3 * metres:.0f} mm from the fitted body in the mean, expected under 30"
+    return [Finding(level, said, "are units, axes and names of the markers right? (--units, --up, --markers)")]
+
+
+def known_markers(known: Sequence[str], unknown: Sequence[str], fewest: int = 6) -> list[Finding]:
+    """Whether enough of the markers that were seen have places on the body that are known."""
+    count = len(known) + len(unknown)
+    if not unknown:
+        return []
+    said = f"{len(unknown)} of {count} markers have names without a known place: {_some(unknown)}"
+    wrong = len(known) < fewest or 3 * len(known) < count
+    return [Finding("wrong" if wrong else "odd", said, "--markers FILE says where they are")]
+
+
+def _some(names: Sequence[str], most: int = 8) -> str:
+    return ", ".join(names[:most]) + (", …" if len(names) > most else "")
+
+
+def keypoints(points: Array, size: Array) -> list[Finding]:
+    """Whether points (K, 3) of one person, x and y in pixels and confidence, can lie in an image of `size` (2,).
+
+    Those that the detector is sure of are judged, all that were seen where it is sure of few.
+    """
+    sure = points[:, 2] > SURE
+    seen = np.asarray(points[sure if sure.sum() >= FEWEST_POINTS else points[:, 2] > 0, :2], np.float64)
+    if len(seen) < FEWEST_POINTS:
+        return []
+    image = f"{size[0]:g} × {size[1]:g} pixels"
+    extent = float(np.ptp(seen, axis=0).max())
+    if extent == 0:
+        return [Finding("wrong", f"all {len(seen)} points lie at one place, ({seen[0, 0]:g}, {seen[0, 1]:g})")]
+    if abs(seen).max() <= RELATIVE and min(size) > SMALL_PERSON:
+        said = f"points of {seen.min():.3g} to {seen.max():.3g} look relative to the image"
+        return [Finding("wrong", said, "multiply them by its width and height")]
+    spread = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
+    if spread[1] < FLAT * spread[0]:
+        said = f"all {len(seen)} points lie on one line"
+        return [Finding("wrong", said, "are x and y columns of their own in the file?")]
+    outside = ((seen < -AROUND * size) | (seen > (1 + AROUND) * size)).any(axis=1)
+    if 2 * outside.sum() > len(seen):
+        x, y = seen[:, 0], seen[:, 1]
+        said = f"{outside.sum()} of {len(seen)} points lie outside the image of {image}"
+        said += f": x from {x.min():.0f} to {x.max():.0f}, y from {y.min():.0f} to {y.max():.0f}"
+        return [Finding("wrong", said, "is that its size? (--image-size WxH)")]
+    if extent < SMALL_PERSON:
+        said = f"the person is {extent:.2g} pixels large in an image of {image}"
+        return [Finding("odd", said, "is that its size? (--image-size WxH)")]
+    return [Finding("ok", f"keypoints: a person of {extent:.0f} pixels in an image of {image}")]

@@ -1,0 +1,146 @@
+"""The judge that every door asks, on the named poses turned every way: what is refused, what is odd, what passes."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import ipman_rs as ip
+from ipman_rs.data import judge
+from ipman_rs.data.check import Finding
+
+UPRIGHT = tuple(name for name in ip.body.poses.NAMES if name != "lying")
+ON_FEET = ("standing", "t_pose", "a_pose", "walking", "one_leg", "warrior", "lunge", "chair", "squat")
+
+
+def levels(name, up=(0, 1, 0), scale=1.0, parts=True, **said):
+    body = ip.load_body("anny-lite")
+    vertices = ip.body.posed(body, name) * scale
+    template = body.template if parts else ip.BodyTemplate(ip.body.posed(body, name), body.faces)
+    return [each for each in judge.bodies(vertices[None], template, np.array(up, float), **said) if each.level != "ok"]
+
+
+@pytest.mark.parametrize("name", UPRIGHT)
+def test_people_on_their_ground_pass(name):
+    assert levels(name) == []
+
+
+def test_who_lies_is_odd_unless_up_is_said():
+    (found,) = levels("lying")
+    assert (found.level, found.option) == ("odd", "--up -z")
+    assert levels("lying", up_is_said=True) == []
+
+
+@pytest.mark.parametrize("name", ON_FEET)
+def test_who_stands_on_the_head_is_refused(name):
+    (found,) = levels(name, up=(0, -1, 0))
+    assert (found.level, found.option) == ("wrong", "--up y")
+    with pytest.raises(judge.NoPerson, match=r"^a\.obj: stands on its head.*--up y if so.*--force"):
+        judge.admit("a.obj", [found])
+    assert judge.admit("a.obj", [found], force=True) == ("stands on its head, with its feet in the air; --up y if so",)
+    assert levels(name, up=(0, -1, 0), up_is_said=True) == []
+
+
+@pytest.mark.parametrize("name", ["standing", "walking", "chair", "one_leg"])
+def test_another_axis_is_odd_in_one_body_and_wrong_in_many(name):
+    body = ip.load_body("anny-lite")
+    vertices = np.repeat(ip.body.posed(body, name)[None], 3, axis=0)
+    for up in ((0, 0, 1), (1, 0, 0)):
+        (found,) = levels(name, up=up)
+        assert (found.level, found.option) == ("odd", "--up y")
+        *fine, found = judge.bodies(vertices, body.template, np.array(up, float))
+        assert {each.level for each in fine} == {"ok"}
+        assert (found.level, found.option) == ("wrong", "--up y")
+
+
+@pytest.mark.parametrize("name", ["standing", "t_pose", "a_pose", "walking", "lunge"])
+def test_a_mesh_without_known_parts_is_judged_by_its_shape(name):
+    (found,) = levels(name, up=(0, -1, 0), parts=False)
+    assert (found.level, found.option) == ("odd", "--up y")
+
+
+@pytest.mark.parametrize(("scale", "option"), [(1e3, "--units mm"), (1e2, "--units cm"), (1e-3, "--units UNIT")])
+def test_other_units_are_refused(scale, option):
+    (found,) = levels("standing", scale=scale)
+    assert (found.level, found.option) == ("wrong", option)
+
+
+@pytest.mark.parametrize(
+    ("kilograms", "level"), [(70, None), (3.5, None), (1.5, "odd"), (300, "odd"), (0.6, "wrong"), (5.9e10, "wrong")]
+)
+def test_mass(kilograms, level):
+    assert [each.level for each in judge.mass(kilograms)] == ([level] if level else [])
+
+
+@pytest.mark.parametrize(
+    ("hertz", "level"), [(30, None), (1, "odd"), (1e5, "odd"), (0, "wrong"), (np.nan, "wrong"), (-30, "wrong")]
+)
+def test_rate(hertz, level):
+    assert [each.level for each in judge.rate(hertz)] == ([level] if level else [])
+
+
+@pytest.mark.parametrize(("metres", "level"), [(0.01, None), (0.05, "odd"), (416, "wrong")])
+def test_marker_error(metres, level):
+    assert [each.level for each in judge.marker_error(metres)] == ([level] if level else [])
+
+
+@pytest.mark.parametrize(
+    ("known", "unknown", "level"), [(55, 0, None), (40, 15, "odd"), (6, 49, "wrong"), (3, 2, "wrong")]
+)
+def test_known_markers(known, unknown, level):
+    found = judge.known_markers(*([f"m{index}" for index in range(count)] for count in (known, unknown)))
+    assert [each.level for each in found] == ([level] if level else [])
+    assert level is None or f"{unknown} of {known + unknown} markers" in found[0].what
+
+
+def test_admit_passes_what_is_merely_missing():
+    assert judge.admit("a", [Finding("ok", "x"), Finding("missing", "y"), Finding("odd", "z", "look")]) == ("z; look",)
+
+
+IMAGE = np.array([640.0, 480.0])
+PERSON = np.array(
+    [[320, 90], [350, 140], [290, 140], [366, 255], [274, 255], [338, 260], [302, 260], [342, 420], [298, 420]], float
+)
+
+
+def of_keypoints(points, size=IMAGE, confidence=0.9):
+    given = np.broadcast_to(confidence, len(points))
+    return judge.keypoints(np.column_stack([points, given]), np.array(size, float))
+
+
+@pytest.mark.parametrize(
+    ("points", "level", "says"),
+    [
+        (PERSON, "ok", "a person of 330 pixels in an image of 640 × 480 pixels"),
+        (PERSON[::-1] * [1, -1] + [0, 480], "ok", "a person"),  # upside down is for the fit to tell
+        (PERSON / IMAGE, "wrong", "points of 0.188 to 0.875 look relative to the image"),
+        (2 * PERSON / IMAGE - 1, "wrong", "look relative to the image"),
+        (np.tile([100.0, 100.0], (9, 1)), "wrong", r"all 9 points lie at one place, \(100, 100\)"),
+        (np.repeat(PERSON[:, :1], 2, axis=1), "wrong", "all 9 points lie on one line"),
+        (PERSON * [1, 0.001], "wrong", "all 9 points lie on one line"),
+        (PERSON * 3, "wrong", "9 of 9 points lie outside the image of 640 × 480 pixels: x from 822 to 1098"),
+        (PERSON + [0, 200], "ok", "a person"),  # the feet alone are outside
+        (PERSON / 20 + 100, "odd", "the person is 16 pixels large"),
+        (PERSON[:3], None, ""),
+    ],
+)
+def test_keypoints(points, level, says):
+    found = of_keypoints(points)
+    assert [each.level for each in found] == ([] if level is None else [level])
+    assert level is None or re.search(says, found[0].what)
+
+
+def test_keypoints_that_the_detector_is_not_sure_of_may_lie_outside():
+    points = np.where(np.arange(9)[:, None] < 5, PERSON, PERSON + [0, 1000])
+    assert of_keypoints(points, confidence=np.where(np.arange(9) < 5, 0.9, 0.3))[0].level == "ok"
+    assert of_keypoints(points[::-1])[0].level == "ok"  # four of nine
+    assert of_keypoints(PERSON + [0, 1000], confidence=0.3)[0].level == "wrong"  # sure of none: all are judged
+
+
+def test_keypoints_of_another_image_size_name_the_option():
+    with pytest.raises(judge.NoPerson, match=r"a.json: 9 of 9 .*is that its size\? \(--image-size WxH\) \(--force"):
+        judge.admit("a.json", of_keypoints(PERSON * 3))
+    (said,) = judge.admit("a.json", of_keypoints(PERSON * 3), force=True)
+    assert "lie outside the image" in said
