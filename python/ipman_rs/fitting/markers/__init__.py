@@ -9,20 +9,22 @@ observed = tracks.select(landmarks.names)
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from ipman_rs.body import BodyModel
 from ipman_rs.data import c3d, trc
 from ipman_rs.data.tracks import Tracks
 
-from ..landmarks import Site
-from .anatomy import MIDDLE, RADIUS, SIDED, Anatomy
+from ..landmarks import Inner, Point, Site
+from ..surface import SIDES
+from .anatomy import HIP_CENTRE, MIDDLE, RADIUS, SIDED, SPREAD, Anatomy
+from .names import meanings
 from .sets import MARKERS, Meaning
 
 READERS: dict[str, Callable[..., Tracks]] = {".trc": trc.read, ".c3d": c3d.markers}
 
-__all__ = ["MARKERS", "READERS", "Site", "Tracks", "read", "sites"]
+__all__ = ["MARKERS", "READERS", "Inner", "Point", "Site", "Tracks", "meanings", "places", "read", "sites"]
 
 
 def read(path: str | os.PathLike[str], up: str | None = None) -> Tracks:
@@ -37,20 +39,31 @@ def read(path: str | os.PathLike[str], up: str | None = None) -> Tracks:
     return READERS[suffix](Path(path), up)
 
 
-def sites(body: BodyModel, markers: Iterable[str], radius: float = RADIUS) -> dict[str, Site | str]:
-    """Where these markers are on the body: a site on the skin, or a joint's name. Unknown markers are left out.
+def sites(
+    body: BodyModel, markers: Iterable[str], radius: float = RADIUS, own: Mapping[str, Meaning | None] | None = None
+) -> dict[str, Point]:
+    """Where these markers of one file are on the body: a site on the skin, a point inside, or a joint's name.
 
-    `radius`: of the markers, m, from the skin to what was recorded.
+    Unknown markers are left out (`names.meanings`). `radius`: of the markers, m, from the skin to what was recorded.
+    `own`: further names and the places that they mean, as `own.read` has them.
     """
     anatomy = Anatomy(body, radius)
-    return {name: _site(anatomy, MARKERS[name]) for name in markers if name in MARKERS}
+    return {name: _site(anatomy, meaning) for name, meaning in meanings(list(markers), own).items()}
 
 
-def _site(anatomy: Anatomy, meaning: Meaning) -> Site | str:
+def _site(anatomy: Anatomy, meaning: Meaning) -> Point:
     if isinstance(meaning, tuple):
-        side, place = meaning
-        return anatomy.site(place, side)
+        side, place, spread = meaning
+        return anatomy.site(place, side, spread)
     if meaning in MIDDLE:
         return anatomy.site(MIDDLE[meaning])
     side, _, name = meaning.partition("_")
-    return anatomy.site(SIDED[name], side) if name in SIDED else meaning
+    if name == HIP_CENTRE:
+        return anatomy.hip_centre(side)
+    return anatomy.site(SIDED[name], side, SPREAD.get(name, RADIUS)) if name in SIDED else meaning
+
+
+def places(body: BodyModel) -> tuple[str, ...]:
+    """The names of all places that a marker can be said to be at: sites on the skin, hip centres, joints."""
+    sided = [f"{side}_{name}" for name in (*SIDED, HIP_CENTRE) for side in SIDES]
+    return tuple(dict.fromkeys([*MIDDLE, *sided, *body.joint_names]))

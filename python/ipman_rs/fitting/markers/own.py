@@ -1,0 +1,96 @@
+"""A user's own marker names: a file that says which place on the body each of them means."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+from ipman_rs.body import BodyModel
+
+from .names import meanings
+from .sets import Meaning
+
+LARGEST = 1_000_000  # bytes
+ENDINGS = (".json", ".yaml", ".yml", ".csv")
+
+
+def read(path: Path, body: BodyModel) -> dict[str, Meaning | None]:
+    """Names of markers and what they mean, from a JSON or YAML object or a CSV file of two columns.
+
+    A place is one of `places(body)`, or the name of a marker of a known set ("LASI"); none (null, an empty cell) leaves
+    the marker out. ValueError, naming the file and
+    the marker, for another one.
+    """
+    pairs = _pairs(path)
+    return {name: _meaning(f"{path}: {name!r}", place, body) for name, place in pairs.items()}
+
+
+def _meaning(what: str, place: Any, body: BodyModel) -> Meaning | None:
+    from . import places
+
+    if place is None or place == "":
+        return None
+    known = places(body)
+    if isinstance(place, str):
+        word = place.strip().lower().replace(" ", "_").replace("-", "_")
+        if word in known:
+            return word
+        other = meanings([place.strip()])
+        if other:
+            return other[place.strip()]
+    raise ValueError(
+        f"{what}: expected a place on the body, such as left_asis or LASI, got {place!r}; "
+        "`ipman fit --marker-places` lists all"
+    )
+
+
+def _pairs(path: Path) -> dict[str, Any]:
+    if path.suffix.lower() not in ENDINGS:
+        raise ValueError(f"{path}: expected a file of marker names ({', '.join(ENDINGS)})")
+    try:
+        if path.is_file() and path.stat().st_size > LARGEST:
+            raise ValueError(f"{path}: expected up to {LARGEST} bytes of marker names, got {path.stat().st_size}")
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise ValueError(f"{path}: expected text in UTF-8") from None
+    pairs = _rows(path, text) if path.suffix.lower() == ".csv" else _object(path, text)
+    if not pairs:
+        raise ValueError(f"{path}: expected names of markers and their places, got none")
+    return pairs
+
+
+def _object(path: Path, text: str) -> dict[str, Any]:
+    try:
+        if path.suffix.lower() == ".json":
+            content = json.loads(text)
+        else:
+            import yaml
+
+            content = yaml.safe_load(text)
+    except Exception as error:  # yaml has its own
+        said = " ".join(str(error).split())
+        raise ValueError(f"{path}: expected {path.suffix[1:].upper()} that can be read: {said}") from None
+    if not isinstance(content, dict):
+        raise ValueError(f"{path}: expected an object of marker names and places, got {type(content).__name__}")
+    return {str(name): place for name, place in content.items()}
+
+
+def _rows(path: Path, text: str) -> dict[str, Any]:
+    rows = [
+        [cell.strip() for cell in row] for row in csv.reader(text.splitlines()) if any(cell.strip() for cell in row)
+    ]
+    if rows and [cell.lower() for cell in rows[0]] in (
+        ["marker", "place"],
+        ["marker", "site"],
+        ["name", "place"],
+        ["name", "site"],
+    ):
+        rows = rows[1:]
+    for number, row in enumerate(rows, 1):
+        if len(row) != 2:
+            raise ValueError(f"{path}: row {number}: expected a marker's name and its place, got {len(row)} columns")
+    return {row[0]: row[1] for row in rows}
