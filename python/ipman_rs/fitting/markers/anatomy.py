@@ -115,8 +115,8 @@ SIDED: dict[str, Place] = {
 
 
 HIP_CENTRE = "hip_centre"  # a point inside
-# How well places are known, m, where it is not the marker's radius: of clusters on plates and wands, which stand off the
-# skin and are anywhere on the part, and of hip centres, as far apart as two ways to find them.
+# How well places are known, m, where it is not the marker's radius: of clusters on plates and wands, which stand off
+# the skin and are anywhere on the part, and of hip centres, as far apart as two ways to find them.
 ANYWHERE = 0.05
 SPREAD = {"thigh": ANYWHERE, "shank": ANYWHERE, HIP_CENTRE: 0.02}
 

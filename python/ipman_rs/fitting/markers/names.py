@@ -15,65 +15,20 @@ from .sets import KEYPOINTS, MARKERS, Meaning
 
 SHARED = 0.5  # of a file's names: a beginning or an end that so many have says nothing
 FEWEST = 3
-SUFFIXES = frozenset(
-    [
-        "study",
-        "marker",
-        "markers",
-        "mkr",
-        "pos",
-        "position",
-        "raw",
-        "filt",
-        "filtered",
-        "smooth",
-        "smoothed",
-        "traj",
-        "trajectory",
-        "interp",
-    ]
-)
+SUFFIXES = {
+    "study", "marker", "markers", "mkr", "pos", "position", "raw", "filt", "filtered", "smooth", "smoothed", "traj",
+    "trajectory", "interp",
+}  # fmt: skip
 SIDES = {"l": "l", "left": "l", "r": "r", "right": "r"}
 # Ends that say where a marker is, though many names may have them.
-TELLING = frozenset(
-    [
-        "l",
-        "r",
-        "left",
-        "right",
-        "lat",
-        "med",
-        "lateral",
-        "medial",
-        "in",
-        "out",
-        "int",
-        "ext",
-        "jc",
-        "joint",
-        "centre",
-        "center",
-        "reg",
-        "sup",
-        "inf",
-        "ant",
-        "post",
-        "up",
-        "front",
-        "rear",
-        "top",
-        "bottom",
-        "upper",
-        "lower",
-        "x",
-        "y",
-        "z",
-    ]
-)
+TELLING = {
+    "l", "r", "left", "right", "lat", "med", "lateral", "medial", "in", "out", "int", "ext", "jc", "joint", "centre",
+    "center", "reg", "sup", "inf", "ant", "post", "up", "front", "rear", "top", "bottom", "upper", "lower", "x", "y", "z",
+}  # fmt: skip
 
 
 def plain(name: str) -> str:
-    """A marker's name for comparison: small letters and digits, without the subject, `l` or `r` first if it has a side."""
+    """A marker's name for comparison: small letters and digits, without the subject, its side first, as `l` or `r`."""
     words = [word.lower() for word in re.split(r"[\W_]+", name.rpartition(":")[2]) if word]
     if len(words) > 1 and words[-1] in SIDES and words[0] not in SIDES:
         words = [words[-1], *words[:-1]]
@@ -93,8 +48,9 @@ _KEYPOINTS: dict[str, Meaning] = {plain(name): meaning for name, meaning in KEYP
 def meanings(names: Sequence[str], own: Mapping[str, Meaning | None] | None = None) -> dict[str, Meaning]:
     """What the markers of one file mean; those that nobody knows are left out.
 
-    `own`: further names and what they mean, before the known ones; None leaves a marker out. Of two names that come to the same one, the one that
-    needed the least taken away counts. Files of keypoints, which name the hips, mean joints by "RKnee".
+    `own`: further names and what they mean, before the known ones; None leaves a marker out. Of two names that come to
+    the same one, the one that needed the least taken away counts. Files of keypoints, which name the hips, mean joints
+    by "RKnee".
     """
     given = {plain(name): meaning for name, meaning in (own or {}).items()}
     ways = [_variants(name, _shared_ends(names)) for name in names]

@@ -197,24 +197,27 @@ OTHERS: dict[str, Meaning] = {
             "wrist": "WJC Wrist.Joint WristJC Wrist.Joint.Centre Wrist.Joint.Center",
             "knee_lateral": "Knee KNE KneeLat Lat.Knee Lateral.Knee Knee.Lateral KneeOut KneeExt KNEOut KNELat KNEL LKNE "
             "LKnee FLE LFE LFC LE LEP LEK CL LCON KNEEL LFEC Femur.Lat",
-            "knee_medial": "MKnee MKNE KneeMed Med.Knee Medial.Knee Knee.Medial KneeIn KneeInt KNEIn KNEMed KNEM FME MFE "
-            "MFC ME MEP MEK CM MCON KNM KNI KNEEM MFEC Femur.Med",
+            "knee_medial": "MKnee MKNE KneeMed Med.Knee Medial.Knee Knee.Medial KneeIn KneeInt KNEIn KNEMed KNEM FME MFE MFC "
+            "ME MEP MEK CM MCON KNM KNI KNEEM MFEC Femur.Med",
             "patella": "PAT Patella",
             "fibula_head": "HF HFB FAX Fibula.Head FH FIB HFIB",
             "tibial_tuberosity": "TT TUB TTC TTUB Tibial.Tuberosity",
             "shin": "SHN Shin Shin.Front.High Shin.Front",
-            "malleolus_lateral": "Ankle ANK AnkleLat Lat.Ankle Lateral.Ankle Ankle.Lateral AnkleOut AnkleExt ANKOut ANKLat "
-            "ANKL LANK LAnkle LMAL LMall LMA LM ML FAL MALL LAT.MAL Malleolus.Lat",
-            "malleolus_medial": "MAnkle MANK AnkleMed Med.Ankle Medial.Ankle Ankle.Medial AnkleIn AnkleInt ANKIn ANKMed "
-            "ANKM MMAL MMall MMA MM TAM ANM MED.MAL Malleolus.Med",
+            "malleolus_lateral": "Ankle ANK AnkleLat Lat.Ankle Lateral.Ankle Ankle.Lateral AnkleOut AnkleExt ANKOut ANKLat ANKL "
+            "LANK LAnkle LMAL LMall LMA LM ML FAL MALL LAT.MAL Malleolus.Lat",
+            "malleolus_medial": "MAnkle MANK AnkleMed Med.Ankle Medial.Ankle Ankle.Medial AnkleIn AnkleInt ANKIn ANKMed ANKM MMAL "
+            "MMall MMA MM TAM ANM MED.MAL Malleolus.Med",
             "heel_marker": "Heel HEE HEEL CAL CALC CA FCC PCA Heel.Back Heel.Bottom Heel.Top Calcaneus HL",
             "heel_lateral": "LCA Heel.Lateral Heel.Lat",
             "heel_medial": "STL MCA Heel.Medial Heel.Med",
             "midfoot_medial": "NAV P1M Midfoot.Med P1MT Navicular",
             "midfoot_lateral": "P5M P5MT Styloid CUB Cuboid",
-            "metatarsal_1": "MT1 1MT M1 FM1 FM FMH MH1 D1M D1MT META1 1META MET1 MTP1 1MTP 1MTH MTH1 1MHD 1MET Forefoot.In",
-            "metatarsal_2": "Toe TOE FM2 SM SMH MH2 D2M D2MT 2MT M2 META2 2META MET2 MTP2 MTH2 2MTH 2MHD Forefoot FT23",
-            "metatarsal_5": "MT5 5MT M5 FM5 VM VMH MH5 D5M D5MT META5 5META MET5 MTP5 5MTP 5MTH MTH5 5MHD 5MET Forefoot.Out",
+            "metatarsal_1": "MT1 1MT M1 FM1 FM FMH MH1 D1M D1MT META1 1META MET1 MTP1 1MTP 1MTH MTH1 1MHD 1MET Forefoot.In "
+            "MT1 1MT M1 FM1 FM FMH MH1 D1M D1MT META1 1META MET1 MTP1 1MTP 1MTH MTH1 1MHD 1MET Forefoot.In",
+            "metatarsal_2": "Toe TOE FM2 SM SMH MH2 D2M D2MT 2MT M2 META2 2META MET2 MTP2 MTH2 2MTH 2MHD Forefoot FT23 "
+            "Toe TOE FM2 SM SMH MH2 D2M D2MT 2MT M2 META2 2META MET2 MTP2 MTH2 2MTH 2MHD Forefoot FT23",
+            "metatarsal_5": "MT5 5MT M5 FM5 VM VMH MH5 D5M D5MT META5 5META MET5 MTP5 5MTP 5MTH MTH5 5MHD 5MET Forefoot.Out "
+            "MT5 5MT M5 FM5 VM VMH MH5 D5M D5MT META5 5META MET5 MTP5 5MTP 5MTH MTH5 5MHD 5MET Forefoot.Out",
             "toe_tip": "Toe.Tip Hallux HLX HAL HX TTIP BigToe Big.Toe",
             "acromion": "Shoulder SHO ACR Acromion Acromium AC ACRO SAE SHLD ACJ Shoulder.Top Acr SHOULD",
             "shoulder_front": "ASH",
@@ -225,10 +228,13 @@ OTHERS: dict[str, Meaning] = {
             "biceps": "Biceps Bicep BIC",
             "elbow_lateral": "Elbow ELB LEL LElbow LELB ELBL ElbowLat Elbow.Lateral Lat.Elbow ElbowOut ELBLat ELBOut HLE EL "
             "HEL LHE LEH",
-            "elbow_medial": "MElbow MELB MEL ELBM ElbowMed Elbow.Medial Med.Elbow ElbowIn ELBMed ELBIn HME EM HEM MHE MEH",
+            "elbow_medial": "MElbow MELB MEL ELBM ElbowMed Elbow.Medial Med.Elbow ElbowIn ELBMed ELBIn HME EM HEM MHE MEH "
+            "MElbow MELB MEL ELBM ElbowMed Elbow.Medial Med.Elbow ElbowIn ELBMed ELBIn HME EM HEM MHE MEH",
             "forearm": "Forearm FRM FRA FA FArm Fore.Arm FASuperior FA1 FA2 FA3 LARM",
-            "radius": "WRA LWrist RSP RS FARadius Radius RAD WristRad Wrist.Radius WRR WRIL Wrist.Lateral WristThumb WristIn WRT RST",
-            "ulna": "WRB MWrist USP US FAUlna Ulna ULN WristUln Wrist.Ulna WRU WRIM Wrist.Medial WristPinky WristOut UST",
+            "radius": "WRA LWrist RSP RS FARadius Radius RAD WristRad Wrist.Radius WRR WRIL Wrist.Lateral WristThumb "
+            "WristIn WRT RST",
+            "ulna": "WRB MWrist USP US FAUlna Ulna ULN WristUln Wrist.Ulna WRU WRIM Wrist.Medial WristPinky WristOut "
+            "UST",
             "wrist_back": "Wrist WRI WR",
             "hand_back": "Hand FIN HAND HM2 MC2 MCP2 MC3 MCP3 M3 HandIn Finger HM3 Hand.Back",
             "hand_back_5": "HM5 MC5 MCP5 HandOut",
@@ -265,19 +271,13 @@ OTHERS: dict[str, Meaning] = {
     # Clusters on plates and wands: every laboratory has them elsewhere on the part.
     **_aliases(
         {
-            "thigh": " ".join(
-                [
-                    *(f"TH{n} Thigh{n} THI{n} TC{n} FT{n}" for n in range(1, 6)),
-                    "Thigh THI THIGH",
+            "thigh": " TH{n} Thigh{n} THI{n} TC{n} FT{n}Thigh THI THIGH",
                     *(f"Thigh.{a}.{b}" for a in ("Top", "Bottom") for b in ("Lateral", "Medial")),
                     "Thigh.Upper Thigh.Front Thigh.Rear Thigh.Lower Thigh.Lat Thigh.Front.Low FPL FAL1",
                 ]
             ),
-            "shank": " ".join(
-                [
-                    *(f"SH{n} Shank{n} TB{n} TIB{n} SK{n} SHK{n} Tibia{n}" for n in range(1, 6)),
-                    *(f"Shank.{a}.{b}" for a in ("Top", "Bottom") for b in ("Lateral", "Medial")),
-                    "Shank TIB SHANK SHK Tibia Shank.Upper Shank.Front Shank.Rear Shank.Lower Shank.AntSup TPL",
+            "shank": " SH{n} Shank{n} TB{n} TIB{n} SK{n} SHK{n} Tibia{n}Shank.{a}.{b}TopBottomLateralMedialShank TIB "
+            "SHANK SHK Tibia Shank.Upper Shank.Front Shank.Rear Shank.Lower Shank.AntSup TPL",
                 ]
             ),
         }
