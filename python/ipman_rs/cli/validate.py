@@ -32,7 +32,7 @@ from .fit import needs
 def validate(folder: Path, output: Path, model: str, person: str, rate: float, fresh: bool) -> None:
     """Compare the engine's centre of mass, centre of pressure and pressure with measurements.
 
-    FOLDER holds recordings of one person: markers (.trc, or .c3d with the extra c3d), force plates (.mot, or those of
+    FOLDER holds recordings of one person: markers (.trc, or .c3d), force plates (.mot, or those of
     the .c3d) and centres of mass by others, such as OpenSim's (.sto, or .csv with columns time_s, com_x_m, com_y_m,
     com_z_m; y up). A file belongs to the recording whose name is in its own: squats.trc, squats_grf.mot,
     squats_com.sto. Bodies are fitted to the markers alone, as by `ipman fit`, and are kept: run it again and it goes on

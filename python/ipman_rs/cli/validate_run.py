@@ -64,7 +64,7 @@ def run(plan: Plan) -> tuple[list[Record], list[str], list[FileError]]:
     for trial in plan.trials:
         try:
             tracks = _tracks(trial)
-            every = max(1, round(_rate(tracks) / plan.rate))
+            every = max(1, round((tracks.rate or 1.0) / plan.rate))
             recording = Recording(trial.name, str(trial.markers), [trial.markers])
             fit = kept(recording, plan.settings, Pace(every), plan.output, plan.resume, person)
             if trial.name == plan.person:
@@ -84,10 +84,6 @@ def _tracks(trial: Trial) -> Tracks:
         return markers.read(trial.markers)
     except (ValueError, ImportError) as error:
         raise FileError(trial.markers, str(error)) from error
-
-
-def _rate(tracks: Tracks) -> float:
-    return 1 / float(np.median(np.diff(tracks.times))) if len(tracks) > 1 else 1.0
 
 
 def _compared(plan: Plan, trial: Trial, tracks: Tracks, fit: Record) -> Record:

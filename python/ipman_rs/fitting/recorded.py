@@ -125,7 +125,7 @@ def fit_tracks(
     start = at_points(problem)
     if betas is not None:
         start["betas"] = betas.expand(len(tracks), -1).clone()
-    rate = rate_of(tracks.times) or 1.0
+    rate = tracks.rate or 1.0
     found = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
     return Recorded(found, tracks, sites, unknown, unseen, markers.meanings(tracks.names, own))
 
@@ -134,12 +134,6 @@ def seen_names(tracks: markers.Tracks) -> tuple[tuple[str, ...], tuple[str, ...]
     """The markers that were ever seen, and those that are only in the file."""
     seen = tracks.confidence.any(axis=0)
     return tuple(np.array(tracks.names)[seen].tolist()), tuple(np.array(tracks.names)[~seen].tolist())
-
-
-def rate_of(times: NDArray[np.float64]) -> float:
-    """Frames a second by the first and the last time, for those between are often rounded; 0 of a single one."""
-    lasted = float(times[-1] - times[0]) if len(times) > 1 else 0.0
-    return (len(times) - 1) / lasted if lasted > 0 else 0.0
 
 
 def _shape_kept(config: Config) -> Config:

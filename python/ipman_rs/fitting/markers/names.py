@@ -11,7 +11,8 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from .sets import KEYPOINTS, MARKERS, Meaning
+from .aliases import KEYPOINTS
+from .sets import MARKERS, Meaning
 
 SHARED = 0.5  # of a file's names: a beginning or an end that so many have says nothing
 FEWEST = 3
@@ -23,7 +24,8 @@ SIDES = {"l": "l", "left": "l", "r": "r", "right": "r"}
 # Ends that say where a marker is, though many names may have them.
 TELLING = {
     "l", "r", "left", "right", "lat", "med", "lateral", "medial", "in", "out", "int", "ext", "jc", "joint", "centre",
-    "center", "reg", "sup", "inf", "ant", "post", "up", "front", "rear", "top", "bottom", "upper", "lower", "x", "y", "z",
+    "center", "reg", "sup", "inf", "ant", "post", "up", "front", "rear", "top", "bottom", "upper", "lower", "x", "y",
+    "z",
 }  # fmt: skip
 
 
@@ -99,7 +101,8 @@ def _shared_ends(names: Sequence[str]) -> tuple[list[str], list[str]]:
     """The beginnings ("Subject_") and ends ("_study") that most of these names share, with their punctuation."""
     names = [name.rpartition(":")[2] for name in names]
     enough = max(FEWEST, SHARED * len(names))
-    first = Counter(match[0] for name in names if (match := re.match(r"[^\W_]+[\W_]+(?=\w)", name)))
+    words = r"(?:[^\W_]+[\W_]+){%d}(?=\w)"
+    first = Counter(match[0] for n in (3, 2, 1) for name in names if (match := re.match(words % n, name)))
     last = Counter(match[0] for name in names if (match := re.search(r"(?<=\w)[\W_]+[^\W_]+$", name)))
     beginnings = [text for text, count in first.items() if count >= enough and not _telling(text)]
     endings = [

@@ -80,15 +80,9 @@ def _object(path: Path, text: str) -> dict[str, Any]:
 
 
 def _rows(path: Path, text: str) -> dict[str, Any]:
-    rows = [
-        [cell.strip() for cell in row] for row in csv.reader(text.splitlines()) if any(cell.strip() for cell in row)
-    ]
-    if rows and [cell.lower() for cell in rows[0]] in (
-        ["marker", "place"],
-        ["marker", "site"],
-        ["name", "place"],
-        ["name", "site"],
-    ):
+    rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines())]
+    rows = [row for row in rows if any(row)]
+    if rows and rows[0][0].lower() in ("marker", "name") and rows[0][-1].lower() in ("place", "site"):
         rows = rows[1:]
     for number, row in enumerate(rows, 1):
         if len(row) != 2:
