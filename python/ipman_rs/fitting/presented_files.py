@@ -67,7 +67,8 @@ def read(path: Path, body: BodyModel, frame: int | None = None, up: Axis | None 
         )
     length = max(len(piece.rotations) for piece in pieces)
     row = _row(stored, length, frame)
-    pose = pose_arrays.place(pieces, body.joint_names, length)[row]
+    own_mean = None if stored.is_absolute else body.pose_mean
+    pose = pose_arrays.place(pieces, body.joint_names, length, own_mean)[row]
     _check_angles(stored, pose)
     if stored.is_absolute:
         pose = pose - body.pose_mean
