@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import FileError
-from .options import FLOOR, SIZE, UP, Setting, of_unknown_camera
+from .options import FLOOR, METRES, SIZE, UNIT, UP, Setting, force, of_unknown_camera, rate
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -67,6 +67,25 @@ if TYPE_CHECKING:
 @click.option("--image", type=click.Path(path_type=Path), metavar="PHOTO", help="Photo to draw under a keypoint file.")
 @click.option("--image-size", type=SIZE, metavar="WxH", help="Pixels of the image, where a keypoint file does not say.")
 @click.option("--person", type=int, metavar="N", help="Which person of a file, from 0. Default: the most visible.")
+@click.option(
+    "--up", type=UP, metavar="AXIS",
+    help="What points up in a marker file: x, y, z, -x, -y, -z, or a normal; the bodies are y up. Default: y for .trc, "
+    "what it says for .c3d.",
+)  # fmt: skip
+@click.option(
+    "--units", type=UNIT, metavar="UNIT",
+    help=f"Unit of the lengths in a marker file: {', '.join(METRES)}, or a number of metres. Default: what it says.",
+)  # fmt: skip
+@rate
+@click.option(
+    "--markers", type=click.Path(path_type=Path), metavar="FILE",
+    help="Places of markers with other names: a JSON or YAML object, or a CSV file, of names and places.",
+)  # fmt: skip
+@click.option(
+    "--marker-places", is_flag=True, is_eager=True, expose_value=False, callback=lambda *given: _list_places(*given),
+    help="List the places that --markers can name, and end.",
+)  # fmt: skip
+@force
 @click.option("--subject", metavar="NAME", help="Whose markers (NAME:LASI), where a marker file has several people's.")
 @click.option("--obj", is_flag=True, help="Write meshes as .obj, too, not only as .glb.")
 @click.option(
@@ -137,6 +156,7 @@ def fit(
     ipman fit yoga.json -o out --preset ipman-o --pose shown.npz --height 1.7 --mass 62
     ipman fit frames/ -o out --sequence --fps 25    one person over time, with one shape
     ipman fit squats.trc -o out --every 5           optical markers, by the preset markers
+    ipman fit lab.trc -o out --up z --units mm --markers names.json           that does not say what it is
     ipman fit --data moyo --path MOYO/ --models models/ -o out/ipman-o        Table 2: then ipman evaluate --table moyo
     ipman fit --data rich --path RICH/ --models models/ -o out/ipman-o-star   and --table rich-o-star
 
@@ -157,6 +177,9 @@ def fit(
     options["preset"], options["model"] = options["preset"] or "fast", options["model"] or "anny-lite"
     reading = Reading(options.pop("person"), options.pop("image_size"), image)
     items, tracks, failures = _items(inputs, reading)
+    said = next((name for name in ("up", "units", "rate", "markers") if options[name] is not None), None)
+    if said and not tracks and not failures:
+        raise click.UsageError(f"--{said} belongs to marker files (.trc, .c3d), of which there are none")
     chosen = _settings(options)
     if fps <= 0:
         raise click.UsageError(f"--fps: expected more than 0, got {fps}")
@@ -181,6 +204,18 @@ def fit(
             console.print_table(recorded)
         console.say(f"report: {page}")
     sys.exit(1 if failures else 0)
+
+
+def _list_places(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if not wanted or context.resilient_parsing:
+        return
+    needs("torch", "roma", "yaml")
+    import ipman_rs as ip
+
+    from ..fitting.markers import places
+
+    click.echo("\n".join(places(ip.load_body("anny-lite"))))
+    context.exit()
 
 
 def needs(*modules: str) -> None:

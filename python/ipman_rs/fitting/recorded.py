@@ -16,14 +16,16 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 import ipman_rs.torch as ipt
+from ipman_rs.data import judge
+from ipman_rs.data.check import Finding
 
 from . import markers
 from .camera import Camera
 from .config import Config, load
 from .fit import Fit
 from .landmarks import Landmarks
+from .markers import judged
 from .markers.calibration import calibrated, certainty
-from .markers.judged import on_skin
 from .markers.sets import Meaning
 from .markers.skin_distance import mean_distances
 from .problem import Problem
@@ -31,6 +33,7 @@ from .sequence import fit_sequence
 from .start import at_points
 
 FEWEST = 6  # known markers, without which a body is a guess
+WEIGHED = 8  # bodies
 POSES = 24  # of the recording, spread over it, that say where the markers are
 
 
@@ -71,7 +74,7 @@ class Recorded:
     def skin_distances(self) -> dict[str, float]:
         """The mean distance of each marker from the skin of the fitted bodies, m, outwards; without those whose places
         are inside the body, and without plates and wands, which stand off it."""
-        names = [name for name in self.tracks.names if on_skin(self.meanings[name])]
+        names = [name for name in self.tracks.names if judged.on_skin(self.meanings[name])]
         some = self.tracks.select(names)
         with torch.no_grad():
             vertices = self.fit.candidate.vertices.numpy()
@@ -128,6 +131,30 @@ def fit_tracks(
     rate = tracks.rate or 1.0
     found = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
     return Recorded(found, tracks, sites, unknown, unseen, markers.meanings(tracks.names, own))
+
+
+def judged_tracks(
+    tracks: markers.Tracks, own: Mapping[str, Meaning | None] | None = None, up_is_said: bool = False
+) -> list[Finding]:
+    """What the judge of all doors says of a recording before its fit: names, coverage, size, place, stance, rate."""
+    seen, _ = seen_names(tracks)
+    meant = markers.meanings(seen, own)
+    unknown = [name for name in seen if name not in meant]
+    found = judge.known_markers([*meant], unknown, FEWEST) + judged.of_rate(tracks)
+    if not meant:
+        return found
+    return found + judged.coverage([*meant], meant) + judged.of_points(tracks, meant, up_is_said)
+
+
+def judged_fit(recorded: Recorded) -> list[Finding]:
+    """What it says of the fit: the markers' mean distance from their places, and the person's mass."""
+    with torch.no_grad():
+        vertices = recorded.fit.candidate.vertices[:: max(1, len(recorded.tracks) // WEIGHED)]
+        mass = ipt.mass_properties(vertices, recorded.fit.problem.body.template).mass.numpy()
+    errors = recorded.errors
+    known = errors[np.isfinite(errors)]
+    found = judge.marker_error(float(known.mean())) if len(known) else []
+    return found + judge.mass(float(np.median(mass)))
 
 
 def seen_names(tracks: markers.Tracks) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -9,12 +9,12 @@ observed = tracks.select(landmarks.names)
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from ipman_rs.body import BodyModel
 from ipman_rs.data import c3d, trc
-from ipman_rs.data.tracks import Tracks
+from ipman_rs.data.tracks import Tracks, turned
 
 from ..landmarks import Inner, Point, Site
 from ..surface import SIDES
@@ -27,16 +27,25 @@ READERS: dict[str, Callable[..., Tracks]] = {".trc": trc.read, ".c3d": c3d.marke
 __all__ = ["MARKERS", "READERS", "Inner", "Point", "Site", "Tracks", "meanings", "places", "read", "sites"]
 
 
-def read(path: str | os.PathLike[str], up: str | None = None, subject: str | None = None) -> Tracks:
+def read(
+    path: str | os.PathLike[str],
+    up: str | Sequence[float] | None = None,
+    subject: str | None = None,
+    unit: float | None = None,
+    rate: float | None = None,
+) -> Tracks:
     """The markers of a `.trc` or `.c3d` file in metres, y up; its `notes` say what was left out or mended.
 
-    `up`: which axis of the file is up, if it does not say so rightly. `subject`: whose markers, where the file has
-    those of several people ("S01:LASI"). ValueError, naming the file, for whatever is not right.
+    What the file does not say, or not rightly: `up`, which axis is up, "x", "y" or "z", or a direction (3,) in the
+    file's axes; `unit`, metres in one of its lengths; `rate`, Hz. `subject`: whose markers, where the file has those of
+    several people ("S01:LASI"). ValueError, naming the file, for whatever is not right.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in READERS:
         raise ValueError(f"{path}: expected a file of markers ({', '.join(READERS)}), got {suffix or 'no ending'}")
-    return READERS[suffix](Path(path), up, subject)
+    if up is None or isinstance(up, str):
+        return READERS[suffix](Path(path), up, subject, unit, rate)
+    return turned(READERS[suffix](Path(path), "y", subject, unit, rate), up)
 
 
 def sites(

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.data import check
+from ipman_rs.data import check, judge
 from ipman_rs.data.check import Finding
-from ipman_rs.data.tracks import Tracks
+from ipman_rs.data.tracks import TO_Y_UP, Tracks
 from ipman_rs.ground import Ground
 
 from .anatomy import ANYWHERE, MIDDLE, SIDED, SPREAD
@@ -53,22 +52,44 @@ def _without_side(name: str) -> str:
     return name.removeprefix("left_").removeprefix("right_")
 
 
-def of_points(
-    tracks: Tracks, meanings: Mapping[str, Meaning], up: Sequence[float] | None = (0.0, 1.0, 0.0)
-) -> list[Finding]:
-    """Size, place and stance of the markers whose places are known; `up` (3,) is theirs, None: the user has said it."""
+def of_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool = False) -> list[Finding]:
+    """Size, place and stance of the markers whose places are known; `up_is_said`: by the user, who knows.
+
+    Axes are the file's own: option `--up` names them.
+    """
     known = tracks.select([name for name in tracks.names if name in meanings])
     rows = rows_to_judge(known)
     points = np.where(known.confidence[rows, :, None] > 0, known.points[rows], np.nan)
-    points = points[np.isfinite(points).any(axis=(1, 2))]
     if not len(points):
         return []
-    found = check.size_of_body("markers", points)
-    if found[0].level == "wrong":
+    found = of_size(points, known.unit)
+    if any(each.level == "wrong" for each in found):
         return found
-    away = check.place("markers", np.nanmean(points, axis=1))
-    stance = [] if up is None else check.upright("markers", ways(points, known, meanings), Ground(np.array(up)))
-    return found + away + stance
+    with np.errstate(invalid="ignore"):
+        found += check.place("markers", points[np.isfinite(points).all(axis=-1)])
+    rotation = TO_Y_UP[tracks.up]
+    up = ways(points @ rotation, known, meanings)
+    return found + ([] if up_is_said else check.upright("markers", up, Ground(rotation[1])))
+
+
+def of_size(points: Array, unit: float) -> list[Finding]:
+    """Whether points (T, M, 3) m of a person can be, that were given in units of so many metres."""
+    found = check.size_of_body("markers", points)
+    if not any(each.level == "wrong" for each in found):
+        return found
+    fits = [
+        name
+        for name, metres in (("m", 1.0), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254))
+        if check.size_of_body("markers", points / unit * metres)[0].level == "ok"
+    ]
+    if not fits:
+        return found
+    said = found[0].what.rpartition(": ")[2]
+    return [Finding("wrong", f"markers: {said}, if the file's unit is right", option=f"--units {fits[0]}")]
+
+
+def of_rate(tracks: Tracks) -> list[Finding]:
+    return judge.rate(tracks.rate) if len(tracks) > 1 else []
 
 
 def rows_to_judge(tracks: Tracks) -> NDArray[np.int64]:
@@ -122,15 +143,3 @@ def of_skin(distances: Mapping[str, float]) -> list[Finding]:
     said = ", ".join(f"{name} {1e3 * off[name]:+.0f} mm" for name in worst[:6]) + (", …" if len(off) > 6 else "")
     what = f"{len(off)} of {len(distances)} markers are not on the skin of the fitted body ({said}; 7 to 15 is usual)"
     return [Finding("odd", what, "are they where their names say? (--markers)")]
-
-
-def turned(tracks: Tracks, normal: Sequence[float]) -> Tracks:
-    """The tracks with this direction of theirs, (3,), turned to +y by the shortest way."""
-    up = np.asarray(normal, float) / np.linalg.norm(normal)
-    axis = np.cross(up, [0.0, 1.0, 0.0])
-    if up[1] < -1 + 1e-12:
-        rotation = np.diag([1.0, -1.0, -1.0])
-    else:
-        skew = np.cross(np.eye(3), axis)
-        rotation = np.eye(3) + skew + skew @ skew / (1 + up[1])
-    return replace(tracks, points=tracks.points @ rotation.T)
