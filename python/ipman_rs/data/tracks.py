@@ -78,8 +78,8 @@ def tracks(
 ) -> Tracks:
     """From a file's own numbers: NaN, exactly the origin, or a number that stands for it is a marker that was not seen.
 
-    `unit`: its name, or metres in one; "" is guessed. Names as `named` has them. ValueError for an unknown unit, axis or
-    subject, for no marker or sample, for two people, if nothing was seen, and for infinite coordinates.
+    `unit`: its name, or metres in one; "" is guessed. Names as `named` has them. ValueError for an unknown unit, axis
+    or subject, for no marker or sample, for two people, if nothing was seen, and for infinite coordinates.
     """
     if up not in TO_Y_UP:
         raise ValueError(f"{source}: up: expected x, y or z, got {up!r}")
