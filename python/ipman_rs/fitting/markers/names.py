@@ -55,7 +55,8 @@ def meanings(names: Sequence[str], own: Mapping[str, Meaning | None] | None = No
     by "RKnee".
     """
     given = {plain(name): meaning for name, meaning in (own or {}).items()}
-    ways = [_variants(name, _shared_ends(names)) for name in names]
+    ends = _shared_ends(names)
+    ways = [_variants(name, ends) for name in names]
     points = {"lhip", "rhip"} <= {plain(name) for name in names}
     found = _found(names, ways, given, _KNOWN, skipped=_KEYPOINTS if points else {})
     if points and len(found) < FEWEST_MARKERS:
