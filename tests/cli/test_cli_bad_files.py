@@ -112,7 +112,7 @@ def test_one_line(run, tmp_path, name):
         ("parts.json", b"[0, 1]", "2 labels for 12 faces"),
         ("parts.npy", b"\x93NUMPY", "no readable .npy"),
         ("parts.txt", b"0", "expected JSON"),
-        ("missing.json", None, "no such parts file"),
+        ("missing.json", None, "there is no such file"),
     ],
 )
 def test_bad_parts(run, tmp_path, name, content, said):

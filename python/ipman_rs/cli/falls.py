@@ -12,6 +12,7 @@ import numpy as np
 from .. import view
 from ..analysis import PIECE
 from ..body.sequence import pieces
+from ..files import being_written, write_whole
 from ..ground import Ground
 from ..plain import plain
 from ..simulation import FALLEN, VERDICT, Simulation, TipTest, simulate, tip_test
@@ -239,13 +240,14 @@ def _film(result: Fall, body: np.ndarray, frame: int, template: Any, ground: Any
 def write_falls(falls: Sequence[Fall], output: Path, record: str) -> None:
     """simulation.json of all files; simulation.npz and filmstrips of each, in folders where there are several."""
     output.mkdir(parents=True, exist_ok=True)
-    (output / "simulation.json").write_text(record + "\n", encoding="utf-8")
+    write_whole(output / "simulation.json", record + "\n")
     names = safe_names([one.path.stem for one in falls])
     with console.progress("writing", sum(1 + len(one.films) for one in falls)) as bar:
         for one, name in zip(falls, names, strict=True):
             folder = output if len(falls) == 1 else output / name
             folder.mkdir(exist_ok=True)
-            np.savez_compressed(folder / "simulation.npz", allow_pickle=False, **one.arrays())
+            with being_written(folder / "simulation.npz") as file:
+                np.savez_compressed(file, allow_pickle=False, **one.arrays())
             bar.one()
             for film in one.films:
                 end = "" if one.count == 1 else f"_{film.frame:0{len(str(one.count))}d}"

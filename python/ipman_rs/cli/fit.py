@@ -66,7 +66,10 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option("--image", type=click.Path(path_type=Path), metavar="PHOTO", help="Photo to draw under a keypoint file.")
 @click.option("--image-size", type=SIZE, metavar="WxH", help="Pixels of the image, where a keypoint file does not say.")
-@click.option("--person", type=int, metavar="N", help="Which person of a file, from 0. Default: the most visible.")
+@click.option(
+    "--person", type=int, metavar="N",
+    help="Which person of an image, from 0, or which track of a file that follows people. Default: the most visible.",
+)  # fmt: skip
 @click.option(
     "--up", type=UP, metavar="AXIS",
     help="What points up in a marker file: x, y, z, -x, -y, -z, or a normal; the bodies are y up. Default: y for .trc, "
@@ -138,8 +141,8 @@ def fit(
 ) -> None:
     """Fit a body to each photo, set of keypoints or marker recording, with intuitive physics.
 
-    INPUT is a photo (.png .jpg; needs the extra photo), a keypoint file (.json of OpenPose, COCO, COCO-WholeBody or
-    MediaPipe), a marker file (.trc, .c3d), or a folder of them. Every person is fitted for
+    INPUT is a photo (.png .jpg; needs the extra photo), a keypoint file (.json of OpenPose, MMPose, AlphaPose, COCO
+    or MediaPipe), a marker file (.trc, .c3d), or a folder of them. Every person is fitted for
     themselves, but for the frames of a --sequence; of several in one image one is taken. In OUTPUT every item gets a
     folder with its parameters (.npz, for `ipman analyze`), mesh (.glb), fit.json and pictures; report.html and
     report.json tell of all.
@@ -175,7 +178,7 @@ def fit(
         where = {"name": data, "path": str(path), "split": split, "options": settings}
         sys.exit(fit_data(where, output, models, keypoints, image_folder, every, options))
     options["preset"], options["model"] = options["preset"] or "fast", options["model"] or "anny-lite"
-    reading = Reading(options.pop("person"), options.pop("image_size"), image)
+    reading = Reading(options.pop("person"), options.pop("image_size"), image, sequence, options["force"])
     items, tracks, failures = _items(inputs, reading)
     said = next((name for name in ("up", "units", "rate", "markers") if options[name] is not None), None)
     if said and not tracks and not failures:
@@ -274,12 +277,17 @@ def _recordings(
 
 
 def _settings(options: dict[str, Any]) -> Settings:
+    import ipman_rs as ip
+
     from ..fitting import camera_file, config
+    from ..fitting.markers import own
     from .fit_run import Settings
 
     try:
         options["camera"] = None if options["camera"] is None else camera_file.read(options["camera"])
         chosen, most = config.load(options.pop("preset")), options.pop("iterations")
+        if options["markers"] is not None:
+            own.read(options["markers"], ip.load_body(options["model"]))  # before anything is fitted
         return Settings(config=chosen if most is None else config.capped(chosen, most), **options)
     except ValueError as error:
         raise click.UsageError(str(error)) from error

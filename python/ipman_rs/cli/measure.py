@@ -193,7 +193,7 @@ def _template(recording: Recording, request: Request) -> tuple[Any, list[str]]:
     if first is None:
         raise FileError(recording.path, "no frame has finite vertices only; export it again")
     if request.parts is not None:
-        face_parts, names = read_parts(request.parts, faces, recording.vertex_map)
+        face_parts, names = read_parts(request.parts, faces, recording.vertex_map, recording.face_map)
         template = ip.BodyTemplate(first, faces, face_parts, names)
         return template, [f"parts: {len(names)} from {request.parts}"]
     body = match_body(faces, len(first), request.model or "anny")

@@ -14,8 +14,8 @@ from ..body.joints import LEFT_HAND, RIGHT_HAND
 from ..body.sequence import Index, PosedSequence, rows_of
 from ..data import check, judge
 from ..data.check import Finding
+from ..io import repair
 from .errors import FileError
-from .meshes import join_seams
 from .parts import match_body
 from .recording import Y_UP, Z_UP, Recording
 
@@ -136,14 +136,18 @@ def _read_vertices(stored: _Npz, model: str, unit: float, rate: float | None) ->
     faces = faces.astype(np.int64)
     if faces.min() < 0 or faces.max() >= vertices.shape[1]:
         raise FileError(stored.path, f"faces name vertex {faces.max()}, but there are {vertices.shape[1]} vertices")
-    vertex_map = None
-    if len(vertices) == 1 and match_body(faces, vertices.shape[1], model) is None:
-        joined, faces, vertex_map = join_seams(vertices[0], faces)
-        vertices = joined[None]
+    mesh = repair.Mesh(vertices[0], faces)
+    if match_body(faces, vertices.shape[1], model) is None:
+        mesh = repair.without_unused(repair.welded(mesh) if len(vertices) == 1 else mesh)
+    if len(vertices) == 1:
+        vertices = mesh.vertices[None]
+    elif mesh.vertex_map is not None:
+        vertices = vertices[:, mesh.vertex_map >= 0]
     seconds, findings = _seconds(stored, len(vertices), rate)
     return Recording(
-        stored.path, vertices, faces, vertex_map=vertex_map, seconds=seconds, up=Y_UP, findings=tuple(findings)
-    )
+        stored.path, vertices, mesh.faces, vertex_map=mesh.vertex_map, face_map=mesh.face_map, seconds=seconds,
+        up=Y_UP, notes=mesh.notes, findings=tuple(findings),
+    )  # fmt: skip
 
 
 def _read_parameters(stored: _Npz, model: str, unit: float, degrees: bool, rate: float | None) -> Recording:

@@ -19,7 +19,8 @@ class Recording:
     """``vertices`` (T, V, 3) m, or bodies that are posed when they are needed, and ``faces`` (F, 3).
 
     ``template`` when the file's body model has one; ``vertex_map`` (N,) the vertex that each vertex of the file became,
-    where some were merged; ``seconds`` (T,) of a sequence; ``up`` what the file's kind has pointing up, ``up_why`` why.
+    −1 for those left out, and ``face_map`` (F,) the triangle of the file that each face was, where the mesh was
+    repaired; ``seconds`` (T,) of a sequence; ``up`` what the file's kind has pointing up, ``up_why`` why.
     ``unused``: names of arrays of the file that were not read; ``findings``: what its reader judged, and ``flags``, in
     words, what is odd about its bodies.
     """
@@ -29,6 +30,7 @@ class Recording:
     faces: np.ndarray
     template: Any = None
     vertex_map: np.ndarray | None = None
+    face_map: np.ndarray | None = None
     seconds: np.ndarray | None = None
     up: tuple[float, float, float] = Y_UP
     up_why: str = ""

@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from ..body import safe_npz
 from ..data.tracks import Tracks
+from ..files import write_whole
 from ..fitting import config, markers
 from ..fitting.recorded import FEWEST
 from ..validation import Comparison, computed, figures, measured, pictures, report
 from ..validation.folder import Trial, find
 from . import console
 from .errors import FileError
-from .fit_outputs import npz, write_whole
+from .fit_outputs import npz
 from .fit_recordings import Pace, Recording, kept
 from .fit_run import Settings
 from .parameters import read_npz
@@ -90,8 +92,7 @@ def _compared(plan: Plan, trial: Trial, tracks: Tracks, fit: Record) -> Record:
     """The figures of a fitted recording; its series and pictures are written."""
     folder = plan.output / trial.name
     stored = read_npz(folder / f"{trial.name}.npz", plan.settings.model)
-    with np.load(folder / f"{trial.name}.npz", allow_pickle=False) as arrays:
-        times = arrays["times"]
+    times = safe_npz.read(folder / f"{trial.name}.npz", "times")
     bodies, template = stored.vertices, stored.template
     plates, reference = _measured(trial, times)
     with console.progress(f"measuring {trial.name}", len(times)) as step:

@@ -29,6 +29,13 @@ SMALLEST_TURN = 0.12  # rad, 7 degrees: the largest turn in a pose of a person i
 LIES = 0.4  # of its length: a body whose height is less
 NEAR = 0.15  # m: what is within it of the lowest point can carry the body
 
+SURE = 0.5  # confidence of a keypoint
+FEWEST_POINTS = 4  # of a person in an image that say something about them
+RELATIVE = 3.0  # a keypoint no farther from the image's corner is a share of its size, not pixels
+FLAT = 0.01  # breadth of a person's keypoints by their length: none is on one line
+AROUND = 0.1  # of the image's size: how far detectors guess points outside it
+SMALL_PERSON = 24.0  # pixels
+
 Array = NDArray[np.floating[Any]]
 
 
@@ -219,3 +226,35 @@ def known_markers(known: Sequence[str], unknown: Sequence[str], fewest: int = 6)
 
 def _some(names: Sequence[str], most: int = 8) -> str:
     return ", ".join(names[:most]) + (", …" if len(names) > most else "")
+
+
+def keypoints(points: Array, size: Array) -> list[Finding]:
+    """Whether points (K, 3) of one person, x and y in pixels and confidence, can lie in an image of `size` (2,).
+
+    Those that the detector is sure of are judged, all that were seen where it is sure of few.
+    """
+    sure = points[:, 2] > SURE
+    seen = np.asarray(points[sure if sure.sum() >= FEWEST_POINTS else points[:, 2] > 0, :2], np.float64)
+    if len(seen) < FEWEST_POINTS:
+        return []
+    image = f"{size[0]:g} × {size[1]:g} pixels"
+    extent = float(np.ptp(seen, axis=0).max())
+    if extent == 0:
+        return [Finding("wrong", f"all {len(seen)} points lie at one place, ({seen[0, 0]:g}, {seen[0, 1]:g})")]
+    if abs(seen).max() <= RELATIVE and min(size) > SMALL_PERSON:
+        said = f"points of {seen.min():.3g} to {seen.max():.3g} look relative to the image"
+        return [Finding("wrong", said, "multiply them by its width and height")]
+    spread = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
+    if spread[1] < FLAT * spread[0]:
+        said = f"all {len(seen)} points lie on one line"
+        return [Finding("wrong", said, "are x and y columns of their own in the file?")]
+    outside = ((seen < -AROUND * size) | (seen > (1 + AROUND) * size)).any(axis=1)
+    if 2 * outside.sum() > len(seen):
+        x, y = seen[:, 0], seen[:, 1]
+        said = f"{outside.sum()} of {len(seen)} points lie outside the image of {image}"
+        said += f": x from {x.min():.0f} to {x.max():.0f}, y from {y.min():.0f} to {y.max():.0f}"
+        return [Finding("wrong", said, "is that its size? (--image-size WxH)")]
+    if extent < SMALL_PERSON:
+        said = f"the person is {extent:.2g} pixels large in an image of {image}"
+        return [Finding("odd", said, "is that its size? (--image-size WxH)")]
+    return [Finding("ok", f"keypoints: a person of {extent:.0f} pixels in an image of {image}")]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 from typing import Any
 
 from ipman_rs.body import BodyModel
+from ipman_rs.files import read_bytes, read_json, read_yaml
 
 from .names import meanings
 from .sets import Meaning
@@ -47,39 +47,27 @@ def _meaning(what: str, place: Any, body: BodyModel) -> Meaning | None:
 
 
 def _pairs(path: Path) -> dict[str, Any]:
-    if path.suffix.lower() not in ENDINGS:
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
         raise ValueError(f"{path}: expected a file of marker names ({', '.join(ENDINGS)})")
-    try:
-        if path.is_file() and path.stat().st_size > LARGEST:
-            raise ValueError(f"{path}: expected up to {LARGEST} bytes of marker names, got {path.stat().st_size}")
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise ValueError(f"{path}: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise ValueError(f"{path}: expected text in UTF-8") from None
-    pairs = _rows(path, text) if path.suffix.lower() == ".csv" else _object(path, text)
+    if ending == ".csv":
+        pairs = _rows(path, read_bytes(path, LARGEST))
+    else:
+        content = read_json(path) if ending == ".json" else read_yaml(path)
+        if content is not None and not isinstance(content, dict):
+            what = type(content).__name__
+            raise ValueError(f"{path}: expected an object of marker names and places, got {what}")
+        pairs = {str(name): place for name, place in (content or {}).items()}
     if not pairs:
         raise ValueError(f"{path}: expected names of markers and their places, got none")
     return pairs
 
 
-def _object(path: Path, text: str) -> dict[str, Any]:
+def _rows(path: Path, data: bytes) -> dict[str, Any]:
     try:
-        if path.suffix.lower() == ".json":
-            content = json.loads(text)
-        else:
-            import yaml
-
-            content = yaml.safe_load(text)
-    except Exception as error:  # yaml has its own
-        said = " ".join(str(error).split())
-        raise ValueError(f"{path}: expected {path.suffix[1:].upper()} that can be read: {said}") from None
-    if not isinstance(content, dict):
-        raise ValueError(f"{path}: expected an object of marker names and places, got {type(content).__name__}")
-    return {str(name): place for name, place in content.items()}
-
-
-def _rows(path: Path, text: str) -> dict[str, Any]:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError(f"{path}: expected text in UTF-8") from None
     rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines())]
     rows = [row for row in rows if any(row)]
     if rows and rows[0][0].lower() in ("marker", "name") and rows[0][-1].lower() in ("place", "site"):
