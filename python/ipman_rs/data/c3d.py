@@ -147,7 +147,13 @@ def read(path: str | os.PathLike[str]) -> Recording:
     )
 
 
-def markers(path: str | os.PathLike[str], up: str | None = None, subject: str | None = None) -> Tracks:
+def markers(
+    path: str | os.PathLike[str],
+    up: str | None = None,
+    subject: str | None = None,
+    unit: float | None = None,
+    rate: float | None = None,
+) -> Tracks:
     """The markers of a C3D file; which axis is up says its Y_SCREEN, z if it does not.
 
     `subject`: of whom, where the file has several people. ValueError, naming the file, if it is missing, damaged, has
@@ -162,8 +168,9 @@ def markers(path: str | os.PathLike[str], up: str | None = None, subject: str | 
     if computed:
         notes.append(f"{len(computed)} outputs of a model are no markers: {_some(list(found.outputs))}")
     names = [found.names[column] for column in rest]
-    up = up or found.up
-    return tracks(names, found.points[:, rest], found.times, found.unit, up, found.source, subject=subject, notes=notes)
+    said, up = found.unit if unit is None else unit, up or found.up
+    times = found.times if rate is None else np.arange(len(found.points)) / rate
+    return tracks(names, found.points[:, rest], times, said, up, found.source, subject=subject, notes=notes)
 
 
 def _faced(parameters: Parameters) -> str:
