@@ -51,6 +51,7 @@ class ForcePlates:
     up: Array  # (3,) unit vector
     source: str
     corners: Array | None = None  # (P, 4, 3) m
+    notes: tuple[str, ...] = ()  # what of the file was left out or turned, a sentence each
 
     def __len__(self) -> int:
         return len(self.times)

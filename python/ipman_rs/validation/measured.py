@@ -3,29 +3,37 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..data import c3d, force_plates, opensim
+from ..data.external_loads import ExternalLoads
 from ..data.force_plates import ForcePlates, between
-from ..data.tracks import TO_Y_UP
+from ..data.tracks import METRES, TO_Y_UP
 
 Array = NDArray[np.float64]
 
+NEITHER = "it has neither forces nor a centre of mass"
+CENTRE_OF_MASS = ("centreofmass", "centerofmass")  # Plug-in Gait's, and Visual3D's
 CSV_COLUMNS = ("time_s", "com_x_m", "com_y_m", "com_z_m")
 
 
-def kind_of(path: Path) -> str | None:
-    """What a table holds: "forces", "com", or nothing of use. ValueError, naming the file, if it cannot be read."""
+def kind_of(path: Path) -> tuple[str | None, str]:
+    """What a table holds: "forces", "com", or None, and then why it is of no use. ValueError, naming the file, if it
+    cannot be read."""
     if path.suffix.lower() == ".csv":
         if not set(CSV_COLUMNS) <= set(_heads(path)):
-            return None
+            return None, NEITHER
         _csv(path)
-        return "com"
+        return "com", ""
     table = opensim.storage(path)
-    return "forces" if opensim.has_plates(table) else "com" if opensim.has_center_of_mass(table) else None
+    moves = opensim.derivative(path)
+    if moves is not None and f"{opensim.COM}_X" in table.columns:
+        return None, f"it has {moves}; the positions are compared"
+    return opensim.kind(table), NEITHER
 
 
 def has_plates(path: Path) -> bool:
@@ -36,22 +44,58 @@ def has_plates(path: Path) -> bool:
         return False
 
 
-def plates(path: Path) -> ForcePlates:
-    """The force plates of a `.c3d`, `.mot` or `.sto` file. ValueError, naming the file, for what is not right in it."""
+def has_center_of_mass(path: Path) -> bool:
+    """Whether a `.c3d` file has a centre of mass by Plug-in Gait."""
+    try:
+        found = c3d.read(path)
+        return _modelled(found) is not None
+    except (ValueError, ImportError):
+        return False
+
+
+def plates(path: Path, up: str | None = None, unit: str = "m", loads: ExternalLoads | None = None) -> ForcePlates:
+    """The force plates of a `.c3d`, `.mot` or `.sto` file, y up. ValueError, naming the file, for what is not right.
+
+    `up`: which axis of the file is up, if that is not what it says, or y; `unit`: of the points of a `.mot` or `.sto`;
+    `loads`: in which of its columns the forces are.
+    """
     if path.suffix.lower() == ".c3d":
         found = c3d.read(path)
-        return force_plates.of_recording(found).turned(TO_Y_UP[found.up])
-    return opensim.plates(opensim.storage(path))
+        return force_plates.of_recording(found, up).turned(TO_Y_UP[up or found.up])
+    return opensim.plates(opensim.storage(path), unit, up or "y", loads).turned(TO_Y_UP[up or "y"])
 
 
-def center_of_mass(path: Path, times: Array) -> Array:
-    """A measured centre of mass (n, 3) m at these times, NaN outside the file's. ValueError, naming the file."""
+def center_of_mass(path: Path, times: Array, up: str | None = None) -> Array:
+    """A measured centre of mass (n, 3) m at these times, y up, NaN outside the file's. ValueError, naming the file.
+
+    `up` as in `plates`.
+    """
+    if path.suffix.lower() == ".c3d":
+        found = c3d.read(path)
+        points = _modelled(found)
+        if points is None:
+            raise ValueError(f"{path}: expected a point CentreOfMass of Plug-in Gait, it has none")
+        return between(found.times, points @ TO_Y_UP[up or found.up].T, times)
     if path.suffix.lower() == ".csv":
         own, points = _csv(path)
     else:
         table = opensim.storage(path)
         own, points = table.times, opensim.center_of_mass(table)
-    return between(own, points, times)
+    return between(own, points @ TO_Y_UP[up or "y"].T, times)
+
+
+def judge(path: Path) -> str:
+    """Whose a centre of mass is."""
+    return {".c3d": "Plug-in Gait", ".sto": "OpenSim", ".mot": "OpenSim"}.get(path.suffix.lower(), path.name)
+
+
+def _modelled(found: c3d.Recording) -> Array | None:
+    """Plug-in Gait's centre of mass (T, 3) m in the file's axes, NaN where it has none; None without it."""
+    for column, name in enumerate(found.names):
+        if re.sub(r"[^a-z]", "", name.rpartition(":")[2].lower()) in CENTRE_OF_MASS:
+            points = found.points[:, column] * METRES[found.unit.lower()]
+            return np.where((points != 0).any(axis=1, keepdims=True), points, np.nan)
+    return None
 
 
 def _heads(path: Path) -> list[str]:
