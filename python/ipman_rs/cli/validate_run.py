@@ -108,8 +108,9 @@ def run(plan: Plan) -> tuple[list[Record], list[str], list[FileError]]:
 def _person(plan: Plan, recordings: list[Measured], told: Told) -> list[Record]:
     """The figures of all recordings of one person, that of standing still first: its shape and weight are needed."""
     chosen = _chosen(plan, recordings, told)
-    useful = [one for one in recordings if not one.idle]
-    recordings = [one for one in recordings if not one.idle or (one.trial.name == chosen and useful)]
+    if all(one.plates is None and one.reference is None for one in recordings):
+        return []
+    recordings = [one for one in recordings if not one.idle or one.trial.name == chosen]
     records: list[Record] = []
     shape, weight = None, np.nan
     for one in sorted(recordings, key=lambda one: (one.trial.name != chosen, not (one.trial.still or one.still))):

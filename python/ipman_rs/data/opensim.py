@@ -346,7 +346,7 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
     found = [Finding("ok", f"{len(files)} .trc {'file' if len(files) == 1 else 'files'}")]
     beside = _beside(Path(path), files)
     found += [Finding("wrong", what) for what in beside.unreadable]
-    found += [Finding("ok", note) for note in beside.pairs.notes]
+    found += [Finding("odd", note) for note in beside.pairs.notes]
     for other, why in beside.pairs.left.items():
         level = "wrong" if other in beside.pairs.rivals else "odd"
         found.append(Finding(level, f"{other.name}: not used, for {why}"))
@@ -409,7 +409,8 @@ def _beside(path: Path, files: list[Path]) -> Beside:
     pairs = pairing.pair(files, kinds, root, aliases=aliases)
     used = {*pairs.forces.values(), *pairs.com.values()}
     told = [what for other, what in unreadable.items() if other not in used]
-    return Beside(pairs, loads, pairing.names(files, root), [*told, *wrong])
+    pairs.notes += wrong
+    return Beside(pairs, loads, pairing.names(files, root), told)
 
 
 def _some(table: Storage) -> str:
