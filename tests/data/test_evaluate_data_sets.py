@@ -52,7 +52,7 @@ def test_joints_alone_are_compared_by_name(table, name, module, number, tmp_path
 @pytest.mark.parametrize("table", ["biomech", "com"])
 def test_the_paper_s_biomechanics(table, tmp_path):
     """MoYo's own bodies against its mat and its centre of mass; the paper's figures stand above."""
-    pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+    pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
     from miniatures import moyo
 
     moyo.write(tmp_path / "moyo")

@@ -82,7 +82,7 @@ def make(table, folder, bodies, regressor):
     elif table == "rich-o-star":
         rich.write(folder)
     else:
-        pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+        pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
         from miniatures import moyo
 
         moyo.write(folder)
@@ -246,7 +246,7 @@ def test_measured_joints_of_spin_s_definition_take_its_extra_regressor(bodies, r
 
 
 def test_bodies_of_another_model_are_compared_by_name_and_it_is_said(bodies, tmp_path):
-    pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+    pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
     from miniatures import moyo
 
     moyo.write(tmp_path / "moyo")
@@ -278,7 +278,7 @@ def test_a_truth_whose_model_is_missing(regressors, tmp_path):
 
 def test_the_gender_of_a_missing_model_is_the_one_that_is_needed(tmp_path):
     """MoYo's people are female, of SMPL-X; without the file of any gender nothing is posed."""
-    pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+    pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
     from miniatures import moyo
 
     moyo.write(tmp_path)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
-ezc3d = pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+ezc3d = pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
 
-from miniatures import c3d_file  # noqa: E402
+from miniatures import c3d_bytes, c3d_file  # noqa: E402
 
 import ipman_rs.data as data  # noqa: E402
 from ipman_rs.data import c3d, force_plates, opensim  # noqa: E402
@@ -186,9 +188,12 @@ def broken(tmp_path, load, **changes):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"kind": 7}, "force plate 1: TYPE: expected one of 2, 3, 4, got type 7"),
+        (
+            {"kind": 7},
+            "force plate 1: TYPE: expected one of 1, 2, 3, 4, got type 7 .a Kistler plate",
+        ),
         ({"kind": 3}, "force plate 1: CHANNEL: expected 8 of the 6 channels, got 1, 2, 3, 4, 5, 6"),
-        ({"force_unit": "V"}, "ANALOG:UNITS: expected N, got 'v': is the plate calibrated"),
+        ({"force_unit": "V"}, "ANALOG:UNITS: expected N, got 'V': is the plate calibrated"),
         ({"size": 1000}, "CORNERS: expected a plate of a decimetre to two metres, got 600 × 400 m; looks like milli"),
         ({"size": 0}, "CORNERS: expected a plate of a decimetre to two metres, got 0 × 0 m"),
     ],
@@ -248,3 +253,170 @@ def test_a_frame_of_nan(tmp_path, load):
     frames = data.open("force-plates", path)[:]
     assert np.isnan(frames.joints[7, 1]).all()
     assert np.isfinite(np.delete(frames.joints, 7, axis=0)).all()
+
+
+def bytes_of(plates, *, units=None, unit="mm", up="+Z", extra=(), scale=1000.0, markers_at=None):
+    """A file of plates [(type, corners (4, 3) m, channels (N, n) in N and mm)], written byte by byte."""
+    channels = np.concatenate([values for _, _, values in plates], axis=1)
+    numbers = np.arange(1, channels.shape[1] + 1).reshape(len(plates), -1)
+    more = [c3d_bytes.group(3, "FORCE_PLATFORM"), c3d_bytes.parameter(3, "USED", len(plates))]
+    more += [c3d_bytes.parameter(3, "TYPE", [kind for kind, *_ in plates])]
+    more += [c3d_bytes.parameter(3, "CORNERS", np.stack([corners for _, corners, _ in plates]) * scale)]
+    more += [c3d_bytes.parameter(3, "ORIGIN", np.array([[0, 0, -c3d_file.DEPTH]] * len(plates)) * scale)]
+    more += [c3d_bytes.parameter(3, "CHANNEL", numbers), *extra]
+    if units:
+        more += [c3d_bytes.parameter(2, "UNITS", units)]
+    points = np.stack(list(markers().values()), axis=1) * 1000 if markers_at is None else markers_at
+    names = [*markers()]
+    return c3d_bytes.c3d(points, channels, names=names, samples=c3d_file.SAMPLES, unit=unit, up=up, more=more)
+
+
+def in_mm(values):
+    return values * [1, 1, 1, 1000, 1000, 1000]
+
+
+@pytest.mark.parametrize(
+    ("force", "moment"),
+    [("nt", "ntmm"), ("N", "N-mm"), ("Newtons", "N·mm"), ("Newton", "Newton-millimeters"), ("n", "N mm"),
+     ("nt", "nt.mm"), ("NT", "NTMM"), ("", ""), ("N", "")],
+)  # fmt: skip
+def test_spellings_of_units(tmp_path, load, force, moment):
+    push, offset, free = load
+    corners = c3d_file.plate((0, 0, 0))
+    values = in_mm(c3d_file.six(corners, push, where((0, 0, 0), offset), free))
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, values)], units=[force] * 3 + [moment] * 3))
+    found = force_plates.read(tmp_path / "a.c3d")
+    loaded = push[:, 2] > 50
+    np.testing.assert_allclose(found.points[loaded, 0], where((0, 0, 0), offset)[loaded], atol=2e-6)
+    np.testing.assert_allclose(found.moments[loaded, 0, 2], free[loaded], atol=2e-3)
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, values / 1000)], units=["kN"] * 3 + ["N m"] * 3))
+    np.testing.assert_allclose(force_plates.read(tmp_path / "a.c3d").forces[:, 0], push, atol=2e-4)
+
+
+@pytest.mark.parametrize("reaction", [True, False])
+@pytest.mark.parametrize("units", [["N"] * 6, ["N", "N", "N", "mm", "mm", "Nmm"], [""] * 6])
+def test_a_plate_of_type_1(tmp_path, load, units, reaction):
+    """Force, centre of pressure and free moment themselves, in the plate's axes; BTS gives all six the unit N."""
+    push, offset, free = load
+    corners = c3d_file.plate((0.8, -0.3, 0.05), turn=0.7)
+    point = where((0.8, -0.3, 0.05), offset)
+    x, y = corners[0] - corners[1], corners[1] - corners[2]
+    axes = np.stack([x / np.linalg.norm(x), y / np.linalg.norm(y), [0.0, 0.0, -1.0]])
+    sign = 1 if reaction else -1
+    place = (point - corners.mean(axis=0)) @ axes.T * 1000
+    values = np.column_stack([sign * push @ axes.T, place[:, :2], -sign * free * 1000])
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(1, corners, values)], units=units))
+    found = force_plates.read(tmp_path / "a.c3d")
+    np.testing.assert_allclose(found.forces[:, 0], push, atol=2e-4)
+    np.testing.assert_allclose(found.points[:, 0], point, atol=1e-6)
+    np.testing.assert_allclose(found.moments[:, 0], free[:, None] * [0, 0, 1], atol=1e-6)
+
+
+def test_plates_that_are_left_out(tmp_path, load):
+    push, offset, free = load
+    corners = c3d_file.plate((0, 0, 0))
+    values = in_mm(c3d_file.six(corners, push, where((0, 0, 0), offset), free))
+    good = (2, corners, values)
+    for other, why in (
+        ((2, 0 * corners, values), "CORNERS: expected a plate of a decimetre to two metres, got 0 × 0 m"),
+        ((2, np.nan * corners, values), "CORNERS: expected 12 numbers, got 0"),
+        (
+            (5, corners, values),
+            r"TYPE: .* got type 5 \(eight channels with a matrix\); export its forces",
+        ),
+        ((21, corners, values), r"TYPE: .* got type 21 \(AMTI's stairs\)"),
+        ((99, corners, values), "TYPE: .* got type 99; export"),
+    ):
+        (tmp_path / "a.c3d").write_bytes(bytes_of([other, good]))
+        found = force_plates.read(tmp_path / "a.c3d")
+        np.testing.assert_allclose(found.forces[:, 0], push, atol=2e-4)
+        assert found.forces.shape[1] == 1
+        assert len(found.notes) == 1
+        assert re.match(f"force plate 1: {why}.*; left out$", found.notes[0])
+        frames = data.open("force-plates", tmp_path / "a.c3d")[:]
+        assert frames.forces.shape == (T, 1, 3)
+        told = [each.what for each in force_plates.check(tmp_path / "a.c3d") if each.level == "odd"]
+        assert told == [f"a.c3d: {found.notes[0]}"]
+        (tmp_path / "a.c3d").write_bytes(bytes_of([other, other]))
+        with pytest.raises(ValueError, match=f"a.c3d: force plate 1: {why}"):
+            force_plates.read(tmp_path / "a.c3d")
+
+
+def test_corners_in_millimetres_and_points_in_metres(tmp_path, load):
+    push, offset, free = load
+    corners = c3d_file.plate((0, 0, 0))
+    values = in_mm(c3d_file.six(corners, push, where((0, 0, 0), offset), free))
+    points = np.stack(list(markers().values()), axis=1)
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, values)], unit="mete", markers_at=points))
+    found = force_plates.read(tmp_path / "a.c3d")
+    np.testing.assert_allclose(found.corners[0], corners, atol=1e-6)
+    np.testing.assert_allclose(found.points[10, 0], where((0, 0, 0), offset)[10], atol=2e-6)
+    assert found.notes == ("the corners of the force plates are in millimetres, its points in mete",)
+
+
+def test_plates_say_which_axis_is_up_where_the_file_does_not(tmp_path, load):
+    push, offset, free = load
+    corners = c3d_file.plate((0, 0, 0))
+    values = in_mm(c3d_file.six(corners, push, where((0, 0, 0), offset), free))
+    turned = corners @ TO_Y_UP["z"].T
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, turned, values)], up=None))
+    assert c3d.read(tmp_path / "a.c3d").up == "y"
+    found = force_plates.read(tmp_path / "a.c3d")
+    np.testing.assert_allclose(found.forces[:, 0], push @ TO_Y_UP["z"].T, atol=2e-4)
+
+
+def test_outputs_of_models_and_names_twice_are_no_joints(tmp_path, load):
+    push, offset, free = load
+    corners = c3d_file.plate((0, 0, 0))
+    six = c3d_file.six(corners, push, where((0, 0, 0), offset), free)
+    points = markers()
+    points |= {"LKneeAngles": 1000 * points["hip"], "CentreOfMass": points["hip"], "hip2": points["hip"] + 0.1}
+    labels = ["head", "hip", "left_heel", "LKneeAngles", "CentreOfMass", "hip"]
+    c3d_file.write(tmp_path / "a.c3d", points, RATE, plates=[(2, corners, six)], labels=labels)
+    frames = data.open("force-plates", tmp_path / "a.c3d")[:]
+    assert frames.joint_names == ("head", "hip", "left_heel")
+    np.testing.assert_allclose(frames.joints[:, 1], points["hip"], atol=1e-6)
+    findings = [(each.level, each.what) for each in force_plates.check(tmp_path / "a.c3d")]
+    assert ("ok", "a.c3d: 2 outputs of a model are no markers, its centre of mass is a reference") in findings
+    assert any(level == "odd" and "more than one marker is called hip" in what for level, what in findings)
+    assert not any(level == "wrong" for level, _ in findings)
+
+
+@pytest.mark.parametrize("name", ["type-2a", "type-4a", "Gait"])
+def test_conformance_files_of_btk_against_ezc3d(shared, name):
+    """Whole numbers of a DEC processor, plates of types 2 and 4 with matrices."""
+    path = shared("motion") / "c3d_plates" / f"btk_{name}.c3d"
+    found = force_plates.read(path)
+    for plate, judge in enumerate(ezc3d.c3d(str(path), extract_forceplat_data=True)["data"]["platform"]):
+        loaded = found.loads[:, plate] > 20
+        assert loaded.sum() > 400
+        np.testing.assert_allclose(found.forces[:, plate], judge["force"].T, atol=1e-9)
+        points = judge["center_of_pressure"].T / 1000
+        np.testing.assert_allclose(found.points[loaded, plate], points[loaded], atol=1e-12)
+
+
+def test_the_same_steps_by_plates_of_types_2_and_4(shared):
+    """BTK's pair of files, whose whole numbers of raw volts round more coarsely: 525 and 584 N at most."""
+    two, four = (force_plates.read(shared("motion") / "c3d_plates" / f"btk_type-{kind}.c3d") for kind in ("2a", "4a"))
+    np.testing.assert_allclose(np.linalg.norm(two.forces, axis=-1).max(axis=0), [525, 584], atol=0.5)
+    np.testing.assert_allclose(np.linalg.norm(four.forces, axis=-1).max(axis=0), [525, 584], atol=1.2)
+    loaded = two.loads > 100
+    np.testing.assert_allclose(four.points[loaded], two.points[loaded], atol=5e-3)
+
+
+def test_plates_of_other_laboratories(shared):
+    gait = force_plates.read(shared("motion") / "c3d_plates" / "btk_Gait.c3d")
+    np.testing.assert_allclose(gait.loads.max(axis=0), [798.7, 855.4], atol=0.1)
+    bts = force_plates.read(shared("motion") / "c3d_plates" / "btk_type1.C3D")  # y up, but no word of it
+    np.testing.assert_array_equal(bts.up, [0, 1, 0])
+    assert bts.loads.max() == pytest.approx(731.7, abs=0.1)
+    on = bts.points[bts.loads[:, 0] > 50, 0]
+    low, high = bts.corners[0].min(axis=0), bts.corners[0].max(axis=0)
+    assert ((on > low - 0.01) & (on < high + 0.01)).all()
+    child = c3d.read(shared("motion") / "child_gait" / "HC036A10.c3d")
+    np.testing.assert_allclose(child.center_of_mass()[0], [0.296441, 1.059984, 0.728468], atol=1e-6)
+    assert {"LKneeAngles", "HEDA", "CentreOfMass", "LHJC"} <= set(child.outputs)
+    assert {"LASI", "RASI", "C7"} <= set(child.markers().names)
+    assert not set(child.outputs) & set(child.markers().names)
+    standing = force_plates.read(shared("motion") / "child_gait" / "HC036A01.c3d")
+    assert standing.loads.sum(axis=1).mean() / 9.80665 == pytest.approx(33.8, abs=0.5)

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
 
 from miniatures import moyo as miniature
 

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 from miniatures import models
 
-pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
 
 from miniatures import moyo as miniature
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from miniatures import opensim as miniature
@@ -130,11 +132,8 @@ def test_the_old_header_of_simm(shared):
     [
         ("", "expected a storage of OpenSim, whose header ends with 'endheader', got another text"),
         ("hello\nendheader\n", "expected a line of column names after the header, the file ends there"),
-        ("nRows=2\nendheader\ntime\ta\n0\t1\n", "expected 2 rows by its header, got 1: is the file complete"),
-        ("datarows 2\nendheader\ntime\ta\n0\t1\n", "expected 2 rows by its header, got 1: is the file complete"),
-        ("nColumns=3\nendheader\ntime\ta\n0\t1\n", "expected 3 columns by its header, got 2"),
         ("endheader\ntime\ta\n0\t1\n1\t\n", "line 4: expected 2 columns, got 1: is the file complete"),
-        ("endheader\ntime\ta\n0\tx\n", "expected numbers: .*'x'"),
+        ("endheader\ntime\ta\n0\tx\n", "line 3: expected numbers: .*'x'"),
         ("endheader\ntime\ta\n", "expected rows of numbers, got none"),
         ("endheader\na\ttime\n0\t1\n", "line 2: expected the time first and different names, got 'a' first"),
         ("endheader\ntime\ta\ta\n0\t1\t2\n", "line 2: .*got the column 'a' twice"),
@@ -217,3 +216,80 @@ def test_columns_that_are_missing(folder):
         opensim.center_of_mass(opensim.storage(folder / "sway_grf.mot"))
     with pytest.raises(ValueError, match="unit, up: expected"):
         opensim.plates(table, unit="furlong")
+
+
+@pytest.mark.parametrize(
+    ("header", "note"),
+    [
+        ("nRows=3\n", "its header says 3 rows, it has 2"),
+        ("datarows 1\n", "its header says 1 rows, it has 2"),
+        ("nColumns=3\nnRows=2\n", "its header says 3 columns, it has 2"),
+        ("nColumns=2\nnRows=2\n", None),
+        ("", None),
+    ],
+)
+def test_a_header_that_says_otherwise_is_a_note(tmp_path, header, note):
+    """As OpenSim's own running example: OpenSim reads what is there."""
+    (tmp_path / "a.mot").write_text(f"x\n{header}endheader\ntime\ta\n0\t1\n0.1\t2\n")
+    found = opensim.storage(tmp_path / "a.mot")
+    assert found.columns["a"].tolist() == [1, 2]
+    assert found.notes == (() if note is None else (note,))
+
+
+@pytest.mark.parametrize(
+    "nan", ["nan", "NaN", "-nan", "-nan(ind)", "nan(snan)", "-1.#IND", "1.#QNAN", "1.#QNAN0000", "-1.#IND00", "NA"]
+)
+def test_spellings_of_nan(tmp_path, nan):
+    (tmp_path / "a.mot").write_text(f"x\nendheader\ntime\ta\tb\n0\t{nan}\t1\n0.1\t2\t1.#INF\n")
+    found = opensim.storage(tmp_path / "a.mot")
+    assert np.isnan(found.columns["a"][0])
+    np.testing.assert_array_equal(found.columns["b"], [1, np.inf])
+    assert found.columns["a"][1] == 2
+
+
+def test_forces_that_are_missing_for_a_while(tmp_path):
+    """NaN are forces that were not measured, and no others'."""
+    miniature.forces(tmp_path / "a.mot")
+    lines = (tmp_path / "a.mot").read_text().split("\n")
+    head = lines.index("endheader") + 2
+    for row in range(head + 100, head + 200):
+        cells = lines[row].split("\t")
+        lines[row] = "\t".join([cells[0], *["-nan(ind)"] * (len(cells) - 1)])
+    (tmp_path / "b.mot").write_text("\n".join(lines))
+    whole, some = (opensim.plates(opensim.storage(tmp_path / f"{name}.mot")) for name in "ab")
+    times = np.array([0.05, 0.15, 0.25])
+    np.testing.assert_array_equal(some.at(times).center()[[0, 2]], whole.at(times).center()[[0, 2]])
+    assert np.isnan(some.at(times).forces[1]).all()
+    assert np.isnan(some.at(times).center()[1]).all()
+
+
+def test_many_columns_at_once(tmp_path):
+    """60,000 columns took minutes when each name was looked for among the earlier ones."""
+    labels = ["time", *(f"c{number}" for number in range(60_000))]
+    (tmp_path / "a.sto").write_text("endheader\n" + "\t".join(labels) + "\n" + "\t".join(["0"] * len(labels)) + "\n")
+    begun = time.perf_counter()
+    found = opensim.storage(tmp_path / "a.sto")
+    assert len(found.columns) == 60_000
+    with pytest.raises(ValueError, match="it has c0, c1, c2, c3, c4, c5, c6, c7, …"):
+        opensim.plates(found)
+    (tmp_path / "a.sto").write_text("endheader\n" + "\t".join([*labels, "c7"]) + "\n")
+    with pytest.raises(ValueError, match="the column 'c7' twice"):
+        opensim.storage(tmp_path / "a.sto")
+    assert time.perf_counter() - begun < 5
+
+
+def test_names_with_blanks_in_them(tmp_path):
+    (tmp_path / "a.sto").write_text("x\nendheader\ntime\tleft knee\ta\n0\t1\t2\n")
+    assert [*opensim.storage(tmp_path / "a.sto").columns] == ["left knee", "a"]
+
+
+def test_quiet_standing_of_bmclab(shared):
+    """A table without a header; the file has the centre of pressure of both plates itself, to a micrometre."""
+    table = opensim.storage(shared("motion") / "results" / "bmclab_PDS13OF1grf.txt")
+    assert opensim.has_plates(table)
+    found = opensim.plates(table)
+    assert found.forces.shape == (6000, 2, 3)
+    assert found.loads.sum(axis=1).mean() / 9.80665 == pytest.approx(66.34, abs=0.01)
+    own = table.vectors(("COPNET_X", "COPNET_Y", "COPNET_Z"))
+    np.testing.assert_allclose(found.center(), own, atol=3e-4)  # theirs is filtered after it was computed
+    np.testing.assert_array_equal(found.moments[0], [[0, 1.277981, 0], [0, -0.70602, 0]])

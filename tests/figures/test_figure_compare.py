@@ -117,7 +117,7 @@ def test_predictions_of_a_data_set(figure, tmp_path, lite):
 
 def test_folders_of_predictions_for_moyo(figure, tmp_path):
     """What `ipman fit --data moyo` leaves, an image that is whole and a damaged one. MoYo's camera is an option."""
-    pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+    pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
     import spring_mat
     from miniatures import moyo
 

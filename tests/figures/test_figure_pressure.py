@@ -12,7 +12,7 @@ from ipman_rs import data, evaluation, paper_figures
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.paper_figures import pressure as made
 
-pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
 spring_mat = pytest.importorskip("spring_mat")
 
 

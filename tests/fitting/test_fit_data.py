@@ -72,7 +72,7 @@ def models(tmp_path_factory):
 @pytest.fixture(scope="module")
 def yoga(models, tmp_path_factory):
     """MoYo's miniature, its validation sequences with images of camera 1, on a mat of true feet; and its keypoints."""
-    pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+    pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
     root = tmp_path_factory.mktemp("moyo")
     for session, day, with_com in ((moyo.HANDS, "220923", False), (moyo.COM, "221004", True)):
         name = moyo.names(day)[2]

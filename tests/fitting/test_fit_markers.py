@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
 import trimesh
@@ -15,11 +13,6 @@ from ipman_rs.fitting import markers  # noqa: E402
 from ipman_rs.fitting.landmarks import Landmarks, Site  # noqa: E402
 from ipman_rs.fitting.markers.calibration import calibrated  # noqa: E402
 from ipman_rs.fitting.markers.sets import OPENCAP, OPENSIM_GAIT, PLUG_IN_GAIT  # noqa: E402
-
-
-@pytest.fixture
-def c3d():
-    pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
 
 
 def trc(rows, units="mm", names=("C7", "L.ASIS")):
@@ -46,7 +39,7 @@ def test_trc_in_millimetres(shared):
     assert 1.7 < tracks.points[..., 1].max() < 1.9
 
 
-def test_c3d_with_z_up(c3d, shared):
+def test_c3d_with_z_up(shared):
     tracks = markers.read(shared("c3d") / "walking2.c3d")
     assert tracks.points.shape == (1249, 44, 3)
     assert tracks.times[1] - tracks.times[0] == pytest.approx(1 / 250)
@@ -88,7 +81,6 @@ def test_units_that_are_not_said(tmp_path, size, metres):
         (trc(["1\t0\t\t\t\t\t\t"]), "expected coordinates, all are missing"),
         (trc([]), "expected markers and samples, got 2 and 0"),
         (trc(["1\t0\t1\t2\t3\t4\t5\t6"], units="furlong"), "units: expected one of m, .* got 'furlong'"),
-        (trc(["1\t0\t1\t2\t3\t4\t5\t6"], names=("C7", "C7")), "the marker 'C7' comes twice"),
     ],
 )
 def test_what_is_wrong_in_a_trc(tmp_path, text, message):
@@ -112,18 +104,12 @@ def test_files_that_are_no_markers(tmp_path):
         tracks.select(["R.ASIS"])
 
 
-def test_a_damaged_c3d(c3d, tmp_path):
+def test_a_damaged_c3d(tmp_path):
     (tmp_path / "a.c3d").write_bytes(b"no markers in here" * 100)
     with pytest.raises(ValueError, match="a.c3d: expected a C3D file"):
         markers.read(tmp_path / "a.c3d")
     with pytest.raises(ValueError, match="b.c3d: no such file"):
         markers.read(tmp_path / "b.c3d")
-
-
-def test_c3d_without_the_extra(monkeypatch, tmp_path):
-    monkeypatch.setitem(sys.modules, "ezc3d", None)
-    with pytest.raises(ImportError, match=r'pip install "ipman_rs\[c3d\]"'):
-        markers.read(tmp_path / "a.c3d")
 
 
 @pytest.fixture(scope="module", params=["anny", "anny-lite"])
@@ -171,8 +157,6 @@ RECORDINGS = {
 
 @pytest.mark.parametrize(("folder", "file"), RECORDINGS)
 def test_a_body_fits_the_markers(shared, folder, file):
-    if file.endswith("c3d"):
-        pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
     body = ipt.BodyModel("anny-lite", torch.float64)
     tracks = markers.read(shared(folder) / file)
     sites = markers.sites(body.body, tracks.names)

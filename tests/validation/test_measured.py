@@ -84,7 +84,7 @@ def test_kinds_of_real_files(real):
 
 def test_plates_of_a_laboratory_with_z_up(real):
     """walking2.c3d in y up, (x, z, −y) of the file's, against its reference in mm, where a foot is on the plate."""
-    pytest.importorskip("ezc3d", reason="ezc3d is the extra c3d")
+    pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
     assert measured.has_plates(real / "c3d" / "walking2.c3d")
     found = measured.plates(real / "c3d" / "walking2.c3d")
     lines = (real / "c3d" / "std_cop_walking2_grfs.sto").read_text().splitlines()

@@ -67,6 +67,7 @@ if TYPE_CHECKING:
 @click.option("--image", type=click.Path(path_type=Path), metavar="PHOTO", help="Photo to draw under a keypoint file.")
 @click.option("--image-size", type=SIZE, metavar="WxH", help="Pixels of the image, where a keypoint file does not say.")
 @click.option("--person", type=int, metavar="N", help="Which person of a file, from 0. Default: the most visible.")
+@click.option("--subject", metavar="NAME", help="Whose markers (NAME:LASI), where a marker file has several people's.")
 @click.option("--obj", is_flag=True, help="Write meshes as .obj, too, not only as .glb.")
 @click.option(
     "--pictures", type=click.IntRange(0), default=8, show_default=True, help="Draw the first N items (seconds each)."
@@ -119,7 +120,7 @@ def fit(
     """Fit a body to each photo, set of keypoints or marker recording, with intuitive physics.
 
     INPUT is a photo (.png .jpg; needs the extra photo), a keypoint file (.json of OpenPose, COCO, COCO-WholeBody or
-    MediaPipe), a marker file (.trc, or .c3d with the extra c3d), or a folder of them. Every person is fitted for
+    MediaPipe), a marker file (.trc, .c3d), or a folder of them. Every person is fitted for
     themselves, but for the frames of a --sequence; of several in one image one is taken. In OUTPUT every item gets a
     folder with its parameters (.npz, for `ipman analyze`), mesh (.glb), fit.json and pictures; report.html and
     report.json tell of all.

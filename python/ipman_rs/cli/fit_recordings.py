@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,8 +44,9 @@ class Pace:
 
 def fitted(recording: Recording, settings: Settings, pace: Pace, output: Path, resume: bool) -> Study:
     """Fit a recording, write its folder and measure it. Raises FileError."""
-    kept(recording, settings, pace, output, resume)
-    return _measured(recording, output / recording.name, settings)
+    record = kept(recording, settings, pace, output, resume)
+    study = _measured(recording, output / recording.name, settings)
+    return replace(study, notes=(*study.notes, *record.get("notes", [])))
 
 
 def kept(
@@ -109,7 +110,7 @@ def _fit_markers(recording: Recording, settings: Settings, pace: Pace, person: P
 
     preset = _preset(recording, settings)
     chosen = config.load(preset) if preset == "markers" else settings.config
-    tracks = markers.read(recording.paths[0])
+    tracks = markers.read(recording.paths[0], subject=settings.subject)
     body, count = ipt.BodyModel(settings.model), len(range(0, len(tracks), pace.every))
     with console.progress(f"fitting {recording.name}", count) as step:
         told = {"every": pace.every, "ground": settings.ground or 0.0, "person": person}
@@ -121,8 +122,8 @@ def _fit_markers(recording: Recording, settings: Settings, pace: Pace, person: P
     sites = {name: site if isinstance(site, str) else asdict(site) for name, site in found.sites.items()}
     record = {"mean_marker_error_m": _number(np.nanmean(errors)), "marker_errors_m": each, "unknown": [*found.unknown]}
     times = found.tracks.times
-    rate = float(1 / np.median(np.diff(times))) if len(times) > 1 else 1.0
-    return found.fit, {"times": times}, {**record, "sites": sites}, rate
+    rate = found.tracks.rate or 1.0
+    return found.fit, {"times": times}, {**record, "notes": [*tracks.notes], "sites": sites}, rate
 
 
 def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:

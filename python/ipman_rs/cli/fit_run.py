@@ -45,6 +45,7 @@ class Settings:
     pose_frame: int | None = None
     pose_up: tuple[float, float, float] | None = None
     contact: Path | None = None
+    subject: str | None = None
     obj: bool = False
 
     def identity(self) -> str:

@@ -38,12 +38,13 @@ from .fit import needs
     "--force-units", "force_unit", type=click.Choice(["m", "cm", "mm"]), default="m", show_default=True,
     help="Unit of the centres of pressure in .mot and .sto, which do not say it.",
 )  # fmt: skip
+@click.option("--subject", metavar="NAME", help="Whose markers (NAME:LASI), where a marker file has several people's.")
 @click.option("--force", is_flag=True, help="Compare also what cannot be a person.")
 @click.option("--fresh", is_flag=True, help="Fit again what was fitted before with the same files and options.")
 def validate(folder: Path, output: Path, model: str, person: str, rate: float, fresh: bool, **said: Any) -> None:
     """Compare the engine's centre of mass, centre of pressure and pressure with measurements.
 
-    FOLDER holds recordings of one person: markers (.trc, or .c3d with the extra c3d), force plates (.mot, .sto, or
+    FOLDER holds recordings of one person: markers (.trc, .c3d), force plates (.mot, .sto, or
     those of the .c3d) and centres of mass by others, such as OpenSim's (.sto, or .csv with columns time_s, com_x_m,
     com_y_m, com_z_m; y up) or Plug-in Gait's CentreOfMass in the .c3d. Names and folders say which belong together:
     squats.trc, squats_grf.mot and squats_com.sto; markers_walk.trc and grf_walk.mot; MarkerData/walk.trc and

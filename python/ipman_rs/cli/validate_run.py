@@ -91,7 +91,7 @@ def plan(folder: Path, output: Path, model: str, person: str, rate: float, resum
     if person not in ("auto", "none", *names):
         raise ValueError(f"--person: expected auto, none or one of {', '.join(names)}, got {person!r}")
     ip.load_body(model)  # before anything is fitted
-    settings = Settings(config.load("markers"), model)
+    settings = Settings(config.load("markers"), model, subject=said.pop("subject", None))
     return Plan(folder, output, trials, settings, person, rate, resume, notes, unreadable, **said)
 
 
@@ -125,6 +125,8 @@ def _person(plan: Plan, recordings: list[Measured], told: Told) -> list[Record]:
             if name == chosen:
                 told.notes.append(f"{name} could not be compared: the others found their shapes themselves")
             continue
+        if fit["unknown"]:
+            told.notes.append(f"{name}: markers without a known place, not used: {', '.join(fit['unknown'])}")
         if np.isnan(weight) and _weighs(records[-1]):
             weight = records[-1]["mass"]["plates"]
     return records
@@ -157,6 +159,7 @@ def _read(plan: Plan, trial: Trial, told: Told) -> Measured | None:
     try:
         tracks = _tracks(plan, trial)
         flags = [*_admitted(trial.markers, _of_markers(tracks), plan.force)]
+        told.notes += [f"{trial.name}: {note}" for note in tracks.notes]
     except FileError as error:
         told.failures.append(error)
         if trial.name == plan.person or (plan.person == "auto" and trial.still):
@@ -181,7 +184,7 @@ def _read(plan: Plan, trial: Trial, told: Told) -> Measured | None:
 
 def _tracks(plan: Plan, trial: Trial) -> Tracks:
     try:
-        return markers.read(trial.markers, plan.up)
+        return markers.read(trial.markers, plan.up, plan.settings.subject)
     except (ValueError, ImportError) as error:
         raise FileError(trial.markers, str(error)) from error
 
@@ -194,7 +197,7 @@ def _of_markers(tracks: Tracks) -> list[check.Finding]:
     found = check.size_of_body("markers", points)
     if not any(each.level == "wrong" for each in found):
         found += standing("markers", tracks.points[some], seen, "y")
-    return found + (judge.rate(rate_of(tracks)) if len(tracks) > 1 else [])
+    return found + (judge.rate(tracks.rate) if len(tracks) > 1 else [])
 
 
 def _admitted(path: Path, findings: Iterable[check.Finding], force: bool) -> tuple[str, ...]:
@@ -203,12 +206,6 @@ def _admitted(path: Path, findings: Iterable[check.Finding], force: bool) -> tup
         return judge.admit(path, findings, force)
     except judge.NoPerson as error:
         raise FileError(path, str(error)) from error
-
-
-def rate_of(tracks: Tracks) -> float:
-    """Samples a second, by the first time and the last: single ones are often rounded to milliseconds."""
-    lasted = float(tracks.times[-1] - tracks.times[0])
-    return (len(tracks) - 1) / lasted if lasted > 0 else 1.0
 
 
 def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
@@ -226,7 +223,7 @@ def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
 def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
     assert trial.com is not None
     try:
-        found = measured.center_of_mass(trial.com, tracks.times, plan.up)
+        found = measured.center_of_mass(trial.com, tracks.times, plan.up, plan.settings.subject)
     except ValueError as error:
         raise FileError(trial.com, str(error)) from error
     if not np.isfinite(found).any():
@@ -237,7 +234,7 @@ def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
 
 
 def _fitted(plan: Plan, one: Measured, person: str | None) -> Record:
-    every = max(1, round(rate_of(one.tracks) / plan.rate))
+    every = max(1, round((one.tracks.rate or 1.0) / plan.rate))
     recording = Recording(one.trial.name, str(one.trial.markers), [one.trial.markers])
     return kept(recording, plan.settings, Pace(every), plan.output, plan.resume, person)
 

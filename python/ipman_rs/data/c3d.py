@@ -1,28 +1,35 @@
-"""C3D files: points, and the analogue channels of force plates. Needs the extra `c3d`: pip install "ipman_rs[c3d]"."""
+"""C3D files: points, the outputs of models among them, and the analogue channels of force plates."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .tracks import METRES, Tracks, tracks
+from . import c3d_format
+from .c3d_format import Parameters, several
+from .tracks import METRES, Named, Tracks, named, seen_of, tracks
+from .units import metres
 
 Array = NDArray[np.float64]
 
-BLOCK = 512  # bytes; a file's parts begin at blocks
+AGAIN = "write it again with Mokka or the program that recorded it"
+GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS", "SYMBOLIC")  # of POINT
+OUTPUTS = re.compile(r".*(?:Angles?|Moment|Force|Power|GRF|Progress\w*)(?:Harrington)?|Cent(?:re|er)OfMass\w*")
+CENTER_OF_MASS = ("centreofmass", "centerofmass", "com", "wholebodycom")  # free of case and punctuation
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
     """What a file holds: P points in T samples, in the file's own unit and axes, and A analogue channels beside them.
 
-    A point that was not seen is NaN. `parameters` are ezc3d's, by group and name: see `values`.
+    A point that was not seen is NaN. `outputs` and `markers` part the points into what a model computed and the rest.
     """
 
     names: tuple[str, ...]  # P, as the file has them, such as "SensorMat:M_1"
@@ -30,102 +37,156 @@ class Recording:
     times: Array  # (T,) s
     rate: float  # Hz, of the points; 0 if the file does not say
     unit: str  # of the points; "" if the file does not say
-    up: str  # "x", "y" or "z": its Y_SCREEN, z if it has none
+    up: str  # "x", "y" or "z": its Y_SCREEN; without one the axis that its force plates face, or z
     analogs: Array  # (T * n, A), n samples of the channels to one of the points
-    parameters: Any
+    parameters: Parameters  # by group and name
     source: str
+    notes: tuple[str, ...] = ()  # what was mended in reading
 
-    def values(self, group: str, name: str) -> list[Any]:
+    def values(self, group: str, name: str) -> list:
         """A parameter's values, flat; none if there is no such parameter."""
-        try:
-            return list(np.ravel(self.parameters[group][name]["value"], order="F"))
-        except KeyError:
-            return []
+        return list(self.parameters.get(group, {}).get(name, []))
+
+    @property
+    def has_plates(self) -> bool:
+        """Whether it has force plates, and what they measured."""
+        return _number(self.parameters.get("FORCE_PLATFORM", {}), "USED") > 0 and len(self.analogs) > 0
+
+    @property
+    def subjects(self) -> list[str]:
+        """The people, or things, whose names stand before a colon in the points' ("S01:LASI")."""
+        people = (name.rpartition(":")[0].strip() for name in self.names)
+        return [*dict.fromkeys(person for person in people if person)]
+
+    @cached_property
+    def outputs(self) -> Mapping[str, Array]:
+        """What a model computed (T, 3) by name, in its own unit: angles, moments, powers, axes, centre of mass."""
+        return {self.names[column]: self.points[:, column] for column in self._computed}
+
+    @cached_property
+    def _computed(self) -> list[int]:
+        said = {name for group in GROUPS for name in several(self.parameters.get("POINT", {}), group)}
+        bare = [name.rpartition(":")[2] for name in self.names]
+        axes = {name[:3] for name in bare if all(name[:3] + end in bare for end in "OALP")}  # LFEO, LFEA, LFEL, LFEP
+        return [
+            column
+            for column, (name, own) in enumerate(zip(self.names, bare, strict=True))
+            if name in said
+            or own in said
+            or OUTPUTS.fullmatch(own)
+            or (len(own) == 4 and own[:3] in axes and own[3] in "OALP")
+            or _plain(own) in CENTER_OF_MASS
+        ]
+
+    def markers(self, subject: str | None = None) -> Named:
+        """The points that are markers of the person, without the subject before a colon; see `tracks.named`.
+
+        ValueError for two people of whom none is chosen.
+        """
+        computed = set(self._computed)
+        rest = [column for column in range(len(self.names)) if column not in computed]
+        seen, _ = seen_of(self.points[:, rest], [self.names[column] for column in rest])
+        chosen = named([self.names[column] for column in rest], seen, self.source, subject)
+        return Named(chosen.names, [rest[column] for column in chosen.columns], chosen.notes)
+
+    def center_of_mass(self, subject: str | None = None) -> Array | None:
+        """The whole body's centre of mass (T, 3) m in the file's axes, as a model such as Plug-in Gait computed it.
+
+        NaN where it has none; None if it is not in the file. `subject`: where there are several people.
+        """
+        for column in self._computed:
+            person, _, name = self.names[column].rpartition(":")
+            if _plain(name) in CENTER_OF_MASS and subject in (None, person):
+                points = self.points[:, column] * self._metres()
+                return np.where((points == 0).all(axis=-1, keepdims=True), np.nan, points)
+        return None
 
     def positions(self, names: Sequence[str]) -> Array:
         """(T, n, 3) m of these points; ValueError if one is missing, or in an unknown unit."""
         missing = [name for name in names if name not in self.names]
         if missing:
             raise ValueError(f"{self.source}: no point {missing[0]!r}; it has {', '.join(self.names) or 'none'}")
-        if self.unit.lower() not in METRES:
+        return self.places([self.names.index(name) for name in names])
+
+    def places(self, columns: Sequence[int]) -> Array:
+        """(T, n, 3) m of the points in these columns. ValueError for an unknown unit."""
+        return self.points[:, columns] * self._metres()
+
+    def _metres(self) -> float:
+        scale = metres(self.unit)
+        if scale is None:
             raise ValueError(f"{self.source}: units: expected one of {', '.join(METRES)}, got {self.unit!r}")
-        return self.points[:, [self.names.index(name) for name in names]] * METRES[self.unit.lower()]
+        return scale
 
 
 def read(path: str | os.PathLike[str]) -> Recording:
-    """The content of a C3D file.
-
-    ImportError without the extra. ValueError, naming the file, if it is missing, damaged or shorter than it says.
-    """
-    try:
-        import ezc3d
-    except ImportError as error:
-        raise ImportError(f'C3D files need ezc3d: pip install "ipman_rs[c3d]" ({error})') from error
+    """The content of a C3D file. ValueError, naming the file, if it is missing, damaged or shorter than it says."""
     path = Path(path)
     if not path.is_file():
         raise ValueError(f"{path}: no such file")
-    _whole(path)
     try:
-        content = ezc3d.c3d(str(path))
-    except Exception as error:  # of a dozen types
-        raise ValueError(f"{path}: expected a C3D file: {error}") from None
-    about = content["parameters"]["POINT"]
-    points = np.moveaxis(content["data"]["points"][:3], 0, -1).swapaxes(0, 1)  # (T, P, 3)
-    names = [str(name).strip() for name in _values(about, "LABELS")]
-    for more in range(2, 2 + points.shape[1] // 255):  # a parameter holds up to 255 labels, LABELS2 the next
-        names += [str(name).strip() for name in _values(about, f"LABELS{more}")]
-    if len(names) < points.shape[1]:
-        raise ValueError(f"{path}: expected {points.shape[1]} names of points, got {len(names)}")
-    rate = float((_values(about, "RATE") or [0.0])[0])
-    first = content["header"]["points"]["first_frame"]
+        content = c3d_format.content(path.read_bytes())
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from None
+    except ValueError as error:
+        said = str(error)
+        raise ValueError(f"{path}: {said}" if said.endswith("?") else f"{path}: {said}; {AGAIN}") from None
+    about, count = content.parameters["POINT"], content.points.shape[1]
+    names = [str(name) for name in several(about, "LABELS")][:count]
+    names += [""] * (count - len(names))
+    rate = _number(about, "RATE")
     return Recording(
-        names=tuple(names[: points.shape[1]]),
-        points=np.asarray(points, np.float64),
-        times=(first + np.arange(len(points))) / (rate if rate > 0 else 1.0),
+        names=tuple(names),
+        points=content.points,
+        times=(content.first + np.arange(len(content.points))) / (rate if rate > 0 else 1.0),
         rate=rate,
-        unit="".join(_values(about, "UNITS")[:1]).strip(),
-        up="".join(_values(about, "Y_SCREEN"))[-1:].lower() or "z",
-        analogs=np.asarray(content["data"]["analogs"][0].T, np.float64),
-        parameters=content["parameters"],
+        unit="".join(str(value) for value in about.get("UNITS", [])[:1]),
+        up="".join(str(value) for value in about.get("Y_SCREEN", []))[-1:].lower() or _faced(content.parameters),
+        analogs=content.analogs,
+        parameters=content.parameters,
         source=str(path),
+        notes=content.notes,
     )
 
 
-def markers(path: str | os.PathLike[str], up: str | None = None) -> Tracks:
+def markers(path: str | os.PathLike[str], up: str | None = None, subject: str | None = None) -> Tracks:
     """The markers of a C3D file; which axis is up says its Y_SCREEN, z if it does not.
 
-    ImportError without the extra. ValueError, naming the file, if it is missing, damaged or has no markers.
+    `subject`: of whom, where the file has several people. ValueError, naming the file, if it is missing, damaged, has
+    no markers, or has those of several people of whom none is chosen.
     """
     found = read(path)
-    names = [name.rpartition(":")[2] for name in found.names]  # without the subject
-    return tracks(names, found.points, found.times, found.unit, up or found.up, found.source)
+    if not found.names and "ROTATION" in found.parameters:
+        raise ValueError(f"{path}: expected markers, it has rotations of segments only, as Theia writes them")
+    computed = set(found._computed)
+    rest = [column for column in range(len(found.names)) if column not in computed]
+    notes = list(found.notes)
+    if computed:
+        notes.append(f"{len(computed)} outputs of a model are no markers: {_some(list(found.outputs))}")
+    names = [found.names[column] for column in rest]
+    up = up or found.up
+    return tracks(names, found.points[:, rest], found.times, found.unit, up, found.source, subject=subject, notes=notes)
 
 
-def _values(about: Any, name: str) -> list[Any]:
-    return list(about[name]["value"]) if name in about else []
+def _faced(parameters: Parameters) -> str:
+    """The axis that the first force plate faces, by its corners; z if it has none."""
+    corners = np.array(parameters.get("FORCE_PLATFORM", {}).get("CORNERS", [])[:12])
+    if corners.size != 12 or corners.dtype.kind not in "if" or not np.isfinite(corners).all():
+        return "z"
+    first, second, third, fourth = corners.reshape(4, 3).astype(np.float64)
+    normal = np.abs(np.cross(third - first, fourth - second))
+    return "xyz"[int(normal.argmax())] if normal.max() > 0 else "z"
 
 
-def _whole(path: Path) -> None:
-    """ValueError for a file that ends before the data that its header announces: ezc3d reads on in zeros."""
-    with path.open("rb") as stream:
-        header = stream.read(BLOCK)
-    size = path.stat().st_size
-    if size < BLOCK or header[1] != 0x50:
-        raise ValueError(f"{path}: expected a C3D file, got something else")
-    if header[0] == 0 or size < (header[0] - 1) * BLOCK + 4:
-        raise ValueError(f"{path}: expected a C3D file: it ends before its parameters; is the download complete?")
-    with path.open("rb") as stream:
-        stream.seek((header[0] - 1) * BLOCK + 3)
-        processor = stream.read(1)[0] - 83
-    order = ">" if processor == 3 else "<"  # 1 Intel, 2 DEC (its integers are Intel's), 3 MIPS
-    points, analogs, first, last = np.frombuffer(header, f"{order}u2", 4, 2)
-    scale = np.frombuffer(header, f"{order}u2", 2, 12)
-    start = int(np.frombuffer(header, f"{order}u2", 1, 16)[0])
-    # Any float is negative if its sign bit is set; DEC's lies in the first of its two words.
-    negative = bool(scale[0 if processor == 2 or order == ">" else 1] >> 15)
-    frames = int(last) - int(first) + 1
-    if last == 0xFFFF or frames < 1:  # more frames than fit into two bytes: parameters say how many
-        frames = 1
-    needed = (start - 1) * BLOCK + frames * (4 * int(points) + int(analogs)) * (4 if negative else 2)
-    if size < needed:
-        raise ValueError(f"{path}: expected {needed} bytes by its header, got {size}: is the download complete?")
+def _plain(name: str) -> str:
+    return re.sub(r"[\W_]", "", name).lower()
+
+
+def _number(about: Mapping[str, list], name: str) -> float:
+    """A parameter's first number; 0 for none and for one that is no number."""
+    value = about.get(name, [])[:1]
+    return float(value[0]) if value and isinstance(value[0], (int, float)) and np.isfinite(value[0]) else 0.0
+
+
+def _some(names: Sequence[str], most: int = 4) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

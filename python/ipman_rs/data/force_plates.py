@@ -1,10 +1,17 @@
 """Force plates: forces, and the centre of pressure computed from the raw forces and moments of a `.c3d` file.
 
 Expected: a `.c3d` file, or a folder of them, with POINT (markers, in the unit that UNITS says, the vertical axis that
-Y_SCREEN says, z without it) and FORCE_PLATFORM (TYPE 2 or 4 with six channels Fx, Fy, Fz, Mx, My, Mz, or TYPE 3 with
-the eight of a Kistler plate; CORNERS, ORIGIN, CHANNEL) over ANALOG, in N and N mm or N m. Such files come from any
-motion capture laboratory. Frames have the file's axes and the rate of its points; `joints` are its markers, the ground
-is the plates' surface (the axis' zero without plates). No cameras. Needs the extra `c3d`.
+Y_SCREEN says, without it the one that the plates face, or z) and FORCE_PLATFORM over ANALOG, in N and N mm or N m (in
+any spelling). Plates of these types are computed (CORNERS, ORIGIN, CHANNEL), others left out with a note:
+
+1  Fx, Fy, Fz, the centre of pressure Px, Py, and the free moment Mz (BTS, EMS)
+2  Fx, Fy, Fz, Mx, My, Mz (AMTI, Bertec; all that Vicon Nexus and Qualisys write)
+3  the eight channels of a Kistler plate
+4  as 2, raw, with a matrix CAL_MATRIX
+
+Such files come from any motion capture laboratory. Frames have the file's axes and the rate of its points; `joints` are
+its markers (without points without a name and what models computed), the ground is the plates' surface (the axis' zero
+without plates). No cameras.
 """
 
 from __future__ import annotations
@@ -21,20 +28,31 @@ from numpy.typing import ArrayLike, NDArray
 from ipman_rs.ground import Ground
 
 from . import c3d, sequences
-from .check import Finding, demanded
+from .c3d_format import several
+from .check import Finding, demanded, size_of_body
 from .frames import DataSet, Frames
 from .joined import Joined
-from .tracks import METRES, TO_Y_UP
+from .tracks import METRES, TO_Y_UP, seen_of
+from .units import metres, newton_metres, newtons
 
 NAME = "force-plates"
 
 Array = NDArray[np.float64]
 
 LOADED = 20.0  # N: with less, a plate's centre of pressure is noise
+MOST = 64  # plates
+SHORTEST, LONGEST = 0.05, 4.0  # m: sides of a plate
 LEVEL = 0.7  # cosine: of several plates, one at least lies level; others may be ramps or walls
 UP = {axis: TO_Y_UP[axis].T @ (0.0, 1.0, 0.0) for axis in TO_Y_UP}
-CHANNELS = {2: 6, 3: 8, 4: 6}  # of a plate, by its type
-NEWTON_METRES = {"nmm": 1e-3, "n.mm": 1e-3, "n*mm": 1e-3, "ncm": 1e-2, "nm": 1.0, "n.m": 1.0, "n*m": 1.0}
+CHANNELS = {1: 6, 2: 6, 3: 8, 4: 6}  # of a plate, by its type
+OTHER_TYPES = {  # what they are, for whoever has one
+    5: "eight channels with a matrix",
+    6: "twelve channels with a matrix",
+    7: "a Kistler plate with a matrix",
+    11: "Kistler's treadmill",
+    12: "Kistler's treadmill with two belts",
+    21: "AMTI's stairs",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,21 +132,24 @@ def read(path: str | os.PathLike[str], up: str | None = None) -> ForcePlates:
     """The force plates of a `.c3d` file in its axes, metres and newtons, at the rate of its analogue channels.
 
     `up`: which axis of the file is up, if it does not say so rightly. The centre of pressure lies on the plate's
-    surface, the plane of its corners. A baseline (FORCE_PLATFORM:ZERO) is not subtracted. ImportError without the
-    extra. ValueError, naming the file, for whatever is missing, damaged or of an unknown type.
+    surface, the plane of its corners. A baseline (FORCE_PLATFORM:ZERO) is not subtracted. A plate that cannot be
+    computed is left out, `notes` say why. ValueError, naming the file, if it is damaged or no plate can be computed.
     """
     return of_recording(c3d.read(Path(path)), up)
 
 
 def of_recording(found: c3d.Recording, up: str | None = None) -> ForcePlates:
     """As `read`."""
-    used = int((found.values("FORCE_PLATFORM", "USED") or [0])[0])
-    if used == 0:
+    used = (_whole(found, "USED") or [0])[0]
+    if used < 1:
         raise ValueError(f"{found.source}: expected force plates (FORCE_PLATFORM), it has none")
     if (up or found.up) not in UP:
         raise ValueError(f"{found.source}: up: expected x, y or z, got {up or found.up!r}")
     vertical = UP[up or found.up]
-    plates = [_Plate.of(found, index) for index in range(used)]
+    count = len(found.analogs) // max(len(found.times), 1)
+    if count == 0:
+        raise ValueError(f"{found.source}: expected samples of the force plates, it has none")
+    plates, notes = _usable(found, used)
     normals = np.abs([plate.axes[:, 2] for plate in plates])
     if (normals @ np.abs(vertical)).max() < LEVEL:
         axis = "xyz"[int(normals[0].argmax())]
@@ -138,13 +159,45 @@ def of_recording(found: c3d.Recording, up: str | None = None) -> ForcePlates:
         )
     wrenches = [plate.wrench(vertical) for plate in plates]
     forces, points, moments = (np.stack(part, axis=1) for part in zip(*wrenches, strict=True))
-    count = len(found.analogs) // max(len(found.times), 1)
-    if count == 0:
-        raise ValueError(f"{found.source}: expected samples of the force plates, it has none")
     rate = found.rate * count if found.rate > 0 else float(count)
     times = found.times[0] + np.arange(len(found.analogs)) / rate
     corners = np.stack([plate.corners for plate in plates])
-    return ForcePlates(times, forces, points, moments, vertical, found.source, corners)
+    return ForcePlates(times, forces, points, moments, vertical, found.source, corners, notes)
+
+
+def _usable(found: c3d.Recording, used: int) -> tuple[list[_Plate], tuple[str, ...]]:
+    """The plates that can be computed, and what is wrong with the others. ValueError if it is something with each."""
+    plates, wrong = [], []
+    scale, notes = _plates_unit(found)
+    for index in range(min(used, MOST)):
+        try:
+            plate = _Plate.of(found, index, scale)
+            _ = plate.axes  # of corners that make a plate
+            plates.append(plate)
+        except ValueError as error:
+            wrong.append(str(error))
+    if not plates:
+        raise ValueError(wrong[0])
+    return plates, (*notes, *(f"{what.removeprefix(f'{found.source}: ')}; left out" for what in wrong))
+
+
+def _plates_unit(found: c3d.Recording) -> tuple[float, tuple[str, ...]]:
+    """Metres in the unit of corners and origins: the points', unless only the points, a person's, can be in it."""
+    scale = metres(found.unit)
+    if scale is None:
+        raise ValueError(f"{found.source}: units: expected one of {', '.join(METRES)}, got {found.unit!r}")
+    values = [value for value in found.values("FORCE_PLATFORM", "CORNERS") if isinstance(value, (int, float))]
+    corners = np.array(values[: len(values) // 12 * 12], float).reshape(-1, 4, 3)
+    sides = np.linalg.norm(corners[:, 0] - corners[:, 1], axis=-1)
+    sides = sides[np.isfinite(sides) & (sides > 0)]
+    if not len(sides) or np.median(sides) * scale <= LONGEST or not SHORTEST < np.median(sides) * 1e-3 <= LONGEST:
+        return scale, ()
+    own = found.markers(next(iter(found.subjects), None))
+    seen, _ = seen_of(found.points[:, own.columns], own.names)
+    points = np.where(seen[..., None], found.places(own.columns), np.nan)
+    if not seen.any() or size_of_body("points", points)[0].level != "ok":
+        return scale, ()  # all are in another unit than the file says
+    return 1e-3, (f"the corners of the force plates are in millimetres, its points in {found.unit}",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,45 +206,40 @@ class _Plate:
 
     place: str  # file and number, for errors
     corners: Array  # (4, 3) m, in the world: at +x +y, -x +y, -x -y, +x -y
-    origin: Array  # (3,) m, from the transducer to the middle of the surface, in the plate's axes
     forces: Array  # (T, 3) N
-    moments: Array  # (T, 3) N m
+    points: Array  # (T, 2) m, centres of pressure from the middle of the surface; not finite without a load
+    free: Array  # (T,) N m about z at the centre of pressure
 
     @classmethod
-    def of(cls, found: c3d.Recording, index: int) -> _Plate:
+    def of(cls, found: c3d.Recording, index: int, scale: float) -> _Plate:
+        """`scale`: metres in the unit of its corners and origin."""
         place = f"{found.source}: force plate {index + 1}"
-        kind = _of_plate(found, "TYPE", index, 1)
-        if not kind or int(kind[0]) not in CHANNELS:
-            got = f"type {int(kind[0])}" if kind else "none"
-            raise ValueError(f"{place}: TYPE: expected one of {', '.join(map(str, CHANNELS))}, got {got}")
-        scale = METRES.get(found.unit.lower())
-        if scale is None:
-            raise ValueError(f"{place}: units: expected one of {', '.join(METRES)}, got {found.unit!r}")
-        corners = np.array(_of_plate(found, "CORNERS", index, 12), float)
-        origin = np.array(_of_plate(found, "ORIGIN", index, 3), float)
-        for name, got, size in (("CORNERS", corners, 12), ("ORIGIN", origin, 3)):
-            if got.size != size or not np.isfinite(got).all():
-                raise ValueError(f"{place}: {name}: expected {size} numbers, got {got.size}")
-        signals = _signals(found, index, int(kind[0]), place)
-        forces, moments = _kistler(signals, origin * scale) if int(kind[0]) == 3 else (signals[:, :3], signals[:, 3:])
+        kind = _type(found, index, place)
+        corners = _numbers_of_plate(found, "CORNERS", index, 12, place).reshape(4, 3) * scale
+        origin = _numbers_of_plate(found, "ORIGIN", index, 3, place) * scale
+        signals = _signals(found, index, kind, scale, place)
+        if kind == 1:
+            return cls(place, corners, signals[:, :3], signals[:, 3:5], signals[:, 5])
+        forces, moments = _kistler(signals, origin) if kind == 3 else (signals[:, :3], signals[:, 3:])
         # The sensors lie under the surface and z points down, but many files have the vector the other way round.
-        origin = -origin * scale if origin[2] > 0 else origin * scale
-        if int(kind[0]) == 3:
+        origin = -origin if origin[2] > 0 else origin
+        if kind == 3:
             origin = np.array([0.0, 0.0, origin[2]])
-        return cls(place, corners.reshape(4, 3) * scale, origin, forces, moments)
+        moments = moments - np.cross(origin, forces)  # about the middle of the surface
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            x, y = -moments[:, 1] / forces[:, 2], moments[:, 0] / forces[:, 2]
+            free = moments[:, 2] - x * forces[:, 1] + y * forces[:, 0]
+        return cls(place, corners, forces, np.stack([x, y], axis=1), free)
 
     def wrench(self, up: Array) -> tuple[Array, Array, Array]:
         """Force on the body, centre of pressure and moment about it, each (T, 3), in the world."""
         axes = self.axes
-        forces = self.forces
-        moments = self.moments - np.cross(self.origin, forces)  # about the middle of the surface
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x, y = -moments[:, 1] / forces[:, 2], moments[:, 0] / forces[:, 2]
-        free = moments[:, 2] - x * forces[:, 1] + y * forces[:, 0]
-        points = self.corners.mean(axis=0) + np.stack([x, y], axis=1) @ axes[:, :2].T
-        force, moment = forces @ axes.T, free[:, None] * axes[:, 2]
+        with np.errstate(invalid="ignore", over="ignore"):
+            points = self.corners.mean(axis=0) + self.points @ axes[:, :2].T
+            force, moment = self.forces @ axes.T, self.free[:, None] * axes[:, 2]
         # Some systems write the force on the plate, others that on the body. Nobody pulls at a plate.
         loads = force @ up
+        loads = loads[np.isfinite(loads)]
         sign = -1.0 if loads.size and -loads.min() > max(loads.max(), LOADED) else 1.0
         return sign * force, np.where(np.isfinite(points), points, np.nan), sign * np.nan_to_num(moment)
 
@@ -210,43 +258,71 @@ class _Plate:
         return np.stack([x, np.cross(z, x), z], axis=1).astype(np.float64)
 
 
-def _of_plate(found: c3d.Recording, name: str, index: int, size: int) -> list[float]:
-    """The numbers of one plate of a parameter whose last dimension is the plates."""
-    return found.values("FORCE_PLATFORM", name)[index * size : (index + 1) * size]
+def _type(found: c3d.Recording, index: int, place: str) -> int:
+    """Which of the types that can be computed."""
+    kind = next(iter(_whole(found, "TYPE")[index : index + 1]), None)
+    if kind in CHANNELS:
+        return kind
+    expected = f"TYPE: expected one of {', '.join(map(str, CHANNELS))}"
+    if kind is None:
+        raise ValueError(f"{place}: {expected}, got none")
+    what = f" ({OTHER_TYPES[kind]})" if kind in OTHER_TYPES else ""
+    raise ValueError(
+        f"{place}: {expected}, got type {kind}{what}; export its forces and moments as type 2, or as a .mot file"
+    )
 
 
-def _signals(found: c3d.Recording, index: int, kind: int, place: str) -> Array:
+def _whole(found: c3d.Recording, name: str) -> list[int]:
+    """The numbers of a parameter of counts; 0 for what is none."""
+    values = found.values("FORCE_PLATFORM", name)
+    return [int(value) if isinstance(value, (int, float)) and np.isfinite(value) else 0 for value in values]
+
+
+def _numbers_of_plate(found: c3d.Recording, name: str, index: int, size: int, place: str) -> Array:
+    """The numbers of one plate of a parameter whose last dimension is the plates. ValueError if some are missing."""
+    values = found.values("FORCE_PLATFORM", name)[index * size : (index + 1) * size]
+    got = np.array([value for value in values if isinstance(value, (int, float))], float)
+    if got.size != size or not np.isfinite(got).all():
+        raise ValueError(f"{place}: {name}: expected {size} numbers, got {int(np.isfinite(got).sum())}")
+    return got
+
+
+def _signals(found: c3d.Recording, index: int, kind: int, length: float, place: str) -> Array:
     """(T, 6 or 8) forces in N and moments in N m, or forces alone, in the plate's axes."""
     count = CHANNELS[kind]
-    stored = len(found.values("FORCE_PLATFORM", "CHANNEL")) // max(len(found.values("FORCE_PLATFORM", "TYPE")), 1)
-    channels = [int(number) - 1 for number in _of_plate(found, "CHANNEL", index, stored)[:count]]
+    stored = _whole(found, "CHANNEL")
+    each = len(stored) // max(len(_whole(found, "TYPE")), 1)
+    channels = [number - 1 for number in stored[index * each : (index + 1) * each][:count]]
     if len(channels) < count or min(channels) < 0 or max(channels) >= found.analogs.shape[1]:
         raise ValueError(
             f"{place}: CHANNEL: expected {count} of the {found.analogs.shape[1]} channels, got "
             f"{', '.join(str(channel + 1) for channel in channels) or 'none'}"
         )
     signals = found.analogs[:, channels]
-    units = [str(unit).strip().lower() for unit in found.values("ANALOG", "UNITS")]
+    units = [str(unit) for unit in several(found.parameters.get("ANALOG", {}), "UNITS")]
     units = ["" if channel >= len(units) else units[channel] for channel in channels]
-    if kind == 4:  # raw channels, turned into forces and moments by a matrix
-        matrix = np.array(_of_plate(found, "CAL_MATRIX", index, 36), float)
-        if matrix.size != 36:
-            raise ValueError(f"{place}: CAL_MATRIX: expected 36 numbers, got {matrix.size}")
-        signals, units = signals @ matrix.reshape(6, 6), [""] * 6
-    return signals * [_scale(unit, channel >= 3 and kind != 3, found.unit, place) for channel, unit in enumerate(units)]
+    matrix = found.values("FORCE_PLATFORM", "CAL_MATRIX")
+    if kind == 4 and matrix:  # raw channels, turned into forces and moments by a matrix; Cortex leaves it empty
+        matrix = _numbers_of_plate(found, "CAL_MATRIX", index, 36, place)
+        with np.errstate(invalid="ignore", over="ignore"):
+            signals, units = signals @ matrix.reshape(6, 6), [""] * 6
+    return signals * [_scale(unit, kind, column, length, place) for column, unit in enumerate(units)]
 
 
-def _scale(unit: str, moment: bool, length: str, place: str) -> float:
-    """What makes N or N m of a channel; moments without a unit go with the points'."""
-    if not moment:
-        if unit in ("", "n"):
-            return 1.0
-    elif unit in NEWTON_METRES:
-        return NEWTON_METRES[unit]
-    elif unit == "":
-        return METRES[length.lower()]
-    expected = f"one of {', '.join(NEWTON_METRES)}" if moment else "N"
-    raise ValueError(f"{place}: ANALOG:UNITS: expected {expected}, got {unit!r}: is the plate calibrated?")
+def _scale(unit: str, kind: int, column: int, length: float, place: str) -> float:
+    """What makes N, m or N m of a channel; lengths and moments without a unit go with the plate's `length`."""
+    if column < 3 or kind == 3:
+        expected, scale = "N", 1.0 if not unit.strip() else newtons(unit)
+    elif kind == 1 and column < 5:
+        # Px and Py are lengths, whatever unit of force the program gave all six channels.
+        expected, scale = "mm or m", metres(unit) or (length if not unit.strip() or newtons(unit) else None)
+    elif kind == 1 and newtons(unit):
+        expected, scale = "N mm or N m", length
+    else:
+        expected, scale = "N mm or N m", length if not unit.strip() else newton_metres(unit)
+    if scale is None:
+        raise ValueError(f"{place}: ANALOG:UNITS: expected {expected}, got {unit!r}: is the plate calibrated?")
+    return scale
 
 
 def _kistler(signals: Array, origin: Array) -> tuple[Array, Array]:
@@ -258,33 +334,38 @@ def _kistler(signals: Array, origin: Array) -> tuple[Array, Array]:
     return forces, moments
 
 
-def open(path: str | os.PathLike[str], split: str | None = None, *, up: str | None = None) -> DataSet:
+def open(
+    path: str | os.PathLike[str], split: str | None = None, *, up: str | None = None, subject: str | None = None
+) -> DataSet:
     """Markers and forces of a `.c3d` file, or of all those in a folder, a sequence each. There are no splits.
 
-    Raises ImportError without the extra, ValueError naming the file for what is missing, damaged, or in units or axes
-    that cannot be.
+    `subject`: whose markers, where files have several people's. ValueError naming the file for what is missing,
+    damaged, or in units or axes that cannot be.
     """
     if split is not None:
         raise ValueError(f"split: recordings have none, got {split!r}")
     files = sequences.recordings(path, ".c3d")
     recordings = [c3d.read(file) for file in files]
-    names = list(dict.fromkeys(name for found in recordings for name in found.names))
-
-    parts = [of_file(found, file.stem, names, up) for file, found in zip(files, recordings, strict=True)]
+    names = list(dict.fromkeys(name for found in recordings for name in found.markers(subject).names))
+    parts = [of_file(found, file.stem, names, up, subject) for file, found in zip(files, recordings, strict=True)]
     return demanded(Path(path), Joined(sequences.measured_alike(parts)))
 
 
-def of_file(found: c3d.Recording, name: str, markers: Sequence[str], up: str | None = None) -> Frames:
+def of_file(
+    found: c3d.Recording, name: str, markers: Sequence[str], up: str | None = None, subject: str | None = None
+) -> Frames:
     """The frames of a recording, with these markers (NaN where it has none of the name)."""
     axis = up or found.up
     if axis not in UP:
         raise ValueError(f"{found.source}: up: expected x, y or z, got {axis!r}")
     joints = np.full((len(found.times), len(markers), 3), np.nan)
-    if found.names:
+    own = found.markers(subject)
+    if own.names:
         column = {marker: index for index, marker in enumerate(markers)}
-        joints[:, [column[marker] for marker in found.names]] = found.positions(found.names)
-        joints[(joints == 0).all(axis=-1)] = np.nan  # not seen, in some systems' files
-    plates = of_recording(found, up) if found.values("FORCE_PLATFORM", "USED")[:1] not in ([], [0]) else None
+        seen, _ = seen_of(found.points[:, own.columns], own.names)
+        places = np.where(seen[..., None], found.places(own.columns), np.nan)
+        joints[:, [column[marker] for marker in own.names]] = places
+    plates = of_recording(found, up) if found.has_plates else None
     return _frames(name, found, joints, list(markers), plates, UP[axis])
 
 
@@ -315,14 +396,25 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
     for file in files:
         try:
             content = c3d.read(file)
-            points = content.positions(content.names)
-            seen = np.isfinite(points).all(axis=-1) & (points != 0).any(axis=-1)
-            found += standing(file.name, points, seen, content.up)
+            own = content.markers()
+            seen, said = seen_of(content.points[:, own.columns], own.names)
+            found += standing(file.name, content.places(own.columns), seen, content.up)
+            found += [Finding("odd", f"{file.name}: {note}") for note in (*content.notes, *own.notes, *said)]
+            found += _outputs(file, content)
             found += sequences.told(file.name, open(file)[:])
-            found.append(_loads(file))
-        except (ValueError, ImportError) as error:
+            found += _loads(file)
+        except ValueError as error:
             found.append(Finding("wrong", str(error)))
     return found
+
+
+def _outputs(file: Path, content: c3d.Recording) -> list[Finding]:
+    """What a model has computed, which is not taken as markers."""
+    count = len(content.outputs)
+    if not count:
+        return []
+    com = "" if content.center_of_mass() is None else ", its centre of mass is a reference"
+    return [Finding("ok", f"{file.name}: {count} outputs of a model are no markers{com}")]
 
 
 def standing(what: str, markers: Array, seen: NDArray[np.bool_], up: str) -> list[Finding]:
@@ -335,18 +427,21 @@ def standing(what: str, markers: Array, seen: NDArray[np.bool_], up: str) -> lis
         return []
     low, high = np.nanmin(points, axis=1), np.nanmax(points, axis=1)
     extent, lowest = np.median(high - low, axis=0), np.median(low, axis=0)
-    axis = int(extent.argmax())
-    if "xyz"[axis] == up or extent["xyz".index(up)] > 0.8 or extent[axis] < 1.2 or not -0.3 < lowest[axis] < 0.5:
+    longest = int(extent.argmax())
+    axis = "xyz"[longest]
+    if axis == up or extent["xyz".index(up)] > 0.8 or extent[longest] < 1.2 or not -0.3 < lowest[longest] < 0.5:
         return []
-    said = f"{what}: looks like {'xyz'[axis]} up: markers reach from {lowest[axis]:.2f} m along {'xyz'[axis]} over "
-    return [Finding("wrong", f"{said}{extent[axis]:.2f} m, but up is said to be {up}", "or does this person lie?")]
+    reach = f"from {lowest[longest]:.2f} m along {axis} over {extent[longest]:.2f} m"
+    said = f"{what}: looks like {axis} up: markers reach {reach}, but up is said to be {up}"
+    return [Finding("wrong", said, "or does this person lie?", f"--up {axis}")]
 
 
-def _loads(file: Path) -> Finding:
+def _loads(file: Path) -> list[Finding]:
     try:
         plates = read(file)
     except ValueError as error:
-        return Finding("missing", str(error))
-    heaviest = float(plates.loads.sum(axis=1).max())
+        return [Finding("missing", str(error))]
+    found = [Finding("odd", f"{file.name}: {note}") for note in plates.notes]
+    heaviest = float(np.nan_to_num(plates.loads).sum(axis=1).max())
     said = f"{file.name}: {plates.forces.shape[1]} force plates, together up to {heaviest:.0f} N"
-    return Finding("ok", said) if heaviest > 200 else Finding("missing", said, "nobody stands on them")
+    return [*found, Finding("ok", said) if heaviest > 200 else Finding("missing", said, "nobody stands on them")]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ipman_rs.ground import Ground
 
-from . import external_loads, pairing, sequences, trc
+from . import external_loads, pairing, sequences, text_file, trc
 from .check import Finding, demand, demanded, size_of_body
 from .external_loads import ExternalLoads, Load
 from .force_plates import LOADED, UP, ForcePlates, between, standing
@@ -42,6 +42,7 @@ BESIDE = 0.5  # m: a centre of mass farther than that outside the markers is in 
 # ground_force_vx beside ground_torque_x; ground_force_1_vx beside ground_force_1_mx; f1_1 beside p1_1 and m1_1.
 OPENSIM_FORCE = re.compile(r"(.*)vx$")
 C3D_FORCE = re.compile(r"f(\d+)_1$")
+BMCLAB_FORCE = re.compile(r"([LR])GRF_X$")  # beside LCOP_X and LFREEMOMENT_Y, y up
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,7 @@ class Storage:
     columns: Mapping[str, Array]  # without the time
     in_degrees: bool | None  # of angles; None: the file does not say
     source: str
+    notes: tuple[str, ...] = ()  # where header and table differ
 
     def __len__(self) -> int:
         return len(self.times)
@@ -60,43 +62,61 @@ class Storage:
         """(T, 3) of three columns. ValueError for one that is missing."""
         missing = [name for name in names if name not in self.columns]
         if missing:
-            raise ValueError(f"{self.source}: no column {missing[0]!r}; it has {', '.join(self.columns) or 'none'}")
+            raise ValueError(f"{self.source}: no column {missing[0]!r}; it has {_some(self) or 'none'}")
         return np.stack([self.columns[name] for name in names], axis=1)
 
 
 def storage(path: str | os.PathLike[str]) -> Storage:
-    """The table of a `.mot` or `.sto` file.
+    """The table of a `.mot` or `.sto` file, or of a text whose first line has the columns' names, the time first.
 
-    ValueError, naming the file and line, for one that is missing, no storage, shorter than it says, without rows, or
-    with columns or times that cannot be.
+    Fewer or more rows than the header says are a note. ValueError, naming the file and line, for one that is missing,
+    no storage, without rows, or with columns or times that cannot be.
     """
-    try:
-        lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        raise ValueError(f"{path}: {error.strerror}") from None
+    lines = text_file.lines(path)
     end = next((number for number, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
-    if end is None:
+    if end is None and not (lines and lines[0].lower().split()[:1] == ["time"]):
         raise ValueError(f"{path}: expected a storage of OpenSim, whose header ends with 'endheader', got another text")
-    rows = [(number, line.split()) for number, line in enumerate(lines[end + 1 :], end + 2) if line.strip()]
+    header = lines[: end or 0]
+    first = 0 if end is None else end + 1
+    rows = [(number, line.split()) for number, line in enumerate(lines[first:], first + 1) if line.strip()]
     if not rows:
         raise ValueError(f"{path}: expected a line of column names after the header, the file ends there")
-    labels, table = rows[0][1], rows[1:]
-    twice = [label for index, label in enumerate(labels) if label in labels[:index]]
+    labels, table = _labels(lines[rows[0][0] - 1], rows), rows[1:]
+    twice = _twice(labels)
     if labels[0].lower() != "time" or twice:
-        told = f"the column {twice[0]!r} twice" if twice else f"{labels[0]!r} first"
+        told = f"the column {twice!r} twice" if twice else f"{labels[0]!r} first"
         raise ValueError(f"{path}: line {rows[0][0]}: expected the time first and different names, got {told}")
     numbers = _numbers(str(path), table, len(labels))
-    said = _said(lines[:end])
-    for name, got in (("rows", len(table)), ("columns", len(labels))):
-        if name in said and said[name] != got:
-            raise ValueError(f"{path}: expected {said[name]} {name} by its header, got {got}: is the file complete?")
     if not len(numbers):
         raise ValueError(f"{path}: expected rows of numbers, got none")
     if not (np.diff(numbers[:, 0]) > 0).all():
         row = int((~(np.diff(numbers[:, 0]) > 0)).argmax()) + 1
         raise ValueError(f"{path}: line {table[row][0]}: expected times that increase, got {numbers[row, 0]:g} s")
+    said = _said(header)
+    notes = [
+        f"its header says {said[name]} {name}, it has {got}"
+        for name, got in (("rows", len(table)), ("columns", len(labels)))
+        if name in said and said[name] != got
+    ]
     degrees = {"yes": True, "no": False}.get(str(said.get("indegrees", "")).lower())
-    return Storage(numbers[:, 0], dict(zip(labels[1:], numbers.T[1:], strict=True)), degrees, str(path))
+    columns = dict(zip(labels[1:], numbers.T[1:], strict=True))
+    return Storage(numbers[:, 0], columns, degrees, str(path), tuple(notes))
+
+
+def _labels(line: str, rows: list[tuple[int, list[str]]]) -> list[str]:
+    """The columns' names, which may have blanks in them where tabs part them."""
+    by_tabs = [label.strip() for label in line.strip().split("\t")]
+    return by_tabs if len(rows) > 1 and len(by_tabs) == len(rows[1][1]) else rows[0][1]
+
+
+def _twice(labels: list[str]) -> str | None:
+    """The first name that comes again."""
+    earlier: set[str] = set()
+    for label in labels:
+        if label in earlier:
+            return label
+        earlier.add(label)
+    return None
 
 
 def _numbers(path: str, table: list[tuple[int, list[str]]], width: int) -> Array:
@@ -105,10 +125,8 @@ def _numbers(path: str, table: list[tuple[int, list[str]]], width: int) -> Array
             raise ValueError(
                 f"{path}: line {number}: expected {width} columns, got {len(fields)}: is the file complete?"
             )
-    try:
-        return np.array([fields for _, fields in table], np.float64).reshape(len(table), width)
-    except ValueError as error:
-        raise ValueError(f"{path}: expected numbers: {error}") from None
+    places = [f"{path}: line {number}" for number, _ in table]
+    return text_file.table([fields for _, fields in table], places).reshape(len(table), width)
 
 
 def _said(header: list[str]) -> dict[str, int | str]:
@@ -126,7 +144,8 @@ def _said(header: list[str]) -> dict[str, int | str]:
 
 def has_plates(table: Storage) -> bool:
     """Whether there are ground forces in it."""
-    return any(OPENSIM_FORCE.match(name) or C3D_FORCE.match(name) for name in table.columns)
+    kinds = (OPENSIM_FORCE, C3D_FORCE, BMCLAB_FORCE)
+    return any(kind.match(name) for name in table.columns for kind in kinds)
 
 
 def has_center_of_mass(table: Storage) -> bool:
@@ -211,7 +230,12 @@ def loaded(found: ForcePlates, times: Array) -> list[Finding]:
 
 def _wrench(table: Storage, name: str) -> tuple[Array, Array, Array] | None:
     """Force, point and moment of the plate whose first column this is."""
-    adapter = C3D_FORCE.match(name)
+    adapter, bmclab = C3D_FORCE.match(name), BMCLAB_FORCE.match(name)
+    if bmclab:
+        f, p = ([f"{bmclab[1]}{kind}_{axis}" for axis in "XYZ"] for kind in ("GRF", "COP"))
+        free = table.columns.get(f"{bmclab[1]}FREEMOMENT_Y", np.zeros(len(table)))
+        moment = np.stack([0 * free, free, 0 * free], axis=1)
+        return table.vectors((f[0], f[1], f[2])), table.vectors((p[0], p[1], p[2])), moment
     if adapter:
         f, p, m = ([f"{letter}{adapter[1]}_{axis}" for axis in (1, 2, 3)] for letter in "fpm")
     else:

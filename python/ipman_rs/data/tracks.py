@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .units import METRES, metres
+
+__all__ = ["METRES", "TO_Y_UP", "Named", "Tracks", "named", "rate_of", "tracks"]
+
 Array = NDArray[np.float64]
 
-METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "um": 1e-6, "in": 0.0254}
 # Rotations that lead from a file's axes to ours, y up.
 TO_Y_UP = {
     "x": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
@@ -18,6 +22,11 @@ TO_Y_UP = {
     "z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
 }
 LARGEST = 20.0  # nobody's markers are farther apart, in metres; in millimetres everybody's are
+FARTHEST = 1e7  # in any unit: programs write a number beyond it for what was not seen, NDI's -3.697314e28
+# 999, 9999.99, 99999.9 …: what programs write for a marker that was not seen.
+NINES = np.array([10.0**whole - 10.0**-part for whole in range(3, 7) for part in range(8 - whole)])
+WORDS = 32767.0, 32768.0, 2147483648.0  # the last integers, which mean the same
+NAMELESS = re.compile(r"\*\d*|(?:unlabell?ed|unnamed|uname)[ _*-]*\d*", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +38,15 @@ class Tracks:
     confidence: Array  # (T, M), 0 or 1
     times: Array  # (T,) s
     source: str
+    notes: tuple[str, ...] = ()  # what of the file was left out or mended, a sentence each
 
     def __len__(self) -> int:
         return len(self.times)
+
+    @property
+    def rate(self) -> float:
+        """Samples a second; 0 of a single one."""
+        return rate_of(self.times)
 
     def select(self, names: Sequence[str]) -> Tracks:
         """These markers, in this order. ValueError for one that was not recorded."""
@@ -39,37 +54,147 @@ class Tracks:
         if missing:
             raise ValueError(f"names: {self.source} has no marker {missing[0]!r}; it has {', '.join(self.names)}")
         columns = [self.names.index(name) for name in names]
-        return Tracks(tuple(names), self.points[:, columns], self.confidence[:, columns], self.times, self.source)
+        return replace(self, names=tuple(names), points=self.points[:, columns], confidence=self.confidence[:, columns])
 
 
-def tracks(names: Sequence[str], points: Array, times: Array, unit: str, up: str, source: str) -> Tracks:
-    """From a file's own numbers: NaN, or exactly the origin, is a marker that was not seen. `unit` "" is guessed.
+def rate_of(times: Array) -> float:
+    """Samples a second, by the first time and the last: single ones are often rounded to milliseconds. 0 of one."""
+    lasted = float(times[-1] - times[0]) if len(times) > 1 else 0.0
+    return (len(times) - 1) / lasted if lasted > 0 else 0.0
 
-    ValueError for an unknown unit or axis, for no marker or sample, for a name that comes twice, if nothing was seen,
-    and for infinite coordinates.
+
+def tracks(
+    names: Sequence[str],
+    points: Array,
+    times: Array,
+    unit: str,
+    up: str,
+    source: str,
+    *,
+    subject: str | None = None,
+    notes: Sequence[str] = (),
+) -> Tracks:
+    """From a file's own numbers: NaN, exactly the origin, or a number that stands for it is a marker that was not seen.
+
+    `unit` "" is guessed. Names as `named` has them. ValueError for an unknown unit, axis or subject, for no marker or
+    sample, for two people, if nothing was seen, and for infinite coordinates.
     """
     if up not in TO_Y_UP:
-        raise ValueError(f"up: expected x, y or z, got {up!r}")
+        raise ValueError(f"{source}: up: expected x, y or z, got {up!r}")
     if points.size == 0:
         raise ValueError(f"{source}: expected markers and samples, got {points.shape[1]} and {points.shape[0]}")
-    twice = [name for index, name in enumerate(names) if name in names[:index]]
-    if twice:
-        raise ValueError(f"{source}: the marker {twice[0]!r} comes twice")
     if np.isinf(points).any():
         sample, marker, _ = np.argwhere(np.isinf(points))[0]
         raise ValueError(f"{source}: sample {sample}, marker {names[marker]!r}: expected numbers, got infinity")
-    seen = ~np.isnan(points).any(-1) & (points != 0).any(-1)
+    seen, said = seen_of(points, names)
+    chosen = named(names, seen, source, subject)
+    points, seen = points[:, chosen.columns], seen[:, chosen.columns]
     if not seen.any():
         raise ValueError(f"{source}: expected coordinates, all are missing")
     scale = _scale(unit, points[seen], source)
     turned = np.where(seen[..., None], points, 0.0) * scale @ TO_Y_UP[up].T
-    return Tracks(tuple(names), turned, seen.astype(float), np.asarray(times, float), source)
+    told = (*notes, *said, *chosen.notes)
+    return Tracks(chosen.names, turned, seen.astype(float), np.asarray(times, float), source, told)
+
+
+def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], list[str]]:
+    """Where markers (T, M, 3) were seen (T, M); and in words which numbers stand for one that was not."""
+    there = ~np.isnan(points).any(-1) & (points != 0).any(-1)
+    with np.errstate(invalid="ignore"):
+        size = np.abs(points)
+        nines = (size >= 999) & (size < FARTHEST)
+        nines[nines] = np.isclose(size[nines][:, None], NINES, rtol=6e-8, atol=0).any(-1)  # half of float32's spacing
+        far = (size >= FARTHEST).any(-1)
+        alike = (size == size[..., :1]).all(-1)
+    stands = far | (nines & (size >= 9999)).any(-1) | (alike & (nines.all(-1) | np.isin(size[..., 0], WORDS)))
+    stands &= there
+    if not stands.any():
+        return there, []
+    which = [names[column] or "one without a name" for column in np.flatnonzero(stands.any(axis=0))]
+    first = points[stands][0]
+    value = first[int(np.abs(first).argmax())]
+    return there & ~stands, [f"{value:.7g} is taken as not seen ({_some(which)})"]
+
+
+@dataclass(frozen=True)
+class Named:
+    """Which of a file's points are markers of the person, and what they are called."""
+
+    names: tuple[str, ...]
+    columns: list[int]
+    notes: tuple[str, ...]
+
+
+def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: str | None = None) -> Named:
+    """The markers by name, without the subject that stands before a colon ("S01:LASI").
+
+    Left out, and named: points without a name, the shorter of two markers of one name, other people than `subject`.
+    ValueError for two people of whom none is chosen, and for an unknown one.
+    """
+    notes = []
+    known = [column for column, name in enumerate(names) if name.strip() and not _nameless(name)]
+    if len(known) < len(names):
+        notes.append(f"{_count(len(names) - len(known), 'point')} without a name left out")
+    split = {column: names[column].rpartition(":") for column in known}
+    people = dict.fromkeys(split[column][0].strip() for column in known)
+    chosen = _person([*people], split, seen, source, subject)
+    if chosen is not None:
+        others = [column for column in known if split[column][0].strip() not in ("", chosen)]
+        known = [column for column in known if column not in set(others)]
+        if others:
+            of = ", ".join(dict.fromkeys(split[column][0].strip() for column in others))
+            notes.append(f"the markers of {chosen} are taken, those of {of} left out ({len(others)})")
+    best: dict[str, int] = {}
+    twice = []
+    for column in known:
+        name = split[column][2].strip()
+        if name in best:
+            twice.append(name)
+        if name not in best or seen[:, column].sum() > seen[:, best[name]].sum():
+            best[name] = column
+    if twice:
+        of = _some([*dict.fromkeys(twice)])
+        notes.append(f"more than one marker is called {of}: of each the one that was seen the longest is taken")
+    return Named(tuple(best), list(best.values()), tuple(notes))
+
+
+def _nameless(name: str) -> bool:
+    return NAMELESS.fullmatch(name.rpartition(":")[2].strip()) is not None
+
+
+def _person(
+    people: list[str], split: dict[int, tuple[str, str, str]], seen: NDArray[np.bool_], source: str, subject: str | None
+) -> str | None:
+    """The chosen subject; None where all the markers can be of one person."""
+    if subject is not None:
+        known = {person.lower(): person for person in people if person}
+        if subject.strip().rstrip(":").lower() not in known:
+            expected = f"one of {', '.join(known.values())}" if known else "none, for no marker has one"
+            raise ValueError(f"{source}: subject: expected {expected}, got {subject!r}")
+        return known[subject.strip().rstrip(":").lower()]
+    markers = {person: {split[c][2].strip() for c in split if split[c][0].strip() == person} for person in people}
+    shown = [p for p in people if any(seen[:, c].any() for c in split if split[c][0].strip() == p)]
+    rivals = [p for p in shown if p and any(markers[p] & markers[other] for other in shown if other and other != p)]
+    if not rivals:
+        hidden = [p for p in people if p and p not in shown]
+        return next((p for p in shown if p and any(markers[p] & markers[other] for other in hidden)), None)
+    of = " and ".join(f"{person} ({_count(len(markers[person]), 'marker')})" for person in rivals)
+    raise ValueError(f"{source}: two people in it, {of}: say which one (subject={rivals[0]!r}, --subject {rivals[0]})")
 
 
 def _scale(unit: str, seen: Array, source: str) -> float:
     """Metres a unit."""
     if unit:
-        if unit.lower() not in METRES:
+        scale = metres(unit)
+        if scale is None:
             raise ValueError(f"{source}: units: expected one of {', '.join(METRES)}, got {unit!r}")
-        return METRES[unit.lower()]
+        return scale
     return METRES["mm"] if np.ptp(seen, axis=0).max() > LARGEST else METRES["m"]
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("" if number == 1 else "s")
+
+
+def _some(names: Sequence[str], most: int = 6) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -1,47 +1,192 @@
-"""TRC files: tab-separated text of Motion Analysis and OpenSim. They do not say which axis is up; OpenSim's is y."""
+"""TRC files: text of Motion Analysis (Cortex, EVaRT), OpenSim, OpenCap and others, whose columns tabs or blanks part.
+
+They do not say which axis is up; OpenSim's is y. Frame, time, then x, y and z of each marker; an empty column between
+two tabs is a coordinate that was not measured, but tabs that are doubled throughout part columns as single ones do.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from .tracks import Tracks, tracks
+from . import text_file
+from .tracks import Tracks, rate_of, tracks
 
-FIRST_ROW = 5  # after two lines of header fields, their values, the markers' names and their axes
+HEADER = 5  # lines: two of header fields, their values, the markers' names, their axes
+LEAST = 4  # columns of a row: frame, time and something of a marker
+UNLIKE = 0.01  # of the rate: that far the header's may be from the times'
 
 
-def read(path: str | Path, up: str | None = None) -> Tracks:
-    """The markers of a TRC file. ValueError, naming the file and line, for whatever is not right in it."""
+def read(path: str | Path, up: str | None = None, subject: str | None = None) -> Tracks:
+    """The markers of a TRC file, of `subject` where its names have one before a colon ("S01:LASI").
+
+    ValueError, naming the file and line, for whatever is not right in it.
+    """
     source = str(path)
-    try:
-        lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        raise ValueError(f"{source}: {error.strerror}") from None
-    if not lines or not lines[0].startswith("PathFileType"):
+    lines = text_file.lines(path)
+    if not lines or not lines[0].strip().lower().startswith("pathfiletype"):
         raise ValueError(f"{source}: line 1: expected PathFileType, got another text")
-    if len(lines) < FIRST_ROW:
-        raise ValueError(f"{source}: expected a header of {FIRST_ROW} lines, got {len(lines)}")
-    header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
-    names = [name.strip() for name in lines[3].split("\t")[2:] if name.strip()]
-    rows = [
-        _row(line, len(names), f"{source}: line {number}")
-        for number, line in enumerate(lines[FIRST_ROW:], FIRST_ROW + 1)
-        if line.strip()
-    ]
-    numbers = np.array(rows).reshape(len(rows), 1 + 3 * len(names))
-    points = numbers[:, 1:].reshape(len(rows), len(names), 3)
-    return tracks(names, points, numbers[:, 0], header.get("Units", "").strip(), up or "y", source)
+    if len(lines) < HEADER:
+        raise ValueError(f"{source}: expected a header of {HEADER} lines, got {len(lines)}")
+    head = next((row for row, line in enumerate(lines[:20]) if line.strip().lower().startswith("frame")), 3)
+    header, notes = _header(lines[1:head]), []
+    rows = [(number, line) for number, line in enumerate(lines[head + 1 :], head + 2) if line.strip()]
+    if rows and not _is_number(rows[0][1].split()[0]):  # the axes: X1, Y1, Z1, …
+        rows.pop(0)
+    names, table = _table_of(rows, lines[head], header, source)
+    if table.markers > len(names):
+        more = table.markers - len(names)
+        notes.append(f"{more} {'marker' if more == 1 else 'markers'} without a name behind the named ones left out")
+    if table.short:
+        notes.append(f"{table.short} rows end before the last marker; what they lack is taken as not seen")
+    numbers = text_file.table(table.rows, [f"{source}: line {number}" for number in table.lines])
+    numbers = numbers.reshape(len(table.rows), 1 + 3 * table.markers)
+    times = _times(numbers[:, 0], table.lines, source, notes)
+    points = numbers[:, 1 : 1 + 3 * len(names)].reshape(len(times), len(names), 3)
+    _compare(header, times, notes)
+    unit = header.get("units", "")
+    return tracks(names, points, times, unit, up or "y", source, subject=subject, notes=notes)
 
 
-def _row(line: str, markers: int, place: str) -> list[float]:
-    """The time and the coordinates of a sample; an empty field is NaN."""
-    fields = line.rstrip("\r\n").split("\t")[1:]
-    width = 1 + 3 * markers
-    if any(field.strip() for field in fields[width:]) or len(fields) < 4:
-        raise ValueError(f"{place}: expected {width + 1} columns for {markers} markers, got {len(fields) + 1}")
-    fields = (fields + [""] * width)[:width]
+def _header(lines: Sequence[str]) -> dict[str, str]:
+    """What the header says, by the fields' names in lower case; the unit may be blank."""
+    filled = [line for line in lines if line.strip()]
+    if len(filled) < 2:
+        return {}
+    for part in (lambda line: line.rstrip("\r\n").split("\t"), str.split):
+        fields, values = part(filled[0]), part(filled[1])
+        while fields and not fields[-1].strip():
+            fields.pop()
+        if len(fields) == len(values) or (len(fields) > 1 and not "".join(values[len(fields) :]).strip()):
+            found = {field.strip().lower(): value.strip() for field, value in zip(fields, values, strict=False)}
+            if not _is_number(found.get("units", "")):
+                return found
+    words = [value for value in filled[1].split() if not _is_number(value)]
+    return {"units": words[0] if words else ""}
+
+
+def _is_number(text: str) -> bool:
     try:
-        return [float(field) if field.strip() else np.nan for field in fields]
-    except ValueError as error:
-        raise ValueError(f"{place}: expected numbers: {error}") from None
+        return np.isfinite(text_file.number(text))
+    except ValueError:
+        return False
+
+
+def _names(line: str) -> tuple[list[str], list[str]]:
+    """The markers' names: by the places of their columns, "" of one without a name; and those that are not blank."""
+    cells = [cell.strip() for cell in line.rstrip().split("\t")]
+    if len([cell for cell in cells if cell]) < 3:
+        words = line.split()[2:]
+        return words, words
+    second = [place for place, cell in enumerate(cells) if cell][1]  # Time
+    places = cells[second + 1 :]
+    filled = [cell for cell in places if cell]
+    while places and not places[0]:  # doubled tabs before the first name
+        places.pop(0)
+    if any(places[place] for place in range(len(places)) if place % 3):  # a column a name, or tabs as they came
+        return filled, filled
+    return places[::3], filled
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Rows of time and three coordinates of each marker, as text; `markers` of them, the unnamed ones last."""
+
+    rows: list[list[str]]
+    lines: list[int]
+    markers: int
+    short: int  # rows that end before the last marker
+
+
+def _table_of(
+    rows: Sequence[tuple[int, str]], line: str, header: dict[str, str], source: str
+) -> tuple[list[str], _Table]:
+    """The names and the rows that go together."""
+    by_place, filled = _names(line)
+    declared = header.get("nummarkers", "")
+    said = int(float(declared)) if _is_number(declared) else None
+    try:
+        return by_place, _table(rows, len(by_place), said, source)
+    except ValueError:
+        if filled == by_place:
+            raise
+        return filled, _table(rows, len(filled), said, source)
+
+
+def _table(rows: Sequence[tuple[int, str]], markers: int, said: int | None, source: str) -> _Table:
+    """`markers` have names, `said` are in the file by its header."""
+    width = 2 + 3 * markers
+    split, tabs = _split([line for _, line in rows], width)
+    widest = max(map(len, split), default=width)
+    for (number, _), cells in zip(rows, split, strict=True):
+        wrong = len(cells) < (LEAST if tabs else width) or (
+            widest > width and (len(cells) < widest or (widest - width) % 3)
+        )
+        expected = f"expected {width} columns for {markers} markers"
+        if wrong or (widest < width and said != markers):
+            raise ValueError(f"{source}: line {number}: {expected}, got {len(cells)}")
+    whole = max(widest, width)
+    filled = [[cell.strip() or "nan" for cell in [*cells[1:], *[""] * (whole - len(cells))]] for cells in split]
+    short = sum(len(cells) < width for cells in split)
+    return _Table(filled, [number for number, _ in rows], (whole - 2) // 3, short)
+
+
+def _split(lines: Sequence[str], width: int) -> tuple[list[list[str]], bool]:
+    """The columns of each row, and whether single tabs part them, or blanks: tabs doubled, mixed with blanks, missing.
+
+    Tabs are believed where the empty columns between them are whole markers that were not seen.
+    """
+    by_tabs = [_trimmed(line.rstrip("\r\n").split("\t"), width) for line in lines]
+    widest = max(map(len, by_tabs), default=width)
+    fits = all(len(cells) >= LEAST for cells in by_tabs) and (widest <= width or (widest - width) % 3 == 0)
+    if fits and all(_whole(cells) for cells in by_tabs):
+        return by_tabs, True
+    by_blanks = [line.split() for line in lines]
+    counts = {len(words) for words in by_blanks}
+    if len(counts) == 1 and (count := counts.pop()) >= width and (count - width) % 3 == 0:
+        return by_blanks, False
+    tabs = any("\t" in line for line in lines)
+    return (by_tabs if tabs else by_blanks), tabs
+
+
+def _trimmed(cells: list[str], width: int) -> list[str]:
+    """Without empty columns behind the `width` that are meant."""
+    while len(cells) > width and not cells[-1].strip():
+        cells.pop()
+    return cells
+
+
+def _whole(cells: list[str]) -> bool:
+    """Whether no marker has some of its coordinates only."""
+    empty = [not cell.strip() for cell in cells[2:]]
+    return all(len(set(empty[at : at + 3])) == 1 for at in range(0, len(empty), 3))
+
+
+def _times(times: np.ndarray, lines: Sequence[int], source: str, notes: list[str]) -> np.ndarray:
+    """Seconds. ValueError for a row without a time and for times that go back; equal ones are spread evenly."""
+    if np.isnan(times).any():
+        line = lines[int(np.isnan(times).argmax())]
+        raise ValueError(f"{source}: line {line}: expected seconds in the column Time, it is blank or no number")
+    steps = np.diff(times)
+    if not np.isfinite(times).all() or (steps < 0).any():
+        row = int((~np.isfinite(times)).argmax() if not np.isfinite(times).all() else (steps < 0).argmax() + 1)
+        raise ValueError(f"{source}: line {lines[row]}: expected times that increase, got {times[row]:g} s")
+    if not (steps == 0).any():
+        return times
+    if times[-1] == times[0]:
+        raise ValueError(f"{source}: line {lines[1]}: expected times that increase, all are {times[0]:g} s")
+    notes.append("some times are equal: they are taken as evenly spaced from the first to the last")
+    return np.linspace(times[0], times[-1], len(times))
+
+
+def _compare(header: dict[str, str], times: np.ndarray, notes: list[str]) -> None:
+    """Notes of what the header says otherwise than the rows."""
+    frames, rate = header.get("numframes", ""), header.get("datarate", "")
+    if _is_number(frames) and float(frames) != len(times):
+        notes.append(f"its header says {frames} frames, it has {len(times)}")
+    own = rate_of(times)
+    if _is_number(rate) and float(rate) > 0 and own and abs(own / float(rate) - 1) > UNLIKE:
+        notes.append(f"its header says {rate} Hz, its times say {own:.4g} Hz; the times are believed")

@@ -104,7 +104,7 @@ def fit_tracks(
     start = at_points(problem)
     if betas is not None:
         start["betas"] = betas.expand(len(tracks), -1).clone()
-    rate = 1 / float(np.median(np.diff(tracks.times))) if len(tracks) > 1 else 1.0
+    rate = tracks.rate or 1.0
     found = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
     return Recorded(found, tracks, sites, unknown)
 
@@ -158,6 +158,4 @@ def problem_of(
 
 def frames(tracks: markers.Tracks, index: NDArray[np.integer]) -> markers.Tracks:
     """These frames of a recording."""
-    return markers.Tracks(
-        tracks.names, tracks.points[index], tracks.confidence[index], tracks.times[index], tracks.source
-    )
+    return replace(tracks, points=tracks.points[index], confidence=tracks.confidence[index], times=tracks.times[index])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +11,11 @@ from numpy.typing import NDArray
 from ..data import c3d, force_plates, opensim
 from ..data.external_loads import ExternalLoads
 from ..data.force_plates import ForcePlates, between
-from ..data.tracks import METRES, TO_Y_UP
+from ..data.tracks import TO_Y_UP
 
 Array = NDArray[np.float64]
 
 NEITHER = "it has neither forces nor a centre of mass"
-CENTRE_OF_MASS = ("centreofmass", "centerofmass")  # Plug-in Gait's, and Visual3D's
 CSV_COLUMNS = ("time_s", "com_x_m", "com_y_m", "com_z_m")
 
 
@@ -39,17 +37,16 @@ def kind_of(path: Path) -> tuple[str | None, str]:
 def has_plates(path: Path) -> bool:
     """Whether a `.c3d` file has force plates; what else is wrong with it comes up when it is read."""
     try:
-        return any(c3d.read(path).values("FORCE_PLATFORM", "USED")[:1])
-    except (ValueError, ImportError):
+        return c3d.read(path).has_plates
+    except ValueError:
         return False
 
 
 def has_center_of_mass(path: Path) -> bool:
-    """Whether a `.c3d` file has a centre of mass by Plug-in Gait."""
+    """Whether a `.c3d` file has a centre of mass that a model such as Plug-in Gait computed."""
     try:
-        found = c3d.read(path)
-        return _modelled(found) is not None
-    except (ValueError, ImportError):
+        return c3d.read(path).center_of_mass() is not None
+    except ValueError:
         return False
 
 
@@ -65,16 +62,16 @@ def plates(path: Path, up: str | None = None, unit: str = "m", loads: ExternalLo
     return opensim.plates(opensim.storage(path), unit, up or "y", loads).turned(TO_Y_UP[up or "y"])
 
 
-def center_of_mass(path: Path, times: Array, up: str | None = None) -> Array:
+def center_of_mass(path: Path, times: Array, up: str | None = None, subject: str | None = None) -> Array:
     """A measured centre of mass (n, 3) m at these times, y up, NaN outside the file's. ValueError, naming the file.
 
-    `up` as in `plates`.
+    `up` as in `plates`; `subject`: whose, where a `.c3d` has several people.
     """
     if path.suffix.lower() == ".c3d":
         found = c3d.read(path)
-        points = _modelled(found)
+        points = found.center_of_mass(subject)
         if points is None:
-            raise ValueError(f"{path}: expected a point CentreOfMass of Plug-in Gait, it has none")
+            raise ValueError(f"{path}: expected a centre of mass by a model such as Plug-in Gait, it has none")
         return between(found.times, points @ TO_Y_UP[up or found.up].T, times)
     if path.suffix.lower() == ".csv":
         own, points = _csv(path)
@@ -87,15 +84,6 @@ def center_of_mass(path: Path, times: Array, up: str | None = None) -> Array:
 def judge(path: Path) -> str:
     """Whose a centre of mass is."""
     return {".c3d": "Plug-in Gait", ".sto": "OpenSim", ".mot": "OpenSim"}.get(path.suffix.lower(), path.name)
-
-
-def _modelled(found: c3d.Recording) -> Array | None:
-    """Plug-in Gait's centre of mass (T, 3) m in the file's axes, NaN where it has none; None without it."""
-    for column, name in enumerate(found.names):
-        if re.sub(r"[^a-z]", "", name.rpartition(":")[2].lower()) in CENTRE_OF_MASS:
-            points = found.points[:, column] * METRES[found.unit.lower()]
-            return np.where((points != 0).any(axis=1, keepdims=True), points, np.nan)
-    return None
 
 
 def _heads(path: Path) -> list[str]:

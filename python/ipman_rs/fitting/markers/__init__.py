@@ -25,16 +25,16 @@ READERS: dict[str, Callable[..., Tracks]] = {".trc": trc.read, ".c3d": c3d.marke
 __all__ = ["MARKERS", "READERS", "Site", "Tracks", "read", "sites"]
 
 
-def read(path: str | os.PathLike[str], up: str | None = None) -> Tracks:
-    """The markers of a `.trc` or `.c3d` file in metres, y up.
+def read(path: str | os.PathLike[str], up: str | None = None, subject: str | None = None) -> Tracks:
+    """The markers of a `.trc` or `.c3d` file in metres, y up; its `notes` say what was left out or mended.
 
-    `up`: which axis of the file is up, if it does not say so rightly. ValueError, naming the file, for whatever is not
-    right; ImportError, naming the extra, where a reader needs one.
+    `up`: which axis of the file is up, if it does not say so rightly. `subject`: whose markers, where the file has
+    those of several people ("S01:LASI"). ValueError, naming the file, for whatever is not right.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in READERS:
         raise ValueError(f"{path}: expected a file of markers ({', '.join(READERS)}), got {suffix or 'no ending'}")
-    return READERS[suffix](Path(path), up)
+    return READERS[suffix](Path(path), up, subject)
 
 
 def sites(body: BodyModel, markers: Iterable[str], radius: float = RADIUS) -> dict[str, Site | str]:

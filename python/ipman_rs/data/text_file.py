@@ -1,0 +1,60 @@
+"""Text files of laboratories: their lines, whatever the encoding, and numbers as C, Fortran and Windows write them."""
+
+from __future__ import annotations
+
+import codecs
+import os
+import re
+import stat
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+MAX_BYTES = 1 << 31  # an hour of sixty markers at 250 Hz has a third of that
+NOT_A_NUMBER = re.compile(r"[-+]?(?:s|q)?nan(?:\(\w*\))?|[-+]?1\.#(?:ind|qnan|snan|nan)\d*|n/?a", re.IGNORECASE)
+INFINITY = re.compile(r"([-+]?)(?:1\.#inf\d*|inf(?:inity)?)", re.IGNORECASE)
+
+
+def lines(path: str | os.PathLike[str]) -> list[str]:
+    """The lines of a file. ValueError, naming it, if it is missing, no ordinary file, or larger than any recording."""
+    try:
+        about = os.stat(path)
+        if not (stat.S_ISREG(about.st_mode) or stat.S_ISDIR(about.st_mode)):
+            raise ValueError(f"{path}: expected an ordinary file, got a device or pipe")
+        if about.st_size > MAX_BYTES:
+            raise ValueError(f"{path}: {about.st_size} bytes is more than any recording has ({MAX_BYTES})")
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from None
+    wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return data.decode("utf-16" if wide else "utf-8-sig", errors="replace").splitlines()
+
+
+def number(text: str) -> float:
+    """A number, NaN for each of its spellings: "nan", "-nan(ind)", "1.#QNAN". ValueError for anything else."""
+    try:
+        return float(text)
+    except ValueError:
+        text = text.strip()
+        if NOT_A_NUMBER.fullmatch(text):
+            return np.nan
+        infinite = INFINITY.fullmatch(text)
+        if infinite:
+            return float(f"{infinite[1]}inf")
+        raise
+
+
+def table(rows: Sequence[Sequence[str]], places: Sequence[str]) -> NDArray[np.float64]:
+    """Numbers (n, width) of rows of one width. ValueError that begins with the place of a row without numbers."""
+    try:
+        return np.array(rows, np.float64)
+    except ValueError:
+        numbers = []
+        for row, place in zip(rows, places, strict=True):
+            try:
+                numbers.append([number(cell) for cell in row])
+            except ValueError as error:
+                raise ValueError(f"{place}: expected numbers: {error}") from None
+        return np.array(numbers, np.float64)
