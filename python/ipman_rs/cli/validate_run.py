@@ -126,7 +126,7 @@ def _person(plan: Plan, recordings: list[Measured], told: Told) -> list[Record]:
                 told.notes.append(f"{name} could not be compared: the others found their shapes themselves")
             continue
         if fit["unknown"]:
-            told.notes.append(f"{name}: markers without a known place, not used: {', '.join(fit['unknown'])}")
+            told.notes.append(f"{name}: markers without a known place, not used: {_some(fit['unknown'])}")
         if np.isnan(weight) and _weighs(records[-1]):
             weight = records[-1]["mass"]["plates"]
     return records
@@ -152,6 +152,10 @@ def _weighs(record: Record) -> bool:
     mass = record["mass"]
     quiet = record["kind"] == "quiet standing" and mass["plates"] is not None
     return quiet and mass["plates_std"] < SPREAD * mass["plates"] and not record["frames_beside_plates"]
+
+
+def _some(names: list[str], most: int = 12) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _read(plan: Plan, trial: Trial, told: Told) -> Measured | None:
@@ -300,8 +304,9 @@ def write(plan: Plan, records: list[Record], notes: list[str], failures: list[Fi
     told = [*notes, *(f"not compared: {failure}" for failure in failures)]
     page = plan.output / "validation.md"
     write_whole(page, report.markdown(records, plan.folder.resolve().name, told, drawn).encode())
-    kept_shapes = sorted({one["fit"]["shape_from"] for one in records} - {"itself"})
-    whole = {"folder": str(plan.folder), "body": plan.settings.model, "person": kept_shapes, "notes": told}
+    shapes = sorted({one["fit"]["shape_from"] for one in records} - {"itself"})
+    person = ", ".join(shapes) or None
+    whole = {"folder": str(plan.folder), "body": plan.settings.model, "person": person, "notes": told}
     content = json.dumps({**whole, "recordings": records}, allow_nan=False, ensure_ascii=False, indent=1)
     write_whole(plan.output / "validation.json", f"{content}\n".encode())
     return page.resolve()

@@ -83,7 +83,9 @@ def center_of_mass(path: Path, times: Array, up: str | None = None, subject: str
 
 def judge(path: Path) -> str:
     """Whose a centre of mass is."""
-    return {".c3d": "Plug-in Gait", ".sto": "OpenSim", ".mot": "OpenSim"}.get(path.suffix.lower(), path.name)
+    if path.suffix.lower() == ".c3d":
+        return "Plug-in Gait"
+    return path.stem if path.suffix.lower() == ".csv" and "opensim" not in path.stem.lower() else "OpenSim"
 
 
 def _heads(path: Path) -> list[str]:
