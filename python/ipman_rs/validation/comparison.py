@@ -201,10 +201,10 @@ def beside_centers(computed: Computed, rate: float, floor: Ground, plates: Force
     away = np.stack([_nearest(plates.points, sole) for sole in soles], axis=1)
     under = (away < NEAR) & loaded[:, None]  # (T, foot, plate)
     down = np.stack([_down(sole, rate, floor).any(axis=1) for sole in soles], axis=1)
-    both = down.all(axis=1)[:, None] & loaded  # (T, plate)
+    both = np.asarray(down.all(axis=1))[:, None] & loaded  # (T, plate)
     shared = (both & (under.all(axis=1) | ~under.any(axis=1))).sum(axis=0) > SHARED * both.sum(axis=0)
     known = loaded.any(axis=1) & ~(loaded & (shared | ~under.any(axis=1))).any(axis=1)
-    return known & (down & ~under.any(axis=2)).any(axis=1)
+    return np.asarray(known & (down & ~under.any(axis=2)).any(axis=1))
 
 
 def _nearest(points: Array, sole: Array) -> Array:
@@ -223,7 +223,7 @@ def beside_plates(soles: Array, rate: float, floor: Ground, outlines: Array | No
     if outlines is None or len(soles) < 2:
         return np.zeros(len(soles), bool)
     on_plate = np.stack([_within(soles[..., [0, 2]], outline[:, [0, 2]]) for outline in outlines]).any(axis=0)
-    return (_down(soles, rate, floor) & ~on_plate).any(axis=1)
+    return np.asarray((_down(soles, rate, floor) & ~on_plate).any(axis=1))
 
 
 def _within(points: Array, outline: Array) -> Mask:

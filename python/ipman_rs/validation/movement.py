@@ -92,8 +92,9 @@ class Movement:
         falls = self.acceleration[:, 1]
         if np.isfinite(falls).any():
             return longest(off & (np.nan_to_num(falls) < FALLS)) >= FLIGHT * self.rate
-        between = np.flatnonzero(~off)
-        return len(between) > 1 and bool((off & (self.heights > 3 * LOW).all(axis=1))[between[0] : between[-1]].any())
+        contacts = np.flatnonzero(~off)
+        far = np.asarray((self.heights > 3 * LOW).all(axis=1))
+        return len(contacts) > 1 and bool(far[contacts[0] : contacts[-1]].any())
 
 
 def longest(mask: Mask) -> int:
