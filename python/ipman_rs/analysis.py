@@ -251,5 +251,7 @@ class _Figures:
 def _warn_units(vertices: NDArray[Any], status: NDArray[np.int64], start: int = 0) -> bool:
     odd = np.flatnonzero(status & Status.ODD_SIZE)
     if odd.size:
-        warn_odd_size(float(np.ptp(vertices[odd[0]], axis=0).max()), f"body {start + odd[0]}")
+        with np.errstate(over="ignore", invalid="ignore"):
+            size = float(np.ptp(vertices[odd[0]], axis=0).max())
+        warn_odd_size(size, f"body {start + odd[0]}")
     return bool(odd.size)

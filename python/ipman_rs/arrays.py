@@ -37,7 +37,8 @@ def _holds(value: Any, kind: type) -> bool:
 def single_or_double(array: NDArray[Any]) -> NDArray[Any]:
     """float32 and half stay or become native float32; everything else becomes native float64."""
     dtype = np.float32 if array.dtype.kind == "f" and array.dtype.itemsize <= 4 else np.float64
-    return np.require(array, dtype, ["C", "A"])  # what comes from packed records is not aligned
+    with np.errstate(over="ignore", invalid="ignore"):  # what double precision cannot hold becomes infinite
+        return np.require(array, dtype, ["C", "A"])  # what comes from packed records is not aligned
 
 
 class Bodies:

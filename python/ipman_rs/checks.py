@@ -7,47 +7,60 @@ Raises:
 
 from __future__ import annotations
 
-import math
 from typing import Any, get_args
 
 import numpy as np
 
+LARGEST = 1e12  # of any option: single precision can still multiply it
+SMALLEST = 1e-12  # of options that divide
+
 
 def number(name: str, value: float) -> float:
-    """A finite real number, as a float."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise TypeError(f"{name}: expected a number, got {value!r}")
-    if not -math.inf < value < math.inf:  # math.isfinite would stop torch.compile
-        raise ValueError(f"{name}: expected a finite number, got {value!r}")
+    """A real number of a size that can be computed with, as a float."""
+    if isinstance(value, (bool, np.bool_, np.timedelta64)) or not isinstance(
+        value, (int, float, np.integer, np.floating)
+    ):
+        raise TypeError(f"{name}: expected a number, got {_shown(value)}")
+    if not -LARGEST <= value <= LARGEST:  # math.isfinite would stop torch.compile
+        raise ValueError(f"{name}: expected a finite number of at most {LARGEST:g}, got {_shown(value)}")
     return float(value)
 
 
 def positive(name: str, value: float, unit: str = "metres") -> float:
-    """A finite number above zero."""
-    if not number(name, value) > 0.0:
-        raise ValueError(f"{name}: expected positive {unit}, got {value!r}")
+    """A number above zero, and not so small that nothing can be divided by it."""
+    if not number(name, value) >= SMALLEST:
+        raise ValueError(f"{name}: expected positive {unit}, got {_shown(value)}")
     return float(value)
 
 
 def not_negative(name: str, value: float) -> float:
-    """A finite number, zero or above."""
+    """A number, zero or above."""
     if not number(name, value) >= 0.0:
-        raise ValueError(f"{name}: expected zero or more, got {value!r}")
+        raise ValueError(f"{name}: expected zero or more, got {_shown(value)}")
     return float(value)
 
 
 def whole(name: str, value: int, low: int, high: int) -> int:
     """A whole number from `low` to `high`."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise TypeError(f"{name}: expected a whole number, got {value!r}")
+    if isinstance(value, (bool, np.timedelta64)) or not isinstance(value, (int, np.integer)):
+        raise TypeError(f"{name}: expected a whole number, got {_shown(value)}")
     if not low <= value <= high:
-        raise ValueError(f"{name}: expected {low} to {high}, got {value}")
+        raise ValueError(f"{name}: expected {low} to {high}, got {_shown(value)}")
     return int(value)
 
 
 def choice(name: str, value: str, words: Any) -> str:
     """`value`, if it is one of the words of a `Literal`."""
     options = get_args(words)
-    if value not in options:
-        raise ValueError(f"{name}: expected one of {', '.join(options)}, got {value!r}")
+    if not isinstance(value, str) or value not in options:
+        raise ValueError(f"{name}: expected one of {', '.join(options)}, got {_shown(value)}")
     return value
+
+
+def _shown(value: Any) -> str:
+    """A value for a message, not endless; Python refuses to write out whole numbers of many digits."""
+    try:
+        text = repr(value)
+    except ValueError:
+        return f"a {type(value).__name__} of many digits"
+    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -26,8 +26,9 @@ class Ground:
     height: NDArray[np.float64]
 
     def __init__(self, normal: ArrayLike = (0.0, 1.0, 0.0), height: ArrayLike = 0.0) -> None:
-        directions = plain("ground normal", normal).astype(np.float64)
-        heights = plain("ground height", height).astype(np.float64)
+        with np.errstate(over="ignore"):  # what double precision cannot hold is refused as not finite
+            directions = plain("ground normal", normal).astype(np.float64)
+            heights = plain("ground height", height).astype(np.float64)
         if directions.ndim == 0 or directions.shape[-1] != 3:
             raise ValueError(f"ground normal: expected (3,) or (..., 3), got {directions.shape}")
         # Scaled first, so that neither tiny nor huge normals leave the range of squares.
@@ -55,13 +56,15 @@ class Ground:
         normal, height = self._beside_points()
         where = plain("points", points).astype(np.float64, copy=False)
         # Axis by axis: a sum along an axis of 3 takes many times as long.
-        x, y, z = (where[..., axis] * normal[..., axis] for axis in range(3))
-        return x + y + z - height
+        with np.errstate(over="ignore", invalid="ignore"):  # points near the end of the range have no finite height
+            x, y, z = (where[..., axis] * normal[..., axis] for axis in range(3))
+            return x + y + z - height
 
     def project(self, points: ArrayLike) -> NDArray[np.float64]:
         """g(u), the points' feet on the ground, in the shape of `points` (see signed_height)."""
         normal, _ = self._beside_points()
-        return plain("points", points) - self.signed_height(points)[..., None] * normal
+        with np.errstate(over="ignore", invalid="ignore"):
+            return plain("points", points) - self.signed_height(points)[..., None] * normal
 
     def axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Two unit vectors in the plane, each (..., 3); (e1, e2, normal) is right-handed, e1 along x where possible."""

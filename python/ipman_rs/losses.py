@@ -7,7 +7,7 @@ from typing import Any, Literal
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.arrays import Bodies
-from ipman_rs.checks import choice, not_negative, number, positive
+from ipman_rs.checks import choice, not_negative, positive
 from ipman_rs.ground import Ground
 from ipman_rs.mass import Method
 from ipman_rs.template import BodyTemplate
@@ -30,7 +30,7 @@ def stability_loss(
 
     vertices (..., V, 3) m; alpha, gamma, epsilon as in `center_of_pressure`; method as in `center_of_mass`.
     """
-    options = [number("alpha", alpha), number("gamma", gamma), not_negative("epsilon", epsilon)]
+    options = [not_negative("alpha", alpha), not_negative("gamma", gamma), not_negative("epsilon", epsilon)]
     quantity = f"stability_loss.{choice('method', method, Method)}"
     return Bodies(vertices, template).evaluate(quantity, options, ground)
 
@@ -55,8 +55,8 @@ def ground_loss(
         points: the surface samples or the mesh's vertices.
         curve: (tanh x)², the paper's, or tanh(x²).
     """
-    pull = [number("alpha1", alpha1), positive("alpha2", alpha2)]
-    push = [number("beta1", beta1), positive("beta2", beta2)]
+    pull = [not_negative("alpha1", alpha1), positive("alpha2", alpha2)]
+    push = [not_negative("beta1", beta1), positive("beta2", beta2)]
     quantity = f"ground_loss.{choice('points', points, Points)}.{choice('curve', curve, Curve)}"
     both = Bodies(vertices, template).evaluate(quantity, pull + push, ground, 2)
     return both[..., 0][()], both[..., 1][()]
@@ -78,6 +78,6 @@ def balance_cost(
     centre of mass, p the pressure distribution, supports blurred by sigma metres. Unlike the paper's norm it does not
     assume how separate supports share the load. `wrap`: log(1 + J), J/(1 + J) where bodies may be falling, or J.
     """
-    options = [number("alpha", alpha), number("gamma", gamma), positive("sigma", sigma)]
+    options = [not_negative("alpha", alpha), not_negative("gamma", gamma), positive("sigma", sigma)]
     quantity = f"balance_cost.{choice('wrap', wrap, Wrap)}.{choice('method', method, Method)}"
     return Bodies(vertices, template).evaluate(quantity, options, ground)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.arrays import Bodies
-from ipman_rs.checks import not_negative, number, positive
+from ipman_rs.checks import not_negative, positive
 from ipman_rs.ground import Ground
 from ipman_rs.sampling import sample_surface
 from ipman_rs.template import BodyTemplate
@@ -21,7 +21,7 @@ def pressure(
 
     vertices (..., V, 3) m; alpha, gamma in 1/m.
     """
-    options = [number("alpha", alpha), number("gamma", gamma)]
+    options = [not_negative("alpha", alpha), not_negative("gamma", gamma)]
     return Bodies(vertices, template).evaluate("pressure", options, ground, template.num_samples)
 
 
@@ -37,7 +37,7 @@ def center_of_pressure(
 
     epsilon: 0 in the paper, 1e-6 in the released code.
     """
-    options = [number("alpha", alpha), number("gamma", gamma), not_negative("epsilon", epsilon)]
+    options = [not_negative("alpha", alpha), not_negative("gamma", gamma), not_negative("epsilon", epsilon)]
     return Bodies(vertices, template).evaluate("center_of_pressure", options, ground, 3)
 
 

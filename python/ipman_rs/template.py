@@ -67,7 +67,9 @@ class BodyTemplate:
         self.part_names = _names(part_names, self.num_parts)
         for array in (self.vertices, self.faces, self.face_parts):
             array.setflags(write=False)
-        warn_odd_size(np.ptp(self.vertices, axis=0).max(), "the template")
+        with np.errstate(over="ignore"):
+            size = np.ptp(self.vertices, axis=0).max()
+        warn_odd_size(size, "the template")
         self._key = next(_KEYS)
         _BY_KEY[self._key] = self
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.arrays import Bodies, plain
+from ipman_rs.checks import LARGEST, SMALLEST
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 
@@ -48,10 +49,11 @@ def mass_properties(vertices: ArrayLike, template: BodyTemplate, density: ArrayL
 
 def densities(density: ArrayLike, template: BodyTemplate) -> list[float]:
     """One density or one a part, checked."""
-    values = plain("density", density).astype(np.float64)
+    with np.errstate(over="ignore"):
+        values = plain("density", density).astype(np.float64)
     if values.shape not in {(), (1,), (template.num_parts,)}:
         raise ValueError(f"density: expected one number or ({template.num_parts},), got {values.shape}")
-    if not (np.isfinite(values).all() and (values > 0).all()):
+    if not ((values >= SMALLEST).all() and (values <= LARGEST).all()):
         raise ValueError("density: expected positive kg/m³")
     return [float(value) for value in values.reshape(-1)]
 

@@ -36,7 +36,7 @@ class Evil:
         return exec, ("raise SystemExit('executed')",)
 
 
-BOX = trimesh.creation.box((1, 1, 1))
+BOX = trimesh.creation.box((0.4, 0.4, 0.4))  # 63 kg
 PLY = BOX.export(file_type="ply")
 GLB = trimesh.Scene([BOX]).export(file_type="glb")
 FACES = np.asarray(BOX.faces)
@@ -85,7 +85,7 @@ BAD = {
     "oddpose.npz": (npz_bytes(poses=np.zeros((4, 71))), "shape (4, 71)"),
     "nopose.npz": (npz_bytes(poses=np.zeros((0, 72))), "shape (0, 72)"),
     "trans.npz": (npz_bytes(poses=np.zeros((4, 72)), trans=np.zeros((3, 3))), "trans has shape (3, 3)"),
-    "betas.npz": (npz_bytes(pose=np.zeros((4, 72)), betas=np.zeros((3, 10))), "betas have shape (3, 10)"),
+    "betas.npz": (npz_bytes(pose=np.zeros((4, 72)), betas=np.zeros((3, 10))), "betas has shape (3, 10)"),
     "pieces.npz": (npz_bytes(global_orient=np.zeros((4, 3)), body_pose=np.zeros((3, 69))), "frames"),
 }
 
@@ -112,7 +112,7 @@ def test_one_line(run, tmp_path, name):
         ("parts.json", b"[0, 1]", "2 labels for 12 faces"),
         ("parts.npy", b"\x93NUMPY", "no readable .npy"),
         ("parts.txt", b"0", "expected JSON"),
-        ("missing.json", None, "no such parts file"),
+        ("missing.json", None, "there is no such file"),
     ],
 )
 def test_bad_parts(run, tmp_path, name, content, said):
@@ -137,7 +137,7 @@ def test_a_bad_body_model(run, tmp_path):
 
 
 def test_a_bad_file_among_good_ones_loses_nothing(run, tmp_path):
-    trimesh.creation.icosphere(3).export(tmp_path / "ball.ply")
+    trimesh.creation.icosphere(3, radius=0.25).export(tmp_path / "ball.ply")
     (tmp_path / "bad.obj").write_bytes(b"no mesh")
     files = [tmp_path / name for name in ("missing.obj", "ball.ply", "bad.obj")]
     result = run("analyze", *files, "-o", tmp_path / "out")
@@ -174,7 +174,7 @@ def test_the_real_program(tmp_path):
     (tmp_path / "box.ply").write_bytes(PLY)
     good = ipman("analyze", tmp_path / "box.ply", "--json")
     assert (good.returncode, good.stderr) == (0, "")
-    np.testing.assert_allclose(strict(good.stdout)["bodies"][0]["frames"][0]["volume"], 1.0)
+    np.testing.assert_allclose(strict(good.stdout)["bodies"][0]["frames"][0]["volume"], 0.064)
     bad = ipman("analyze", tmp_path / "none.ply", "--json")
     assert bad.returncode == 1
     assert bad.stderr == f"ipman: error: {tmp_path / 'none.ply'}: there is no such file\n"
@@ -183,7 +183,7 @@ def test_the_real_program(tmp_path):
 
 def test_a_reader_that_leaves_early_costs_no_report(tmp_path):
     """`ipman analyze ... | head -0`: the page is written before anything is printed."""
-    trimesh.creation.icosphere(2).export(tmp_path / "ball.ply")
+    trimesh.creation.icosphere(2, radius=0.25).export(tmp_path / "ball.ply")
     program = f'{sys.executable} -c "from ipman_rs.cli import main; main()"'
     command = f"{program} analyze {tmp_path}/ball.ply -o {tmp_path}/out | true"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=120, check=True)

@@ -67,6 +67,16 @@ def test_fewer_frames_a_second(tmp_path):
         data.open("amass", tmp_path / "a.npz", frame_rate=0)
 
 
+@pytest.mark.parametrize("rate", [None, 60.0])
+def test_betas_of_each_frame(tmp_path, rate):
+    betas = np.random.default_rng(1).normal(size=(20, 16))
+    miniature.motion(tmp_path / "a.npz", betas=betas)
+    frames = data.open("amass", tmp_path / "a.npz", frame_rate=rate)[:]
+    np.testing.assert_array_equal(frames.betas, betas[:: 1 if rate is None else 2])
+    miniature.motion(tmp_path / "b.npz", betas=betas[:1])
+    np.testing.assert_array_equal(data.open("amass", tmp_path / "b.npz")[:].betas, np.repeat(betas[:1], 20, axis=0))
+
+
 def test_only_headers_are_read_when_it_is_opened(tmp_path, monkeypatch):
     miniature.tree(tmp_path)
     for number in range(60):
@@ -89,6 +99,9 @@ BAD = {
     "rest": [
         ({"trans": np.zeros((19, 3))}, r"trans: expected \(20, 3\) as poses has 20 frames, got \(19, 3\)"),
         ({"betas": None}, "no betas among its arrays"),
+        ({"betas": np.zeros((19, 16))}, r"betas: expected \(n,\) or \(20, n\), a row for each frame, got \(19, 16\)"),
+        ({"betas": np.zeros((1, 20, 16))}, r"betas: expected \(n,\) or \(20, n\)"),
+        ({"betas": np.float64(1.0)}, r"betas: expected \(n,\) or \(20, n\)"),
         ({"mocap_framerate": None}, "expected mocap_framerate or mocap_frame_rate, found neither"),
         ({"mocap_framerate": -1.0}, "mocap_framerate: expected Hz"),
         ({"gender": "woman"}, "gender: expected neutral, female or male, got 'woman'"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -95,3 +97,50 @@ def test_known_markers(known, unknown, level):
 
 def test_admit_passes_what_is_merely_missing():
     assert judge.admit("a", [Finding("ok", "x"), Finding("missing", "y"), Finding("odd", "z", "look")]) == ("z; look",)
+
+
+IMAGE = np.array([640.0, 480.0])
+PERSON = np.array(
+    [[320, 90], [350, 140], [290, 140], [366, 255], [274, 255], [338, 260], [302, 260], [342, 420], [298, 420]], float
+)
+
+
+def of_keypoints(points, size=IMAGE, confidence=0.9):
+    given = np.broadcast_to(confidence, len(points))
+    return judge.keypoints(np.column_stack([points, given]), np.array(size, float))
+
+
+@pytest.mark.parametrize(
+    ("points", "level", "says"),
+    [
+        (PERSON, "ok", "a person of 330 pixels in an image of 640 × 480 pixels"),
+        (PERSON[::-1] * [1, -1] + [0, 480], "ok", "a person"),  # upside down is for the fit to tell
+        (PERSON / IMAGE, "wrong", "points of 0.188 to 0.875 look relative to the image"),
+        (2 * PERSON / IMAGE - 1, "wrong", "look relative to the image"),
+        (np.tile([100.0, 100.0], (9, 1)), "wrong", r"all 9 points lie at one place, \(100, 100\)"),
+        (np.repeat(PERSON[:, :1], 2, axis=1), "wrong", "all 9 points lie on one line"),
+        (PERSON * [1, 0.001], "wrong", "all 9 points lie on one line"),
+        (PERSON * 3, "wrong", "9 of 9 points lie outside the image of 640 × 480 pixels: x from 822 to 1098"),
+        (PERSON + [0, 200], "ok", "a person"),  # the feet alone are outside
+        (PERSON / 20 + 100, "odd", "the person is 16 pixels large"),
+        (PERSON[:3], None, ""),
+    ],
+)
+def test_keypoints(points, level, says):
+    found = of_keypoints(points)
+    assert [each.level for each in found] == ([] if level is None else [level])
+    assert level is None or re.search(says, found[0].what)
+
+
+def test_keypoints_that_the_detector_is_not_sure_of_may_lie_outside():
+    points = np.where(np.arange(9)[:, None] < 5, PERSON, PERSON + [0, 1000])
+    assert of_keypoints(points, confidence=np.where(np.arange(9) < 5, 0.9, 0.3))[0].level == "ok"
+    assert of_keypoints(points[::-1])[0].level == "ok"  # four of nine
+    assert of_keypoints(PERSON + [0, 1000], confidence=0.3)[0].level == "wrong"  # sure of none: all are judged
+
+
+def test_keypoints_of_another_image_size_name_the_option():
+    with pytest.raises(judge.NoPerson, match=r"a.json: 9 of 9 .*is that its size\? \(--image-size WxH\) \(--force"):
+        judge.admit("a.json", of_keypoints(PERSON * 3))
+    (said,) = judge.admit("a.json", of_keypoints(PERSON * 3), force=True)
+    assert "lie outside the image" in said

@@ -256,7 +256,7 @@ def test_pickles_are_not_loaded(copy):
             lambda folder: (folder.mkdir(), (folder / "thesis.tex").touch()),
             "expected an empty folder .* got thesis.tex",
         ),
-        (lambda folder: (folder.mkdir(), (folder / "index.json").write_text("{")), "no index of rendered images"),
+        (lambda folder: (folder.mkdir(), (folder / "index.json").write_text("{")), "index.json: is no JSON"),
     ],
     ids=["file", "others", "index"],
 )

@@ -223,7 +223,7 @@ def test_ways_to_the_world_that_cannot_be(one):
     path.write_text(json.dumps(said)[:30])
     refused(root, "Pavallion_multicam2world.json: expected R, t and c")
     path.unlink()
-    refused(root, "Pavallion_multicam2world.json: expected R, t and c .*No such file")
+    refused(root, "Pavallion_multicam2world.json: there is no such file")
 
 
 BOMB = '<!DOCTYPE b [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;"><!ENTITY c "&b;&b;&b;&b;">]>\n'

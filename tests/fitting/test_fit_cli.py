@@ -112,7 +112,7 @@ def test_bad_items_leave_the_others_as_they_are(fit, tmp_path, standing):
     folder = tmp_path / "inputs"
     folder.mkdir()
     files.write(folder / "good.json", standing)
-    files.write(folder / "nan.json", np.where(np.arange(33)[:, None] == 3, np.nan, standing))
+    files.write(folder / "nan.json", np.where(np.arange(132).reshape(33, 4) == 13, np.nan, standing))
     files.write(folder / "zero.json", standing * [1, 1, 1, 0])
     files.write(folder / "nobody.json", np.zeros((0, 4)))
     files.write(folder / "few.json", np.where(np.arange(33)[:, None] < 29, standing * [1, 1, 1, 0], standing))
@@ -256,6 +256,88 @@ def test_a_file_without_image_size(fit, tmp_path, standing):
     said = fit(tmp_path / "open.json")
     assert said.code == 1
     assert "--image-size" in said.err
+
+
+def openpose(landmarks, scale=1.0):
+    """OpenPose's 25 points of MediaPipe's, relative to the image times `scale`."""
+    from ipman_rs.fitting.keypoints import mediapipe
+    from ipman_rs.fitting.keypoints.openpose import BODY_25
+
+    places = dict(zip(mediapipe.NAMES, landmarks[:, [0, 1, 3]], strict=True))
+    points = np.array([places.get(name, np.zeros(3)) for name in BODY_25]) * [*np.broadcast_to(scale, 2), 1]
+    return {"pose_keypoints_2d": points.ravel().tolist()}
+
+
+def test_points_relative_to_the_image(fit, tmp_path, standing):
+    (tmp_path / "scale3.json").write_text(json.dumps({"people": [openpose(standing)]}))
+    (tmp_path / "pixels.json").write_text(json.dumps({"people": [openpose(standing, files.SIZE)]}))
+    said = fit(tmp_path / "scale3.json")
+    assert said.code == 1
+    assert "look relative to the image and need it, got none; give --image-size WIDTHxHEIGHT" in said.err
+    said = fit(tmp_path / "scale3.json", tmp_path / "pixels.json", "--image-size", "480x640")
+    assert said.code == 0, said.err
+    relative, pixels = (body["fit"] for body in said.report["bodies"])
+    assert "look relative to the image: taken as 0 to 1 of its 480 × 640 pixels" in relative["notes"][0]
+    assert pixels["notes"] == []
+    # The same points up to the sixteenth digit, and so nearly the same body.
+    assert relative["reprojection"]["median_px"] == pytest.approx(pixels["reprojection"]["median_px"], rel=1e-3)
+
+
+def test_points_of_another_image_size(fit, tmp_path, standing):
+    (tmp_path / "large.json").write_text(json.dumps({"people": [openpose(standing, np.multiply(files.SIZE, 4))]}))
+    options = ("--image-size", "480x640")
+    said = fit(tmp_path / "large.json", *options)
+    assert said.code == 1
+    assert "points lie outside the image of 480 × 640 pixels" in said.err
+    assert "is that its size? (--image-size WxH) (--force: it is right as it is)" in said.err
+    said = fit(tmp_path / "large.json", *options, "--force")
+    assert any("lie outside the image" in note for note in said.report["bodies"][0]["fit"]["notes"])
+
+
+def test_a_photo_of_another_size(fit, tmp_path, standing):
+    from PIL import Image
+
+    Image.new("RGB", (96, 128)).save(tmp_path / "small.png")
+    path = files.write(tmp_path / "anna.json", standing)
+    photo = ("--image", tmp_path / "small.png")
+    notes = fit(path, *photo).report["bodies"][0]["fit"]["notes"]
+    assert "the file says that its image has 480 × 640 pixels; 96 × 128 were given" in notes[0]
+    notes = fit(path, *photo, "--image-size", "480x640").report["bodies"][0]["fit"]["notes"]
+    assert "the photo has 96 × 128 pixels, --image-size says 480 × 640" in notes[0]
+
+
+def test_a_video_of_mmpose(fit, tmp_path, standing):
+    """Three frames, of which the second shows nobody: two bodies, or one over time."""
+    from ipman_rs.fitting.keypoints import coco, mediapipe
+
+    places = dict(zip(mediapipe.NAMES, standing[:, :2] * files.SIZE, strict=True))
+    points = [list(places[name]) for name in coco.NAMES]
+    frames = [{"frame_id": n, "instances": [{"keypoints": points, "keypoint_scores": [5.0] * 17}]} for n in range(3)]
+    frames[1]["instances"] = []
+    (tmp_path / "video.json").write_text(json.dumps(frames))
+    said = fit(tmp_path / "video.json", "--image-size", "480x640")
+    assert said.code == 0, said.err
+    notes = {body["name"]: body["fit"]["notes"] for body in said.report["bodies"]}
+    assert sorted(notes) == ["video_0", "video_1"]
+    for what in ("scores up to 5", "1 of 3 images left out", "--sequence fits one person over time"):
+        assert any(what in note for note in notes["video_0"])
+    assert notes["video_1"] == []  # of the file, and said once
+    over_time = fit(tmp_path / "video.json", "--image-size", "480x640", "--sequence")
+    assert over_time.code == 0, over_time.err
+    (body,) = over_time.report["bodies"]
+    assert body["frames"][-1]["frame"] == 1
+    assert any("1 of 3 images left out" in note for note in body["notes"])
+
+
+def test_mirrored_points_and_a_camera_of_another_image_are_flagged(fit, tmp_path, standing):
+    mirrored = standing * [-1, 1, 1, 1] + [1, 0, 0, 0]
+    (tmp_path / "camera.json").write_text(json.dumps({"K": [[800, 0, 960], [0, 800, 540], [0, 0, 1]]}))
+    paths = files.write(tmp_path / "plain.json", standing), files.write(tmp_path / "mirrored.json", mirrored)
+    flags = fit(*paths).flags
+    assert not any("mirrored" in flag for flag in flags["plain"])
+    assert any("are the points mirrored" in flag for flag in flags["mirrored"])
+    flags = fit(paths[0], "--camera", tmp_path / "camera.json").flags
+    assert any("is the camera of another image size?" in flag for flag in flags["plain"])
 
 
 def test_without_torch(tmp_path, standing, monkeypatch):

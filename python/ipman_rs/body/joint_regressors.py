@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from . import safe_npz
+
 # By SPIN's names of its 24 joints, in which Human3.6M's last of the head is "Head (H36M)", not LSP's top of the head.
 HUMAN36M = (
     "pelvis", "right_hip", "right_knee", "right_ankle", "left_hip", "left_knee", "left_ankle", "spine", "neck",
@@ -39,8 +41,8 @@ class JointRegressor:
 def read(path: str | os.PathLike[str]) -> JointRegressor:
     """A regressor from an .npy file. ValueError, naming the file, for one that is damaged or not of 17 or 9 rows."""
     try:
-        found = np.load(path, allow_pickle=False)
-    except (OSError, ValueError) as error:
+        found = safe_npz.read_npy(path)
+    except ValueError as error:
         raise ValueError(
             f"{path}: the regressor cannot be read ({error}); expected J_regressor_h36m.npy or J_regressor_extra.npy"
         ) from error

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..io.read_mesh import read_points
+
 ENDINGS = (".ply", ".obj")
 SPAN = (0.25, 3.5)  # m, of a body's longest side
 
@@ -19,14 +21,7 @@ def vertices(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     if place.suffix.lower() not in ENDINGS or not place.is_file():
         what = "no such file" if not place.is_file() else f"a file {place.suffix or 'without ending'}"
         raise ValueError(f"{path}: expected a mesh in a .ply or .obj file, got {what}")
-    import trimesh
-
-    try:
-        found = np.asarray(trimesh.load(place, process=False, maintain_order=True).vertices, np.float64)  # type: ignore[union-attr]
-    except Exception as error:  # damaged files fail in any way
-        raise ValueError(f"{path}: cannot be read as a mesh: {error}") from None
-    if found.ndim != 2 or not len(found) or not np.isfinite(found).all():
-        raise ValueError(f"{path}: expected a mesh with finite vertices, got {found.shape}")
+    found = read_points(place)
     span = float(np.ptp(found, axis=0).max())
     if not SPAN[0] <= span <= SPAN[1]:
         hint = "; looks like millimetres" if span > 100 else ""

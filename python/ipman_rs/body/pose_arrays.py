@@ -1,25 +1,31 @@
 """Poses in files: which arrays hold a pose, or a piece of it, and the joints that each turns.
 
-AMASS, the smplx package, SMPL and SMPL-X name them differently; all are rotation vectors (T, 3 n) or (T, n, 3), in
-radians, each joint relative to its parent.
+AMASS, the smplx package, SMPL, SMPL-X and ROMP name them differently. Each joint turns relative to its parent; the
+numbers are rotation vectors (T, 3 n) or (T, n, 3) in radians, matrices (T, n, 3, 3) or (T, 9 n), the first two columns
+of matrices (T, n, 6), or quaternions in an array whose name ends in _wxyz or _xyzw. The shape tells which. EasyMocap
+has a turn of the whole body beside its poses, Rh.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import rotations
 from .joints import BODY, LEFT_HAND, RIGHT_HAND, SMPL, SMPLH, SMPLX
 from .model import BodyModel
 
-WHOLE_POSES = ("poses", "fullpose", "pose", "full_pose")
+WHOLE_POSES = ("poses", "fullpose", "pose", "full_pose", "smpl_thetas", "smpl_poses")
 # Arrays that hold a piece of the pose, and the joints of that piece by its number of columns / 3.
 PIECES: dict[str, tuple[tuple[str, ...], ...]] = {
     "global_orient": (BODY[:1],),
     "root_orient": (BODY[:1],),
+    "Rh": (BODY[:1],),
     "body_pose": (BODY[1:], SMPL[1:]),
     "pose_body": (BODY[1:], SMPL[1:]),
     "left_hand_pose": (LEFT_HAND,),
@@ -31,42 +37,102 @@ PIECES: dict[str, tuple[tuple[str, ...], ...]] = {
     "reye_pose": (SMPLX[24:25],),
     "pose_eye": (SMPLX[23:25],),
 }
-NAMES = (*WHOLE_POSES, *PIECES)
-_WHOLE = (BODY, SMPL, SMPLH, SMPLX)
+_WHOLE = (SMPL, BODY, SMPLH, SMPLX)
+_VECTORS, _MATRICES, COLUMNS, _QUATERNIONS = "rotation vectors", "rotation matrices", "6D rotations", "quaternions"
+_WIDTHS = {_VECTORS: 3, _MATRICES: 9, COLUMNS: 6, _QUATERNIONS: 4}
+_ORDERS = {"_wxyz": (1, 2, 3, 0), "_xyzw": (0, 1, 2, 3)}  # where x, y, z and w of a quaternion are
+_ORTHONORMAL = 1e-3  # how far rounded rotation matrices are off
+NAMES = tuple(
+    f"{name}{more}" for name in (*WHOLE_POSES, *PIECES) for more in ("", *_ORDERS, *(f"_quat{end}" for end in _ORDERS))
+)
 
 Array = NDArray[Any]
 
 
-class Piece(NamedTuple):
-    """Rotation vectors (T, n, 3) of the joints (n,) of these names."""
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Rotation vectors (T, n, 3) of the joints (n,) of these names.
+
+    name: of the array in its file. form: what the array holds. Fingers that are no rotation vectors in the file are
+    absolute, not relative to a mean hand (`Hands`).
+    """
 
     rotations: Array
     joints: tuple[str, ...]
+    name: str = ""
+    form: str = _VECTORS
+
+    @property
+    def is_absolute(self) -> bool:
+        return self.form != _VECTORS
 
 
-def read(first: Callable[..., Array | None]) -> list[Piece]:
+def read(first: Callable[..., Array | None], degrees: bool = False) -> list[Piece]:
     """The pieces of a stored pose; `first(*names)` gives the first of these arrays that there is, or None.
 
+    degrees: of rotation vectors; in the pieces they are radians.
+
     Raises:
-        ValueError: an array has another shape than its joints need, or pieces have unequal numbers of frames.
+        ValueError: an array has another shape than its joints need, does not tell what it holds, or pieces have unequal
+            numbers of frames.
     """
-    whole = first(*WHOLE_POSES)
-    if whole is not None:
-        return [_whole(whole)]
-    pieces = [_piece(name, array) for name in PIECES if (array := first(name)) is not None]
+    pieces = _pieces(first)
+    if degrees:
+        pieces = [each if each.is_absolute else replace(each, rotations=np.radians(each.rotations)) for each in pieces]
     counts = {len(piece.rotations) for piece in pieces}
     if len(counts - {1}) > 1:
         raise ValueError(f"pose arrays have {sorted(counts)} frames; expected equal numbers")
-    return pieces
+    turn = next((piece for piece in pieces if piece.name == "Rh"), None)
+    return pieces if turn is None else _turned(turn, [piece for piece in pieces if piece is not turn])
 
 
-def place(pieces: Sequence[Piece], joint_names: Sequence[str], length: int) -> NDArray[np.float64]:
+def _pieces(first: Callable[..., Array | None]) -> list[Piece]:
+    """As they are in the file."""
+    for name in WHOLE_POSES:
+        whole = _stored(first, name)
+        if whole is not None:
+            turn = first("Rh")
+            if turn is None:
+                return [_piece(*whole, _WHOLE)]
+            return [_piece("Rh", turn, PIECES["Rh"]), _piece(*whole, (*_WHOLE, SMPL[1:], BODY[1:]))]
+    stored = [(name, array, PIECES[base]) for base in PIECES for name, array in _listed(_stored(first, base))]
+    # One matrix has the shape of three rotation vectors: how many frames the others have tells which it is.
+    others = [_piece(*one) for one in stored if one[1].shape != (3, 3)]
+    frames = {len(piece.rotations) for piece in others} - {1}
+    made = {piece.name: piece for piece in others}
+    return [made.get(name) or _square(name, array, joints, frames) for name, array, joints in stored]
+
+
+def _turned(turn: Piece, pieces: list[Piece]) -> list[Piece]:
+    """With the root turned after it has turned by itself."""
+    from scipy.spatial.transform import Rotation
+
+    root = next((piece for piece in pieces if piece.joints[0] == BODY[0]), None)
+    if root is None:
+        return [turn, *pieces]
+    ways = np.broadcast_arrays(turn.rotations[:, 0], root.rotations[:, 0])
+    whole = np.broadcast_to(root.rotations, (len(ways[0]), *root.rotations.shape[1:])).astype(np.float64)
+    outer, inner = (Rotation.from_rotvec(np.nan_to_num(way)) for way in ways)
+    whole[:, 0] = np.where(np.isfinite(ways[0] + ways[1]), (outer * inner).as_rotvec(), np.nan)
+    return [replace(piece, rotations=whole) if piece is root else piece for piece in pieces]
+
+
+def place(
+    pieces: Sequence[Piece],
+    joint_names: Sequence[str],
+    length: int,
+    pose_mean: Array | None = None,
+    dtype: type[np.floating] = np.float64,
+) -> NDArray[Any]:
     """The pose (length, J, 3) on joints of these names, zero where no piece turns them; a piece of one frame is that of
-    all."""
-    pose = np.zeros((length, len(joint_names), 3))
-    for rotations, joints in pieces:
-        here = [k for k, name in enumerate(joints) if name in joint_names]
-        pose[:, [joint_names.index(joints[k]) for k in here]] = rotations[:, here]
+    all. `pose_mean` (J, 3), `BodyModel.pose_mean`: is taken off absolute rotations."""
+    pose = np.zeros((length, len(joint_names), 3), dtype)
+    for piece in pieces:
+        here = [k for k, name in enumerate(piece.joints) if name in joint_names]
+        columns = [joint_names.index(piece.joints[k]) for k in here]
+        pose[:, columns] = piece.rotations[:, here]
+        if piece.is_absolute and pose_mean is not None:
+            pose[:, columns] -= pose_mean[columns]
     return pose
 
 
@@ -80,26 +146,112 @@ def joints_of(body: BodyModel) -> dict[str, list[int]]:
     return {name: [column[joint] for joint in piece] for name, piece in pieces.items() if set(piece) <= set(column)}
 
 
-def _whole(array: Array) -> Piece:
-    by_columns = {3 * len(names): names for names in _WHOLE}
-    by_columns[72] = SMPL
-    if array.ndim >= 2 and array.shape[-1] == 3 and 3 * array.shape[-2] in by_columns:
-        array = array.reshape(*array.shape[:-2], -1)
-    if array.ndim == 3 and array.shape[-1] in by_columns and array.shape[0] == 1:
-        array = array[0]
-    if array.ndim not in (1, 2) or array.shape[-1] not in by_columns or array.size == 0:
-        counts = ", ".join(str(count) for count in sorted(by_columns))
-        raise ValueError(f"the pose has shape {array.shape}; expected (T, n) with n of {counts}")
-    joints = by_columns[array.shape[-1]]
-    return Piece(array.reshape(-1, len(joints), 3), joints)
+def _stored(first: Callable[..., Array | None], base: str) -> tuple[str, Array] | None:
+    """The array of a pose, or a piece, under its plain name or that of quaternions."""
+    for name in (base, *(f"{base}{more}{order}" for order in _ORDERS for more in ("", "_quat"))):
+        array = first(name)
+        if array is not None:
+            return name, array
+    return None
 
 
-def _piece(name: str, array: Array) -> Piece:
-    choices = PIECES[name]
-    if array.ndim >= 2 and array.shape[-1] == 3 and array.shape[-2] in {len(choice) for choice in choices}:
-        array = array.reshape(*array.shape[:-2], -1)
-    joints = next((choice for choice in choices if array.shape[-1:] == (3 * len(choice),)), None)
-    if joints is None or array.ndim > 2 or array.size == 0:
-        counts = " or ".join(str(3 * len(choice)) for choice in choices)
-        raise ValueError(f"{name} has shape {array.shape}; expected (T, {counts}) axis-angle")
-    return Piece(array.reshape(-1, len(joints), 3), joints)
+def _listed(found: tuple[str, Array] | None) -> list[tuple[str, Array]]:
+    return [] if found is None else [found]
+
+
+def _piece(name: str, array: Array, choices: Sequence[tuple[str, ...]]) -> Piece:
+    """The rotations of an array by its shape; those of the first of the `choices` of joints that it fits."""
+    order = next((order for ending, order in _ORDERS.items() if name.endswith(ending)), None)
+    for joints in choices:
+        for form, width in _WIDTHS.items():
+            rows = _rows(array, len(joints), width)
+            if rows is None or (form == _QUATERNIONS) != (order is not None):
+                continue
+            return Piece(_vectors(name, form, rows, order), joints, name, form)
+    for joints in choices:
+        if order is None and _rows(array, len(joints), 4) is not None:
+            raise ValueError(
+                f"{name} has shape {array.shape}, as of quaternions, and nothing tells whether w is first or last: "
+                f"call the array {name}_wxyz or {name}_xyzw"
+            )
+    widths = " or ".join(str(3 * len(joints)) for joints in choices)
+    raise ValueError(
+        f"{name} has shape {array.shape}; expected rotation vectors (T, {widths}), or matrices (T, n, 3, 3) of "
+        f"{' or '.join(str(len(joints)) for joints in choices)} joints"
+    )
+
+
+def _square(name: str, array: Array, choices: Sequence[tuple[str, ...]], frames: set[int]) -> Piece:
+    """An array (3, 3): one matrix, if it is a rotation and the other pieces have not three `frames`, else vectors."""
+    single = [joints for joints in choices if len(joints) == 1]
+    if not single or not _are_rotations(array[None]):
+        return _piece(name, array, choices)
+    if 3 in frames:
+        raise ValueError(
+            f"{name} has shape (3, 3): it may be one rotation matrix or three frames of rotation vectors; save it as "
+            "(1, 3, 3) or as (3, 1, 3)"
+        )
+    return _piece(name, array[None], choices)
+
+
+def _rows(array: Array, joints: int, width: int) -> Array | None:
+    """The array as (T, joints, width), if its shape is that of so many joints with so many numbers each."""
+    tails: list[tuple[int, ...]] = [(joints * width,), (joints, width)]
+    if width == 9:
+        tails = [(joints, 3, 3), *([(3, 3)] if joints == 1 else []), *tails]
+    if width == 6:
+        tails.append((joints, 3, 2))
+    for tail in tails:
+        lead = array.shape[: array.ndim - len(tail)]
+        if array.ndim >= len(tail) and array.shape[array.ndim - len(tail) :] == tail and array.size:
+            if joints == 1 and width == 3 and array.ndim > 2 and tail == (3,) and array.shape[-2] == 3:
+                continue  # (T, 3, 3): matrices
+            if sum(size != 1 for size in lead) <= 1:
+                return array.reshape(math.prod(lead), joints, width)
+    return None
+
+
+def _vectors(name: str, form: str, rows: Array, order: tuple[int, ...] | None) -> Array:
+    """Rotation vectors (T, n, 3) of rows in one of the forms."""
+    if form == _VECTORS:
+        return rows
+    from scipy.spatial.transform import Rotation
+
+    rows = rows.astype(np.float64)
+    known = np.isfinite(rows).all(axis=-1)
+    rows = np.where(known[..., None], rows, _IDENTITY[form] if order is None else np.eye(4)[order[3]])
+    if order is not None:
+        lengths = np.linalg.norm(rows, axis=-1)
+        if (np.abs(lengths - 1) > 0.1).any():
+            raise ValueError(f"{name}: expected quaternions of length 1, got one of {lengths.flat[0]:.4g}")
+        turned = Rotation.from_quat(rows[..., order].reshape(-1, 4))
+    else:
+        matrices = rows.reshape(-1, 3, 3) if form == _MATRICES else _from_columns(name, rows.reshape(-1, 6))
+        if not _are_rotations(matrices):
+            raise ValueError(f"{name}: has the shape of rotation matrices, but they are none; save rotation vectors")
+        turned = Rotation.from_matrix(matrices)
+    vectors = turned.as_rotvec().reshape(*rows.shape[:-1], 3)
+    vectors[~known] = np.nan
+    return vectors
+
+
+_IDENTITY = {_MATRICES: np.eye(3).ravel(), COLUMNS: np.eye(3)[:2].ravel()}
+
+
+def _from_columns(name: str, rows: Array) -> Array:
+    """Matrices (n, 3, 3) of two columns, one after the other, or in turn as SPIN writes them (n, 3, 2)."""
+    after = rows.reshape(-1, 2, 3)
+    in_turn = rows.reshape(-1, 3, 2).swapaxes(1, 2)
+    for columns in (after, in_turn):
+        if np.abs(columns @ columns.swapaxes(1, 2) - np.eye(2)).max() < _ORTHONORMAL:
+            return rotations.from_6d(np.ascontiguousarray(columns).reshape(-1, 6))
+    raise ValueError(
+        f"{name}: has six numbers for each joint, but they are no two columns of a rotation matrix; save rotation "
+        "vectors or matrices"
+    )
+
+
+def _are_rotations(matrices: Array) -> bool:
+    matrices = matrices.astype(np.float64)
+    off = np.abs(np.matmul(matrices, matrices.swapaxes(-1, -2)) - np.eye(3)).max(initial=0)
+    return bool(off < _ORTHONORMAL and np.all(np.linalg.det(matrices) > 0))

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
+import os
 import struct
+import sys
 import zipfile
 from pathlib import Path
 from typing import IO, Any, Literal
@@ -11,20 +14,27 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from ipman_rs.files import read_bytes, regular
+
 MAX_BYTES = 1 << 30  # of one array, unpacked
 
 
 def names(path: Path) -> set[str]:
     """Names of the arrays in `path`; ValueError if it is no `.npz` file."""
+    regular(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            return {name.removesuffix(".npy") for name in archive.namelist()}
-    except (zipfile.BadZipFile, OSError, ValueError) as error:
+            found = {name.removesuffix(".npy") for name in archive.namelist()}
+        for name in found:
+            name.encode()  # half a character cannot be written anywhere
+        return found
+    except Exception as error:  # damaged bytes can fail in any way
         raise ValueError(f"{path}: not a .npz file ({error}); is the download complete?") from error
 
 
 def read(path: Path, name: str) -> NDArray[Any]:
     """Array `name` of `path`; ValueError when it is damaged, holds Python objects, or claims more than it carries."""
+    regular(path)
     try:
         with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as stream:
             packed = archive.getinfo(f"{name}.npy")
@@ -33,13 +43,14 @@ def read(path: Path, name: str) -> NDArray[Any]:
             shape, order, dtype = _header(stream)
             data = stream.read(packed.file_size)
             _fits(shape, dtype, len(data))
-            return np.frombuffer(data, dtype).reshape(shape, order=order)
+            return checked_text(np.frombuffer(data, dtype).reshape(shape, order=order))
     except Exception as error:  # damaged bytes can fail in any way (zlib, struct, header syntax)
         raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
 
 
 def shape_of(path: Path, name: str) -> tuple[int, ...]:
     """The shape that array `name` of `path` claims; a few bytes are read. Raises as `read`."""
+    regular(path)
     try:
         with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as stream:
             return tuple(int(size) for size in _header(stream)[0])
@@ -53,6 +64,7 @@ def mapped(path: Path, name: str) -> NDArray[Any]:
     numpy.savez stores its arrays as they are, so they can be mapped into memory in place, read-only (and, unlike with
     `read`, without a comparison of checksums). A packed one (numpy.savez_compressed) is read as a whole, once.
     """
+    regular(path)
     try:
         with zipfile.ZipFile(path) as archive:
             packed = archive.getinfo(f"{name}.npy")
@@ -71,6 +83,31 @@ def mapped(path: Path, name: str) -> NDArray[Any]:
         raise ValueError(
             text if text.startswith(f"{path}: ") else f"{path}: array {name!r} cannot be read: {text}"
         ) from error
+
+
+def read_npy(path: str | os.PathLike[str]) -> NDArray[Any]:
+    """The array of an `.npy` file. ValueError, naming the file, as `read`."""
+    data = io.BytesIO(read_bytes(path, MAX_BYTES))
+    try:
+        shape, order, dtype = _header(data)
+        rest = data.read()
+        _fits(shape, dtype, len(rest))
+        return checked_text(np.frombuffer(rest, dtype).reshape(shape, order=order))
+    except Exception as error:  # damaged bytes can fail in any way (header syntax, tokens, depth)
+        raise ValueError(f"{path}: is no readable .npy file ({error or type(error).__name__})") from error
+
+
+def checked_text(array: NDArray[Any]) -> NDArray[Any]:
+    """The array, if its text, where it holds any, is text. numpy and Python do not look before they use it.
+
+    Raises:
+        ValueError: it holds characters that Unicode does not have, or halves of characters.
+    """
+    if array.dtype.kind == "U" and array.size and array.dtype.itemsize:
+        codes = np.ascontiguousarray(array).reshape(-1).view(np.dtype(np.uint32).newbyteorder(array.dtype.byteorder))
+        if int(codes.max()) > sys.maxunicode or ((codes >= 0xD800) & (codes < 0xE000)).any():
+            raise ValueError("holds what is no text (characters that Unicode does not have)")
+    return array
 
 
 def _data_offset(stream: IO[bytes], start: int) -> int:

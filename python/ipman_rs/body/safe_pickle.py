@@ -21,6 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.files import regular
+
+from .safe_npz import checked_text
+
 BODY_MODEL, BODY_MODELS = "body model", "an unmodified SMPL, SMPL+H or SMPL-X file"
 MAX_BYTES = 1 << 30  # the largest upstream file (SMPL-X with 400 components, in float64) has about half of that
 
@@ -293,7 +297,7 @@ def read(path: Path, what: str = BODY_MODEL, expected: str = BODY_MODELS, tolera
     dictionary, or names anything not allowed.
     """
     try:
-        size = path.stat().st_size
+        size = regular(path).stat().st_size
         if size > MAX_BYTES:
             raise ValueError(f"{path}: {size} bytes is more than any {what} has ({MAX_BYTES}); is it the right file?")
         data = path.read_bytes()
@@ -317,8 +321,11 @@ def read(path: Path, what: str = BODY_MODEL, expected: str = BODY_MODELS, tolera
 
 def as_array(value: Any, shape: tuple[int, ...] | None = None) -> NDArray[Any]:
     """The array behind a value of `read`; a sparse matrix only if it has the expected `shape`."""
-    if isinstance(value, SparseRecord):
-        if value.shape != shape:
-            raise ValueError(f"expected shape {shape}, got a sparse matrix of shape {value.shape}")
-        return value.dense()
-    return _resolved(value, (ArrayRecord, ChumpyRecord, ScalarRecord, SelectRecord))
+    try:
+        if isinstance(value, SparseRecord):
+            if value.shape != shape:
+                raise ValueError(f"expected shape {shape}, got a sparse matrix of shape {value.shape}")
+            return value.dense()
+        return checked_text(_resolved(value, (ArrayRecord, ChumpyRecord, ScalarRecord, SelectRecord)))
+    except (ArithmeticError, AttributeError, LookupError, TypeError) as error:  # state of another kind than expected
+        raise ValueError(f"is no array that can be read: {type(error).__name__}: {error}") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,26 @@ def load(
         joint_names=names,
         hands=_hands(read, flat_hand_mean) if keys.issuperset(HAND_KEYS) else None,
     )
+
+
+_GENDERS = {"female": "female", "f": "female", "male": "male", "m": "male", "neutral": "neutral", "n": "neutral"}
+
+
+def gender(word: str) -> str:
+    """female, male or neutral, of what files call it; empty for other words."""
+    return _GENDERS.get(word.strip().lower().removeprefix("b").strip("'\""), "")
+
+
+def gender_of(path: Path) -> str:
+    """Of a model file: what an array of it says, or its name, or that of its folder, as AMASS's SMPL+H has it; empty
+    where nothing does."""
+    if path.suffix == ".npz" and "gender" in safe_npz.names(path):
+        said = safe_npz.read(path, "gender").reshape(-1)
+        if said.dtype.kind in "US" and len(said) == 1:
+            return gender(said[0].decode("latin1") if said.dtype.kind == "S" else str(said[0]))
+    stem, folder = path.stem.lower(), path.parent.name.lower()
+    words = [word for name in (stem, folder) for word in ("female", "male", "neutral") if word in name]
+    return next((_GENDERS[word] for word in (*words, *re.split(r"[^a-z]+", stem)) if word in _GENDERS), "")
 
 
 def _open(path: Path) -> tuple[Read, set[str]]:

@@ -10,11 +10,11 @@ import click
 
 from .benchmark import benchmark
 from .data import data
-from .errors import FileError
+from .errors import FileError, warnings_in_one_line
 from .evaluate import evaluate
 from .figure import figure
 from .fit import fit
-from .options import GROUND, PRESETS, UP
+from .options import GROUND, PRESETS, UP, of_files
 from .predict import predict
 from .simulate import simulate
 from .train import train
@@ -40,7 +40,8 @@ def _version(context: click.Context, _parameter: click.Parameter, wanted: bool) 
 
 @click.group(context_settings=_CONTEXT)
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Show the version.")
-def main() -> None:
+@click.pass_context
+def main(context: click.Context) -> None:
     """Intuitive physics of 3D human bodies: pressure, centre of mass, base of support and balance.
 
     \b
@@ -52,6 +53,7 @@ def main() -> None:
     ipman figure pull -o out        the paper's figures, as PNG, SVG and numbers
     ipman simulate body.obj         how firmly it stands, and what becomes of it when it is let go
     """
+    context.with_resource(warnings_in_one_line())
 
 
 main.add_command(fit)
@@ -110,6 +112,7 @@ def demo(output: Path, preset: str) -> None:
     "--parts", type=click.Path(path_type=Path), metavar="FILE",
     help="Body parts of a mesh: JSON {part: [vertex ids]}, or one label a face (.json, .npy, .npz).",
 )  # fmt: skip
+@of_files
 @_preset
 @click.option("--json", "as_json", is_flag=True, help="Print report.json to stdout and nothing else there.")
 def analyze(
@@ -121,19 +124,21 @@ def analyze(
     parts: Path | None,
     preset: str,
     as_json: bool,
+    **mended: Any,
 ) -> None:
     """Analyse bodies and write a report: report.html, report.json, report.npz and pictures.
 
     BODY is a mesh in metres (.obj .ply .glb .stl, or .npz with vertices and faces), or the parameters of a body model
     (.npz: poses/betas/trans as AMASS ships them, or global_orient/body_pose/betas/transl, or pose/betas/transl).
     Vertices (T, V, 3) and parameters over time are sequences. Several bodies come into one report, each with its own
-    folder of pictures.
+    folder of pictures. What cannot be a person is refused, and what is odd is marked with ! in the table.
 
     \b
     ipman analyze scan.ply -o out --up z            a scan of a z-up scanner, its lowest point on the floor
     ipman analyze smpl.obj -o out --parts parts.json
     ipman analyze walk_poses.npz -o out --body SMPLH_NEUTRAL.pkl
     ipman analyze *.obj -o out --ground 0           several bodies on the plane y = 0
+    ipman analyze scan.stl -o out --units mm        a scan in millimetres
     ipman analyze scan.ply --json | jq .bodies[0].frames[0].margin
 
     Exit code: 0 when all is well, 1 when a file could not be analysed (the others are), 2 for wrong usage.
@@ -143,7 +148,7 @@ def analyze(
     from . import console
     from .measure import Request, measure
 
-    request = Request(model=model, up=up, ground=ground, parts=parts, preset=preset)
+    request = Request(model=model, up=up, ground=ground, parts=parts, preset=preset, **mended)
     studies: list[Study] = []
     failures: list[tuple[str, str]] = []
     for path in bodies:

@@ -93,7 +93,7 @@ def print_table(studies: Sequence[Study]) -> None:
 def _row(study: Study, frames: int | slice) -> list[Text]:
     value = {key: np.atleast_1d(column[frames]) for key, column in study.numbers.items() if column.ndim == 1}
     single = isinstance(frames, int)
-    name = study.label(frames) if single else f"{study.name} ({study.num_frames} frames)"
+    name = marked(study.label(frames) if single else f"{study.name} ({study.num_frames} frames)", study.flags)
     stable = value["bose"].astype(bool)
     if single:
         said = "yes" if stable[0] else ("no" if value["has_contact"][0] else "no contact")
@@ -109,6 +109,11 @@ def _row(study: Study, frames: int | slice) -> list[Text]:
         _number(np.median(value["balance"]), 1, 2),
     ]
     return [*map(Text, cells), Text(said, style="green" if stable.all() else "red")]
+
+
+def marked(name: str, flags: Sequence[str]) -> str:
+    """A name in a table, with a sign where something is odd; what it is stands below."""
+    return f"{name} !" if flags else name
 
 
 def print_rows(head: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
@@ -200,9 +205,11 @@ def _known(value: float | None, factor: float) -> str:
 
 
 def print_notes(studies: Sequence[Study]) -> None:
-    """What was assumed, under each body's name."""
+    """What is odd and what was assumed, under each body's name."""
     for study in studies:
         say("")
         say(one_line(study.source))
+        for flag in study.flags:
+            say(f"! {one_line(flag)}")
         for note in study.notes:
             say(f"  {one_line(note)}")

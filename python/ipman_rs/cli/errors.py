@@ -1,8 +1,12 @@
-"""The one way in which a file fails: which file, what is wrong with it, and what to do."""
+"""The one way in which a file fails: which file, what is wrong with it, and what to do; and how warnings are said."""
 
 from __future__ import annotations
 
 import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
 
 
 class FileError(Exception):
@@ -18,3 +22,17 @@ def one_line(text: str) -> str:
     """Text for a terminal line: no line breaks, no control characters, not endless."""
     line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     return line if len(line) <= 400 else line[:399] + "…"
+
+
+@contextmanager
+def warnings_in_one_line() -> Iterator[None]:
+    """Warnings of the library are a line each on stderr, without Python's file names and source lines."""
+    import click
+
+    def show(message: Warning | str, category: type[Warning], *_place: Any) -> None:
+        if not issubclass(category, (DeprecationWarning, ImportWarning)):
+            click.echo(one_line(f"ipman: warning: {message}"), err=True)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield

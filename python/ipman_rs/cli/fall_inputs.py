@@ -17,15 +17,17 @@ import ipman_rs as ip
 from ..body import embedded, safe_npz
 from .errors import FileError
 from .fit_outputs import RECORD
-from .measure import Request, on_ground
+from .measure import Request, odd_sizes, on_ground, warn, with_sizes
 from .recording import Recording
 
+_BESIDE = ("names", "body", "model", "ground", "ground_normal", "ground_height")  # arrays beside the parameters
 PREDICTIONS = "predictions.npz"  # what `ipman predict --data` and `ipman fit --data` leave in their folder
 
 
 @dataclass(frozen=True)
 class Bodies:
-    """T bodies of a file on a ground, which is one for all or one for each. names: (T,) where they have any."""
+    """T bodies of a file on a ground, which is one for all or one for each. names: (T,) where they have any; flags:
+    what is odd about them."""
 
     path: Path
     recording: Recording
@@ -33,6 +35,7 @@ class Bodies:
     ground: ip.Ground
     names: tuple[str, ...] | None
     notes: Sequence[str]
+    flags: tuple[str, ...] = ()
 
     @property
     def count(self) -> int:
@@ -40,41 +43,41 @@ class Bodies:
 
 
 def read_bodies(path: Path, request: Request) -> Bodies:
-    """Raises FileError."""
+    """What is odd about them goes to stderr, too. Raises FileError."""
     try:
-        if path.is_dir() and not (path / PREDICTIONS).is_file():
-            return _fits(path, request)
-        return replace(_file(path / PREDICTIONS if path.is_dir() else path, request), path=path)
+        with odd_sizes() as sizes:
+            if path.is_dir() and not (path / PREDICTIONS).is_file():
+                found = _fits(path, request)
+            else:
+                found = replace(_file(path / PREDICTIONS if path.is_dir() else path, request), path=path)
     except (ValueError, TypeError) as error:
         raise FileError(path, str(error)) from error
     except MemoryError as error:
         raise FileError(path, "needs more memory than there is; simulate fewer frames at once") from error
+    found = replace(found, flags=with_sizes(found.flags, sizes))
+    warn(path, found.flags)
+    return found
 
 
 def _file(path: Path, request: Request) -> Bodies:
     arrays = _arrays(path) if path.suffix.lower() == ".npz" and path.is_file() and path.stat().st_size else {}
     request = _with_model(path, request, arrays)
-    own = _own_ground(path, arrays) if request.up is None and request.ground is None else None
-    recording, template, ground, notes = on_ground(path, request if own is None else replace(request, ground=0.0))
+    own = _own_ground(path, arrays, request.units) if request.up is None and request.ground is None else None
+    recording, template, ground, notes = on_ground(path, request, own, _BESIDE)
     count = len(recording.vertices)
-    if own is not None:
-        if own.height.size not in (1, count):
-            raise FileError(path, f"has {own.height.size} grounds for {count} bodies; expected one, or one for each")
-        ground = own
-        notes = [note for note in notes if not note.startswith("up: ")]
-        notes.append("ground: the file's own (--up and --ground say otherwise)")
+    if own is not None and own.height.size not in (1, count):
+        raise FileError(path, f"has {own.height.size} grounds for {count} bodies; expected one, or one for each")
     if "names" in arrays and arrays["names"].shape != (count,):
         raise FileError(path, f"names have shape {arrays['names'].shape}; expected one for each of {count} bodies")
     names = tuple(arrays["names"].astype(str).tolist()) if "names" in arrays else None
-    return Bodies(path, recording, template, ground, names, notes)
+    return Bodies(path, recording, template, ground, names, notes, recording.flags)
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
     """What a file says of its bodies beside their parameters."""
     try:
         stored = safe_npz.names(path)
-        wanted = ("names", "body", "model", "ground", "ground_normal", "ground_height")
-        return {name: safe_npz.read(path, name) for name in wanted if name in stored}
+        return {name: safe_npz.read(path, name) for name in _BESIDE if name in stored}
     except ValueError as error:
         raise FileError(path, str(error)) from error
 
@@ -89,7 +92,7 @@ def _with_model(path: Path, request: Request, arrays: dict[str, np.ndarray]) -> 
     return replace(request, model=named)
 
 
-def _own_ground(path: Path, arrays: dict[str, np.ndarray]) -> ip.Ground | None:
+def _own_ground(path: Path, arrays: dict[str, np.ndarray], metres: float) -> ip.Ground | None:
     """From `ground` (normal and height, of predictions) or `ground_normal` and `ground_height` (of a fit)."""
     if "ground" in arrays:
         rows = arrays["ground"]
@@ -101,7 +104,7 @@ def _own_ground(path: Path, arrays: dict[str, np.ndarray]) -> ip.Ground | None:
     else:
         return None
     try:
-        normal, height = normal.reshape(-1, 3), height.reshape(-1)
+        normal, height = normal.reshape(-1, 3), metres * height.reshape(-1)
         return ip.Ground(normal[0], height[0]) if len(normal) == len(height) == 1 else ip.Ground(normal, height)
     except ValueError as error:
         raise FileError(path, str(error)) from error
@@ -133,5 +136,6 @@ def _fits(folder: Path, request: Request) -> Bodies:
         first.template,
         ip.Ground(np.concatenate(normals), np.concatenate(heights)),
         tuple(names),
-        [*first.notes, f"bodies: {len(names)} from {len(items)} fits, each on its own ground"],
+        flags=tuple(f"{item.name}: {flag}" for item, one in zip(items, each, strict=True) for flag in one.flags),
+        notes=[*first.notes, f"bodies: {len(names)} from {len(items)} fits, each on its own ground"],
     )

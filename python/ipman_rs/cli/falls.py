@@ -12,6 +12,7 @@ import numpy as np
 from .. import view
 from ..analysis import PIECE
 from ..body.sequence import pieces
+from ..files import being_written, write_whole
 from ..ground import Ground
 from ..plain import plain
 from ..simulation import FALLEN, VERDICT, Simulation, TipTest, simulate, tip_test
@@ -41,7 +42,7 @@ class Film:
 class Fall:
     """The tip test of each of the T bodies of a file, what became of them (None where that was not asked for), films.
 
-    names: of the bodies, where the file names them.
+    names: of the bodies, where the file names them. flags: what is odd about them.
     """
 
     path: Path
@@ -50,6 +51,7 @@ class Fall:
     notes: Sequence[str]
     films: Sequence[Film]
     names: tuple[str, ...] | None = None
+    flags: tuple[str, ...] = ()
 
     @property
     def count(self) -> int:
@@ -96,7 +98,7 @@ class Fall:
         columns, stands, status = self._columns(), self.stands(), self.status()
         for frame in range(self.count):
             own = f" {frame}" if self.names is None else f" {self.names[frame]}"
-            name = self.path.name + ("" if self.count == 1 else own)
+            name = console.marked(self.path.name + ("" if self.count == 1 else own), self.flags)
             unknown = status_names(status[frame] & _UNKNOWN)
             verdict = None if stands is None else ("yes" if stands[frame] else "no")
             yield name, [_number(value) for value in columns[:, frame]], ", ".join(unknown).lower() or verdict
@@ -105,12 +107,15 @@ class Fall:
         """Medians of those that are known."""
         known = (self.status() & _UNKNOWN) == 0
         if not known.any():
-            return f"{self.path.name} ({self.count} frames)", ["–"] * len(self.titles()), None
+            return self._title(), ["–"] * len(self.titles()), None
         cells = [_number(value) for value in np.median(self._columns()[:, known], axis=1)]
         stands = self.stands()
         left_out = "" if known.all() else f" of {known.sum()}"
         share = None if stands is None else f"{100 * stands[known].mean():.0f} %{left_out}"
-        return f"{self.path.name} ({self.count} frames)", cells, share
+        return self._title(), cells, share
+
+    def _title(self) -> str:
+        return console.marked(f"{self.path.name} ({self.count} frames)", self.flags)
 
     def record(self) -> dict[str, Any]:
         """Plain numbers for JSON; of more than 10,000 frames evenly spaced ones."""
@@ -131,7 +136,14 @@ class Fall:
             listed.append(row)
         told = {} if self.run is None else {"engine": self.run.engine, "times": plain(self.run.times)}
         notes = [*self.notes, *([self.without_verdict] if self.without_verdict else [])]
-        return {"file": str(self.path), "notes": notes, "fallen_tilt": FALLEN, **told, "frames": listed}
+        return {
+            "file": str(self.path),
+            "notes": notes,
+            "flags": [*self.flags],
+            "fallen_tilt": FALLEN,
+            **told,
+            "frames": listed,
+        }
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The columns of simulation.npz: those of `TipTest` as tip_…, and those of `Simulation`."""
@@ -174,7 +186,9 @@ def fall(
                     runs.append(simulate(vertices, template, ground, times, **told))
                 done += len(vertices)
                 bar.to(done)
-        result = Fall(path, _joined(tips), None if tip_only else _joined(runs), bodies.notes, (), bodies.names)
+        result = Fall(
+            path, _joined(tips), None if tip_only else _joined(runs), bodies.notes, (), bodies.names, bodies.flags
+        )
         drawn = [] if tip_only else _to_draw(result, films)
         made = [
             _film(result, recording.vertices[frame], frame, template, _grounds(bodies.ground, frame), options)
@@ -226,13 +240,14 @@ def _film(result: Fall, body: np.ndarray, frame: int, template: Any, ground: Any
 def write_falls(falls: Sequence[Fall], output: Path, record: str) -> None:
     """simulation.json of all files; simulation.npz and filmstrips of each, in folders where there are several."""
     output.mkdir(parents=True, exist_ok=True)
-    (output / "simulation.json").write_text(record + "\n", encoding="utf-8")
+    write_whole(output / "simulation.json", record + "\n")
     names = safe_names([one.path.stem for one in falls])
     with console.progress("writing", sum(1 + len(one.films) for one in falls)) as bar:
         for one, name in zip(falls, names, strict=True):
             folder = output if len(falls) == 1 else output / name
             folder.mkdir(exist_ok=True)
-            np.savez_compressed(folder / "simulation.npz", allow_pickle=False, **one.arrays())
+            with being_written(folder / "simulation.npz") as file:
+                np.savez_compressed(file, allow_pickle=False, **one.arrays())
             bar.one()
             for film in one.films:
                 end = "" if one.count == 1 else f"_{film.frame:0{len(str(one.count))}d}"

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..evaluation.bootstrap import Interval
+from ..files import being_written
 from ..paper_figures.files import settle
 from ..plain import plain
 from ..simulation import VERDICT, Comparison, Means, Simulation, compare
@@ -158,8 +159,10 @@ def write_comparison(one: Simulation, other: Simulation, paths: tuple[Path, Path
         text.set_parse_math(False)
     settle(figure, PNG_DPI)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}):
-        figure.savefig(output / f"{NAME}.svg", metadata={"Date": None})
-        figure.savefig(output / f"{NAME}.png", dpi=PNG_DPI)
+        with being_written(output / f"{NAME}.svg") as file:
+            figure.savefig(file, format="svg", metadata={"Date": None})
+        with being_written(output / f"{NAME}.png") as file:
+            figure.savefig(file, format="png", dpi=PNG_DPI)
 
 
 def _told_apart(first: Path, second: Path) -> tuple[str, str]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import FileError
-from .options import GROUND, PRESETS, UP, Setting
+from .options import GROUND, PRESETS, UP, Setting, of_files
 
 if TYPE_CHECKING:
     from ..data import DataSet
@@ -168,11 +168,9 @@ def pull(output: Path, width: float, push_width: float, body: str) -> None:
     help="Height of the ground along that axis in metres; auto: under the lowest vertex.",
 )  # fmt: skip
 @click.option("--parts", type=click.Path(path_type=Path), metavar="FILE", help="Body parts, as of `ipman analyze`.")
+@of_files
 @_preset
-def com(
-    body: str, output: Path, frame: int | None, model: str | None, up: tuple[float, float, float] | None,
-    ground: float | None, parts: Path | None, preset: str,
-) -> None:  # fmt: skip
+def com(body: str, output: Path, frame: int | None, preset: str, **request: Any) -> None:
     """The formulations of the centre of mass on one body, with the CoP and that of binary contact (Fig. S.3).
 
     BODY is a file as `ipman analyze` reads it, or a named pose of `ipman demo` on the built-in body.
@@ -186,7 +184,7 @@ def com(
     with _one_line_errors(output):
         from ..paper_figures import center_of_mass as made
 
-        vertices, template, floor, name = _one_body(body, frame, model, up, ground, parts)
+        vertices, template, floor, name = _one_body(body, frame, request)
         with console.busy("drawing"):
             found = made.center_of_mass(vertices, template, floor, name, preset)
             _write(found, output)
@@ -203,27 +201,27 @@ def _millimetres(about: dict[str, Any]) -> list[str]:
     return ["–" if value != value else f"{1e3 * value:.0f}" for value in distances]
 
 
-def _one_body(
-    body: str, frame: int | None, model: str | None, up: Any, ground: float | None, parts: Path | None
-) -> tuple[Any, Any, Any, str]:
-    """Vertices, template, ground and name."""
+def _one_body(body: str, frame: int | None, request: dict[str, Any]) -> tuple[Any, Any, Any, str]:
+    """Vertices, template, ground and name; `request`: the fields of `measure.Request`."""
     import ipman_rs as ip
 
-    from .measure import Request, on_ground
+    from .measure import Request, odd_sizes, on_ground, warn, with_sizes
 
     if body in ip.body.poses.NAMES and not Path(body).exists():
-        for option, value in (("--frame", frame), ("--up", up), ("--parts", parts)):
+        for option, value in (("--frame", frame), ("--up", request["up"]), ("--parts", request["parts"])):
             if value is not None:
                 raise click.UsageError(f"{option}: is for files; {body} is a named pose, one body with y up")
-        posed = ip.load_body(model or "anny")
-        return ip.body.posed(posed, body), posed.template, ip.Ground.y_up(ground or 0.0), body
+        posed = ip.load_body(request["model"] or "anny")
+        return ip.body.posed(posed, body), posed.template, ip.Ground.y_up(request["ground"] or 0.0), body
     if not Path(body).suffix and not Path(body).exists():
         raise click.UsageError(
             f"BODY: expected a file, or a pose such as {', '.join(ip.body.poses.NAMES)}; got {body!r}"
         )
     path = Path(body)
     try:
-        recording, template, floor, _ = on_ground(path, Request(model=model, up=up, ground=ground, parts=parts))
+        with odd_sizes() as sizes:
+            recording, template, floor, _ = on_ground(path, Request(**request))
+        warn(path, with_sizes(recording.flags, sizes))
     except (ValueError, TypeError) as error:
         raise FileError(path, str(error)) from error
     count, frame = len(recording.vertices), frame or 0

@@ -66,7 +66,10 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option("--image", type=click.Path(path_type=Path), metavar="PHOTO", help="Photo to draw under a keypoint file.")
 @click.option("--image-size", type=SIZE, metavar="WxH", help="Pixels of the image, where a keypoint file does not say.")
-@click.option("--person", type=int, metavar="N", help="Which person of a file, from 0. Default: the most visible.")
+@click.option(
+    "--person", type=int, metavar="N",
+    help="Which person of an image, from 0, or which track of a file that follows people. Default: the most visible.",
+)  # fmt: skip
 @click.option("--subject", metavar="NAME", help="Whose markers (NAME:LASI), where a marker file has several people's.")
 @click.option("--obj", is_flag=True, help="Write meshes as .obj, too, not only as .glb.")
 @click.option(
@@ -76,6 +79,9 @@ if TYPE_CHECKING:
 @click.option("--fps", type=float, default=30.0, show_default=True, help="Frames a second of a --sequence.")
 @click.option(
     "--every", type=click.IntRange(1), default=1, show_default=True, help="Fit each n-th frame of recordings."
+)
+@click.option(
+    "--force", is_flag=True, help="Take what cannot be a person, too; what is odd about it is said all the same."
 )
 @click.option("--resume", is_flag=True, help="Skip items that were finished with the same input and options.")
 @click.option(
@@ -119,8 +125,8 @@ def fit(
 ) -> None:
     """Fit a body to each photo, set of keypoints or marker recording, with intuitive physics.
 
-    INPUT is a photo (.png .jpg; needs the extra photo), a keypoint file (.json of OpenPose, COCO, COCO-WholeBody or
-    MediaPipe), a marker file (.trc, .c3d), or a folder of them. Every person is fitted for
+    INPUT is a photo (.png .jpg; needs the extra photo), a keypoint file (.json of OpenPose, MMPose, AlphaPose, COCO
+    or MediaPipe), a marker file (.trc, .c3d), or a folder of them. Every person is fitted for
     themselves, but for the frames of a --sequence; of several in one image one is taken. In OUTPUT every item gets a
     folder with its parameters (.npz, for `ipman analyze`), mesh (.glb), fit.json and pictures; report.html and
     report.json tell of all.
@@ -155,7 +161,7 @@ def fit(
         where = {"name": data, "path": str(path), "split": split, "options": settings}
         sys.exit(fit_data(where, output, models, keypoints, image_folder, every, options))
     options["preset"], options["model"] = options["preset"] or "fast", options["model"] or "anny-lite"
-    reading = Reading(options.pop("person"), options.pop("image_size"), image)
+    reading = Reading(options.pop("person"), options.pop("image_size"), image, sequence, options.pop("force"))
     items, tracks, failures = _items(inputs, reading)
     chosen = _settings(options)
     if fps <= 0:

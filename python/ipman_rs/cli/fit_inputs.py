@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..files import regular
 from .errors import FileError
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ class Reading:
     person: int | None = None
     image_size: tuple[float, float] | None = None
     photo: Path | None = None
+    sequence: bool = False  # the images of a file are frames of one person
+    force: bool = False  # take what cannot be a person, too
 
 
 def expand(inputs: Iterable[Path]) -> list[Path]:
@@ -70,17 +73,46 @@ def items(path: Path, reading: Reading) -> list[Item]:
     from ..fitting import keypoints
 
     try:
-        found = keypoints.read(path, person=reading.person, image_size=_size(reading))
+        size, odd = _size(reading)
+        found = keypoints.read(path, person=reading.person, image_size=size)
     except ValueError as error:
         raise FileError(path, _advice(str(error))) from error
     if found.image_size is None:
         raise FileError(path, "does not say how large its image is; give --image-size WIDTHxHEIGHT, or --image PHOTO")
-    people = [_one(found, row) for row in range(len(found))]
-    many = len(people) > 1
-    return [
+    people, notes = _admitted(path, [_one(found, row) for row in range(len(found))], reading.force)
+    many = len(found) > 1
+    if many and not reading.sequence:
+        notes.append(f"{path}: {len(found)} images, each fitted on its own; --sequence fits one person over time")
+    made = [
         Item(f"{path.stem}_{number}" if many else path.stem, path, one.sources[0], one, reading.photo, list(one.notes))
         for number, one in enumerate(people)
     ]
+    made[0].notes += notes + odd
+    return made
+
+
+def _admitted(path: Path, people: list[Detections], force: bool) -> tuple[list[Detections], list[str]]:
+    """Those whose points can be a person in the image, and what is odd. Raises FileError where nobody's can."""
+    from ..data import judge
+
+    kept: list[Detections] = []
+    notes: list[str] = []
+    refused: list[str] = []
+    for one in people:
+        assert one.image_size is not None
+        points = np.column_stack([one.points[0], one.confidence[0]])
+        try:
+            odd = judge.admit(one.sources[0], judge.keypoints(points, one.image_size[0]), force)
+        except judge.NoPerson as error:
+            refused.append(str(error))
+            continue
+        kept.append(replace(one, notes=(*one.notes, *odd)))
+    if not kept:
+        raise FileError(path, refused[0])
+    if refused:
+        first = refused[0].removeprefix(f"{path}: ")
+        notes.append(f"{path}: {len(refused)} of {len(people)} images refused; first of all: {first}")
+    return kept, notes
 
 
 def look(item: Item) -> None:
@@ -94,13 +126,18 @@ def look(item: Item) -> None:
     item.notes += item.seen.notes
 
 
-def _size(reading: Reading) -> tuple[float, float] | None:
-    if reading.image_size is not None or reading.photo is None:
-        return reading.image_size
+def _size(reading: Reading) -> tuple[tuple[float, float] | None, list[str]]:
+    """The image's size as given, or the photo's, and a note where the two differ."""
+    if reading.photo is None:
+        return reading.image_size, []
     from ..fitting import photo
 
     height, width = photo.read(reading.photo).shape[:2]
-    return float(width), float(height)
+    size, given = (float(width), float(height)), reading.image_size
+    if given is None or given == size:
+        return size, []
+    said = f"{reading.photo}: the photo has {width} × {height} pixels, --image-size says {given[0]:g} × {given[1]:g}"
+    return given, [said]
 
 
 def _advice(what: str) -> str:
@@ -117,7 +154,11 @@ def _one(found: Detections, row: int) -> Detections:
 
     points, confidence = found.points[row : row + 1], found.confidence[row : row + 1]
     others = (part(found.image_size), part(found.points_3d), part(found.confidence_3d))
-    notes = tuple(note for note in found.notes if len(found) == 1 or note.startswith(f"{found.sources[row]}:"))
+    others_notes = tuple(f"{source}:" for source in found.sources if source != found.sources[row])
+    own = f"{found.sources[row]}:"
+    notes = tuple(  # what is said of the whole file goes to its first image
+        note for note in found.notes if note.startswith(own) or (row == 0 and not note.startswith(others_notes))
+    )
     return Detections(found.names, points, confidence, (found.sources[row],), *others, notes)
 
 
@@ -130,4 +171,4 @@ def identity(item: Item, options: str) -> str:
 
 
 def _bytes(path: Path | None) -> bytes:
-    return b"" if path is None else path.read_bytes()
+    return b"" if path is None else regular(path).read_bytes()

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +19,7 @@ import ipman_rs as ip
 from .. import view
 from ..body import BodyModel, safe_npz
 from ..body.pose_arrays import joints_of
+from ..files import read_json, write_whole
 from ..view.fitted import camera_of
 from . import mesh_files
 from .fit_inputs import Item
@@ -31,30 +31,34 @@ RECORD = "fit.json"
 _BEFORE = "before_"
 
 
-def write_item(item: Item, result: Result, body: BodyModel, folder: Path, told: dict[str, Any], obj: bool) -> None:
-    """Write one fitted body. Raises OSError."""
+def write_item(
+    item: Item, result: Result, body: BodyModel, folder: Path, told: dict[str, Any], obj: bool
+) -> dict[str, Any]:
+    """Write one fitted body; the record that a later run reads back. Raises OSError."""
     arrays = result.arrays()
     vertices = posed(body, arrays)
     files: dict[str, Any] = {f"{item.name}.npz": arrays, f"{item.name}.glb": mesh_files.glb(vertices, body.faces)}
     if obj:
         files[f"{item.name}.obj"] = mesh_files.obj(vertices, body.faces)
-    write_files(folder, files, {"name": item.name, "source": item.source, **told})
+    return write_files(folder, files, {"name": item.name, "source": item.source, **told})
 
 
-def write_files(folder: Path, files: dict[str, Any], record: dict[str, Any]) -> None:
-    """Write files, bytes or arrays for an .npz, and then the record that makes the folder complete. Raises OSError."""
+def write_files(folder: Path, files: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
+    """Write files, bytes or arrays for an .npz, and then the record, with their names, that makes the folder complete;
+    that record. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / RECORD).unlink(missing_ok=True)  # incomplete from here on
     for name, content in files.items():
         write_whole(folder / name, content if isinstance(content, bytes) else npz(content))
     record = {**record, "files": sorted(files)}
-    write_whole(folder / RECORD, (json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1) + "\n").encode())
+    write_whole(folder / RECORD, json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1) + "\n")
+    return record
 
 
 def complete(folder: Path, identity: str) -> dict[str, Any] | None:
     """The record of a fit that was finished with the same input and options and has all its files, or None."""
     try:
-        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        record = read_json(folder / RECORD)
         fits = record["identity"] == identity
         there = all((folder / name).is_file() for name in record["files"])
     except (OSError, ValueError, KeyError, TypeError):
@@ -130,10 +134,3 @@ def npz(arrays: dict[str, np.ndarray]) -> bytes:
     stream = io.BytesIO()
     np.savez(stream, allow_pickle=False, **arrays)
     return stream.getvalue()
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
-    partial = path.with_name(f".{path.name}.part")
-    partial.write_bytes(content)
-    os.replace(partial, path)

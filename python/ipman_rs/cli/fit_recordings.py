@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..body import safe_npz
+from ..files import read_json
 from . import console
 from .errors import FileError
 from .fit_outputs import RECORD, complete, write_files
@@ -46,7 +47,7 @@ def fitted(recording: Recording, settings: Settings, pace: Pace, output: Path, r
     """Fit a recording, write its folder and measure it. Raises FileError."""
     record = kept(recording, settings, pace, output, resume)
     study = _measured(recording, output / recording.name, settings)
-    return replace(study, notes=(*study.notes, *record.get("notes", [])))
+    return replace(study, notes=(*study.notes, *record.get("notes", ())))
 
 
 def kept(
@@ -72,7 +73,7 @@ def kept(
             raise FileError(recording.paths[0], str(error)) from error
         record = {"name": recording.name, "source": recording.source, **told, **_stages(found)}
         record |= {"preset": _preset(recording, settings), "shape_from": person or "itself", "identity": identity}
-        write_files(folder, {f"{recording.name}.npz": {**_arrays(found, rate), **arrays}}, record)
+        record = write_files(folder, {f"{recording.name}.npz": {**_arrays(found, rate), **arrays}}, record)
     return record
 
 
@@ -92,7 +93,7 @@ def person_of(folder: Path) -> Person:
 
 
 def _record(folder: Path) -> dict[str, Any]:
-    return json.loads((folder / RECORD).read_text(encoding="utf-8"))
+    return read_json(folder / RECORD)
 
 
 def _preset(recording: Recording, settings: Settings) -> str:
@@ -158,9 +159,10 @@ def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
         found = fit_sequence(problem, variables, settings.config, **told)
     assert problem.points is not None
     median = (found.candidate.projected - problem.points).norm(dim=-1).median()
-    record: dict[str, Any] = {"frames_left_out": unseen, "median_error_px": _number(median)}
+    notes = list(dict.fromkeys(note for item in items for note in item.notes))
+    record: dict[str, Any] = {"frames_left_out": unseen, "median_error_px": _number(median), "notes": notes}
     if imitated is not None:
-        record |= {"presented": imitated.record(body.body), "notes": [*imitated.notes]}
+        record |= {"presented": imitated.record(body.body), "notes": [*notes, *imitated.notes]}
     return found, {}, record, rate
 
 
@@ -193,8 +195,7 @@ def _measured(recording: Recording, folder: Path, settings: Settings) -> Study:
     from .measure import Request, measure
 
     path = folder / f"{recording.name}.npz"
-    with np.load(path, allow_pickle=False) as stored:
-        height = float(stored["ground_height"][0]) if "ground_height" in stored.files else None
+    height = float(safe_npz.read(path, "ground_height")[0]) if "ground_height" in safe_npz.names(path) else None
     return measure(path, Request(model=settings.model, ground=height))
 
 

@@ -82,8 +82,7 @@ def run(items: list[Item], settings: Settings, output: Path, resume: bool) -> di
                 told["presented"] = imitated.record(body.body)
                 item.notes += imitated.notes
             told |= {"flags": item.flags, "notes": item.notes, "identity": hashes[item.name]}
-            write_item(item, result, body.body, output / item.name, told, settings.obj)
-            records[item.name] = {"name": item.name, "source": item.source, **told}
+            records[item.name] = write_item(item, result, body.body, output / item.name, told, settings.obj)
     return records
 
 
@@ -119,7 +118,7 @@ def _batches(items: Iterable[Item]) -> Iterator[list[Item]]:
 def _fitted(
     batch: list[Item], settings: Settings, body: ipt.BodyModel, imitated: PresentedBody | None
 ) -> Iterator[tuple[Item, Result]]:
-    kept = [item for item in batch if not _refused(item, body)]
+    kept = [item for item in batch if not _refused(item, body, settings.camera)]
     if not kept:
         return
     problem = problem_of(body, join([item.seen for item in kept if item.seen is not None]), settings, imitated)
@@ -148,7 +147,7 @@ def problem_of(
     return presented.present(problem, [imitated], settings.config.moves_camera)
 
 
-def _refused(item: Item, body: ipt.BodyModel) -> bool:
+def _refused(item: Item, body: ipt.BodyModel, camera: KnownCamera | None) -> bool:
     """Whether too little is seen of an item; else its oddities become flags."""
     assert item.seen is not None
     names = detected.shared_names(body, item.seen)
@@ -158,4 +157,5 @@ def _refused(item: Item, body: ipt.BodyModel) -> bool:
         return True
     assert seen.image_size is not None
     item.flags += detected.oddities(names, seen.points[0], seen.confidence[0], seen.image_size[0])
+    item.flags += [] if camera is None else detected.unlike(camera, seen.image_size[0])
     return False

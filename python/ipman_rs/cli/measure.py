@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +16,18 @@ import ipman_rs as ip
 from .. import view
 from ..analysis import PIECE
 from ..body.sequence import pieces
+from ..data import check, judge
+from ..data.check import Finding
 from . import console
 from .errors import FileError
 from .meshes import read_mesh
 from .parameters import read_npz
 from .parts import match_body, read_parts
 from .recording import Recording
+
+SAMPLED_VERTICES = 3_000_000  # of the bodies that are judged: 256 of the embedded one
+WEIGHED = 16  # bodies
+LISTED = 12  # names of arrays
 
 
 @dataclass(frozen=True)
@@ -31,22 +39,46 @@ class Request:
     ground: float | None = None
     parts: Path | None = None
     preset: str = "paper-r"
+    units: float = 1.0  # metres in one of the files' lengths
+    degrees: bool = False
+    rate: float | None = None  # Hz, instead of the files'
+    force: bool = False  # what cannot be a person is let in, too
 
 
 def measure(path: Path, request: Request) -> view.Study:
-    """Analyse one file. Raises FileError; warnings about units go to stderr as one line."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("ignore")
-        warnings.simplefilter("always", ip.UnitsWarning)
+    """Analyse one file. Raises FileError; what is odd goes to stderr, a line each, and into the study's flags."""
+    with odd_sizes() as found:
         try:
             study = _measure(path, request)
         except (ValueError, TypeError) as error:
             raise FileError(path, str(error)) from error
         except MemoryError as error:
             raise FileError(path, "needs more memory than there is; analyse fewer frames at once") from error
-    for warning in caught[:1]:
-        console.warn(f"{path}: {warning.message}")
+    study = replace(study, flags=with_sizes(study.flags, found))
+    warn(path, study.flags)
     return study
+
+
+@contextmanager
+def odd_sizes() -> Iterator[list[str]]:
+    """What was said of bodies too large or too small for metres, instead of warnings."""
+    said: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("always", ip.UnitsWarning)
+        yield said
+    said += [str(warning.message) for warning in caught]
+
+
+def with_sizes(flags: Sequence[str], sizes: Sequence[str]) -> tuple[str, ...]:
+    """The flags, with the first of the odd sizes where nothing is said of sizes yet."""
+    said = any(flag.startswith("vertices:") for flag in flags)
+    return (*flags, *([] if said else sizes[:1]))
+
+
+def warn(path: Path, flags: Sequence[str]) -> None:
+    for flag in flags:
+        console.warn(f"{path}: {flag}")
 
 
 def _measure(path: Path, request: Request) -> view.Study:
@@ -57,17 +89,27 @@ def _measure(path: Path, request: Request) -> view.Study:
         notes.append("open mesh: its holes are closed by fans before volumes are measured")
     with console.progress(f"analysing {path.name}", len(recording.vertices)) as step:
         return view.study(
-            path.stem, recording.vertices, template, ground, request.preset,
-            seconds=recording.seconds, source=str(path), notes=notes, progress=step.to,
+            path.stem, recording.vertices, template, ground, request.preset, seconds=recording.seconds,
+            source=str(path), notes=notes, flags=recording.flags, progress=step.to,
         )  # fmt: skip
 
 
-def on_ground(path: Path, request: Request) -> tuple[Recording, Any, ip.Ground, list[str]]:
-    """The bodies of a file, their template and ground, and what was assumed. Raises FileError."""
-    recording = read(path, request.model)
+def on_ground(
+    path: Path, request: Request, own: ip.Ground | None = None, read_elsewhere: Collection[str] = ()
+) -> tuple[Recording, Any, ip.Ground, list[str]]:
+    """The bodies of a file, judged, their template and ground, and what was assumed. Raises FileError.
+
+    own: the ground that the file itself gives. read_elsewhere: arrays of the file that the caller reads.
+    """
+    recording = read(path, request)
+    admitted = judge.admit(path, recording.findings, request.force)
     template, notes = _template(recording, request)
-    normal = request.up or recording.up
-    notes = [*recording.notes, *notes]
+    normal = request.up or recording.up if own is None else np.atleast_2d(own.normal)[0]
+    findings = _judged(recording, template, np.asarray(normal), request.up is not None or own is not None)
+    recording = replace(recording, flags=(*admitted, *judge.admit(path, findings, request.force)))
+    notes = [*recording.notes, *notes, *_not_used(recording, read_elsewhere)]
+    if own is not None:
+        return recording, template, own, [*notes, "ground: the file's own (--up and --ground say otherwise)"]
     if request.up is None:
         notes.append(f"up: {recording.up_name} (assumed{recording.up_why}; --up says otherwise)")
     height = request.ground
@@ -81,7 +123,24 @@ def on_ground(path: Path, request: Request) -> tuple[Recording, Any, ip.Ground, 
     return recording, template, ip.Ground(normal, height), notes
 
 
-def read(path: Path, model: str | None) -> Recording:
+def _judged(recording: Recording, template: Any, normal: np.ndarray, up_is_said: bool) -> list[Finding]:
+    """Of some bodies of a file, evenly spaced."""
+    count, size = recording.vertices.shape[:2]
+    few = np.asarray(recording.vertices[judge.evenly(count, max(1, min(check.SAMPLE, SAMPLED_VERTICES // size)))])
+    findings = judge.bodies(few, template, normal, up_is_said=up_is_said)
+    if not any(each.level == "wrong" for each in findings):
+        masses = ip.mass_properties(few[judge.evenly(len(few), WEIGHED)], template).mass
+        findings += judge.mass(float(np.median(masses[np.isfinite(masses)]))) if np.isfinite(masses).any() else []
+    return findings
+
+
+def _not_used(recording: Recording, read_elsewhere: Collection[str]) -> list[str]:
+    names = [name for name in recording.unused if name not in read_elsewhere]
+    more = f", … ({len(names)} arrays)" if len(names) > LISTED else ""
+    return [f"not used: {', '.join(names[:LISTED])}{more}"] if names else []
+
+
+def read(path: Path, request: Request) -> Recording:
     """The bodies in a file, by the ending of its name."""
     if not path.is_file():
         what = "is a folder; name the files in it" if path.is_dir() else "there is no such file"
@@ -89,8 +148,9 @@ def read(path: Path, model: str | None) -> Recording:
     if path.stat().st_size == 0:
         raise FileError(path, "is empty; export it again")
     if path.suffix.lower() == ".npz":
-        return read_npz(path, model)
-    return read_mesh(path)
+        return read_npz(path, request.model, unit=request.units, degrees=request.degrees, rate=request.rate)
+    recording = read_mesh(path)
+    return recording if request.units == 1.0 else replace(recording, vertices=recording.vertices[:] * request.units)
 
 
 def _lowest(recording: Recording, normal: np.ndarray) -> float:
@@ -128,7 +188,7 @@ def _template(recording: Recording, request: Request) -> tuple[Any, list[str]]:
     if first is None:
         raise FileError(recording.path, "no frame has finite vertices only; export it again")
     if request.parts is not None:
-        face_parts, names = read_parts(request.parts, faces, recording.vertex_map)
+        face_parts, names = read_parts(request.parts, faces, recording.vertex_map, recording.face_map)
         template = ip.BodyTemplate(first, faces, face_parts, names)
         return template, [f"parts: {len(names)} from {request.parts}"]
     body = match_body(faces, len(first), request.model or "anny")

@@ -10,6 +10,7 @@ import click
 # Kept equal to `ipman_rs.presets.PRESETS` by a test.
 PRESETS = ("paper-r", "paper-o", "released", "balanced")
 
+METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "ft": 0.3048, "yd": 0.9144}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -31,6 +32,39 @@ class UpAxis(click.ParamType):
         if len(normal) != 3 or not all(map(math.isfinite, normal)) or not any(normal):
             self.fail(f"{value!r} is neither one of x, y, z, -x, -y, -z nor a normal such as 0,0,1", param, ctx)
         return normal
+
+
+class Unit(click.ParamType):
+    name = "unit"
+
+    def convert(self, value, param, ctx):
+        """Metres in one of it."""
+        if isinstance(value, float):
+            return value
+        word = value.strip().lower()
+        if word in METRES:
+            return METRES[word]
+        try:
+            metres = float(word)
+        except ValueError:
+            metres = math.nan
+        if not 0 < metres < math.inf:
+            self.fail(f"{value!r} is none of {', '.join(METRES)}, and no number of metres such as 0.001", param, ctx)
+        return metres
+
+
+class Rate(click.ParamType):
+    name = "hz"
+
+    def convert(self, value, param, ctx):
+        """Frames a second."""
+        try:
+            hertz = float(value)
+        except ValueError:
+            hertz = math.nan
+        if not 0 < hertz < math.inf:
+            self.fail(f"{value!r} is no number of frames a second above 0", param, ctx)
+        return hertz
 
 
 class GroundHeight(click.ParamType):
@@ -105,6 +139,7 @@ class Setting(click.ParamType):
 
 
 TIMES = Times()
+UNIT, RATE = Unit(), Rate()
 UP, GROUND, FLOOR, SIZE = UpAxis(), GroundHeight("auto"), GroundHeight("found"), ImageSize()
 
 
@@ -119,6 +154,25 @@ def several_processes(command):
 def _cores() -> int:
     """The processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+# What mends a file that the judge of all doors (`ipman_rs.data.judge`) refuses, beside --up.
+units = click.option(
+    "--units", type=UNIT, default="m", show_default=True, metavar="UNIT",
+    help=f"Unit of the lengths in the files: {', '.join(METRES)}, or a number of metres.",
+)  # fmt: skip
+degrees = click.option("--degrees", is_flag=True, help="Rotations in the files are degrees, not radians.")
+rate = click.option(
+    "--rate", type=RATE, metavar="HZ", help="Frames a second, where a file does not say so or is wrong."
+)
+force = click.option(
+    "--force", is_flag=True, help="Take what cannot be a person, too; what is odd about it is said all the same."
+)
+
+
+def of_files(command):
+    """The options of commands that read other people's files: what mends a file that is refused, and --force."""
+    return units(degrees(rate(force(command))))
 
 
 def of_unknown_camera(command):

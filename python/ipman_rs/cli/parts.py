@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..body import safe_npz
+from ..files import read_json, regular
 from .errors import FileError
 
 if TYPE_CHECKING:
@@ -17,16 +17,24 @@ if TYPE_CHECKING:
 _HELP = "expected JSON {part: [vertex ids]}, or one label a face as .json, .npy or .npz (face_parts)"
 
 
-def read_parts(path: Path, faces: np.ndarray, vertex_map: np.ndarray | None) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Labels (F,) and part names from a file. ``vertex_map`` takes the file's vertex ids to those of ``faces``."""
-    if not path.is_file():
-        raise FileError(path, "there is no such parts file")
+def read_parts(
+    path: Path, faces: np.ndarray, vertex_map: np.ndarray | None, face_map: np.ndarray | None = None
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Labels (F,) and part names from a file. ``vertex_map`` takes the mesh file's vertex ids to those of ``faces``,
+    −1 to none; ``face_map`` (F,) is the mesh file's triangle of each face."""
+    try:
+        return _read(path, faces, vertex_map, face_map)
+    except ValueError as error:
+        raise FileError(path, f"{error}; {_HELP}") from error
+
+
+def _read(
+    path: Path, faces: np.ndarray, vertex_map: np.ndarray | None, face_map: np.ndarray | None
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    regular(path)
     names: list[str] | None = None
     if path.suffix.lower() == ".json":
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-        except (ValueError, RecursionError, OSError) as error:
-            raise FileError(path, f"is no JSON ({error}); {_HELP}") from error
+        content = read_json(path)
         if isinstance(content, dict):
             return _from_vertices(path, content, faces, vertex_map)
         labels = _labels(path, content)
@@ -37,12 +45,11 @@ def read_parts(path: Path, faces: np.ndarray, vertex_map: np.ndarray | None) -> 
         labels = _labels(path, safe_npz.read(path, "face_parts"))
         names = safe_npz.read(path, "part_names").astype(str).ravel().tolist() if "part_names" in stored else None
     elif path.suffix.lower() == ".npy":
-        try:
-            labels = _labels(path, np.load(path, allow_pickle=False, mmap_mode="r"))
-        except (ValueError, OSError, EOFError) as error:
-            raise FileError(path, f"is no readable .npy file ({error}); {_HELP}") from error
+        labels = _labels(path, safe_npz.read_npy(path))
     else:
         raise FileError(path, _HELP)
+    if face_map is not None and len(labels) > face_map.max():
+        labels = labels[face_map]
     if len(labels) != len(faces):
         raise FileError(path, f"has {len(labels)} labels for {len(faces)} faces; expected one label a face")
     used, labels = np.unique(labels, return_inverse=True)
@@ -56,7 +63,8 @@ def _labels(path: Path, content: Any) -> np.ndarray:
         labels = np.asarray(content)
     except ValueError:
         labels = np.empty((0, 0))
-    if labels.ndim != 1 or labels.dtype.kind not in "iu" or len(labels) == 0:
+    largest = np.iinfo(np.int64).max
+    if labels.ndim != 1 or labels.dtype.kind not in "iu" or len(labels) == 0 or labels.max() > largest:
         raise FileError(path, f"holds no list of whole numbers; {_HELP}")
     return labels.astype(np.int64)
 
@@ -73,8 +81,9 @@ def _from_vertices(
         if ids.min() < 0 or ids.max() >= count:
             bad = ids[(ids < 0) | (ids >= count)][0]
             raise FileError(path, f"part {name!r} names vertex {bad} of {count}; is it the file of another mesh?")
+        ids = ids if vertex_map is None else vertex_map[ids]
         member = np.zeros(int(faces.max()) + 1, dtype=bool)
-        member[ids if vertex_map is None else vertex_map[ids]] = True
+        member[ids[ids >= 0]] = True
         votes[:, part] = member[faces].sum(axis=1)
     used, labels = np.unique(votes.argmax(axis=1), return_inverse=True)
     names = (*map(str, content), "rest")

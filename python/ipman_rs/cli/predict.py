@@ -124,8 +124,9 @@ def _write_predictions(
     import ipman_rs.data
 
     from ..body import joint_regressors
+    from ..files import write_whole
     from . import console
-    from .fit_outputs import npz, write_whole
+    from .fit_outputs import npz
 
     try:
         data = ipman_rs.data.open(name, path, **({} if split is None else {"split": split}))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import FileError, one_line
-from .options import GROUND, TIMES, UP
+from .options import GROUND, TIMES, UP, of_files
 
 if TYPE_CHECKING:
     from .fall_inputs import Bodies
@@ -35,6 +35,7 @@ MOST_ROWS = 40
     help="Height of the ground along that axis in metres; auto: through the lowest vertex of all frames.",
 )  # fmt: skip
 @click.option("--parts", type=click.Path(path_type=Path), metavar="FILE", help="Body parts of a mesh.")
+@of_files
 @click.option(
     "--engine", type=click.Choice(("rapier", "bullet", "mujoco")), default="rapier", show_default=True,
     help="rapier is built in; the others need pip install 'ipman_rs[bullet]' or 'ipman_rs[mujoco]'.",
@@ -68,6 +69,10 @@ def simulate(
     ground: float | None,
     parts: Path | None,
     as_json: bool,
+    units: float,
+    degrees: bool,
+    rate: float | None,
+    force: bool,
     **options: Any,
 ) -> None:
     """Let stiff bodies go on their ground: do they stand or fall?
@@ -82,6 +87,8 @@ def simulate(
     roll      how far it tilts if nothing is quick, degrees; and after a nudge
     moved     how far its centre of mass has moved after each time, mm; tilt: of its up axis, degrees
     stands    tilted by at most 15 degrees at the last time, if that is 2 s or later; else there is no verdict
+
+    What cannot be a person is refused, and what is odd is marked with ! in the table.
 
     With --against: the share of stable bodies of both, and the difference and ratio of their displacements, with
     intervals. Bodies are paired by name where both files have names (predictions, folders of fits), else in order;
@@ -115,7 +122,9 @@ def simulate(
     if against is not None and (len(bodies) != 1 or options["tip_only"]):
         wrong = "--tip-only" if options["tip_only"] else f"{len(bodies)} files"
         raise click.UsageError(f"--against compares the simulated bodies of one BODY with those of OTHER, got {wrong}")
-    request = Request(model=model, up=up, ground=ground, parts=parts)
+    request = Request(
+        model=model, up=up, ground=ground, parts=parts, units=units, degrees=degrees, rate=rate, force=force
+    )
     films = options.pop("filmstrips")
     films = films if output is not None else 0
     falls: list[Fall] = []
@@ -164,6 +173,8 @@ def simulate(
     elif falls:
         print_falls(falls)
         for one in falls:
+            for flag in one.flags:
+                console.say(one_line(f"! {one.path}: {flag}"))
             assumed = [note for note in one.notes if note.startswith(("up: ", "ground: "))]
             if assumed:
                 console.say(one_line(f"{one.path}: {'; '.join(assumed)}"))

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..body import safe_npz
 from ..data import check, judge, opensim
 from ..data.force_plates import ForcePlates, standing
 from ..data.tracks import Tracks
+from ..files import write_whole
 from ..fitting import config, markers
 from ..fitting.recorded import FEWEST
 from ..validation import Comparison, computed, figures, measured, pictures, report
@@ -21,7 +23,7 @@ from ..validation.figures import SPREAD
 from ..validation.folder import Kinds, Trial, find
 from . import console
 from .errors import FileError
-from .fit_outputs import npz, write_whole
+from .fit_outputs import npz
 from .fit_recordings import Pace, Recording, kept
 from .fit_run import Settings
 from .parameters import read_npz
@@ -248,8 +250,7 @@ def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told)
     trial = one.trial
     folder = plan.output / trial.name
     stored = read_npz(folder / f"{trial.name}.npz", plan.settings.model)
-    with np.load(folder / f"{trial.name}.npz", allow_pickle=False) as arrays:
-        times = arrays["times"]
+    times = safe_npz.read(folder / f"{trial.name}.npz", "times")
     bodies, template = stored.vertices, stored.template
     plates = None if one.plates is None else one.plates.at(times)
     with console.progress(f"measuring {trial.name}", len(times)) as step:

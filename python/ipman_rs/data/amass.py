@@ -3,8 +3,8 @@
     CMU/01/01_01_poses.npz            SMPL+H: poses (F, 156), betas (16,), trans (F, 3) m, mocap_framerate, gender
     CMU/01/01_01_stageii.npz          SMPL-X: poses (F, 165), betas (16,), trans, mocap_frame_rate, gender
 
-The folder of all of AMASS, or of any of its data sets, or one file; shape.npz and *_stagei.npz are passed over. Of the
-files only the headers are read when it is opened, and a sample of the frames.
+betas may have a row for each frame, too. The folder of all of AMASS, or of any of its data sets, or one file; shape.npz
+and *_stagei.npz are passed over. Of the files only the headers are read when it is opened, and a sample of the frames.
 
 World: metres, z up, the floor at z = 0 (fitted by each capture, so by some centimetres). 60 to 250 Hz by file:
 `frame_rate=30` takes the nearest earlier frame of each thirtieth of a second. Hands are absolute: load the body with
@@ -122,6 +122,9 @@ def _header(file: Path) -> tuple[int, int, float]:
         raise ValueError(f"{file}: poses: expected (F, n) with n of {widths}, got {poses}")
     if trans != (poses[0], 3):
         raise ValueError(f"{file}: trans: expected ({poses[0]}, 3) as poses has {poses[0]} frames, got {trans}")
+    betas = safe_npz.shape_of(file, "betas")
+    if len(betas) not in (1, 2) or betas[:-1] not in ((), (1,), (poses[0],)):
+        raise ValueError(f"{file}: betas: expected (n,) or ({poses[0]}, n), a row for each frame, got {betas}")
     if not poses[0]:
         raise ValueError(f"{file}: expected frames, the motion is empty")
     name = next((name for name in RATES if name in there), None)
@@ -154,7 +157,7 @@ def _whole(file: Path, name: str) -> Frames:
 
 def _frames(file: Path, name: str, rows: NDArray[np.int64], rate: float) -> Frames:
     poses, trans = _numbers(file, "poses"), _numbers(file, "trans")
-    betas = _numbers(file, "betas").reshape(-1)
+    betas = np.atleast_2d(_numbers(file, "betas"))
     gender = _gender(file)
     count = len(rows)
     frames = Frames(
@@ -165,7 +168,7 @@ def _frames(file: Path, name: str, rows: NDArray[np.int64], rate: float) -> Fram
         body=BODIES[poses.shape[1]],
         genders=np.full(count, gender),
         pose=poses[rows].reshape(count, -1, 3),
-        betas=np.broadcast_to(betas, (count, len(betas))),
+        betas=betas[rows] if len(betas) > 1 else np.broadcast_to(betas, (count, betas.shape[1])),
         transl=trans[rows],
     )
     return sequences.plausible(file, frames)

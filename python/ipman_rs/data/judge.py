@@ -16,15 +16,25 @@ from numpy.typing import NDArray
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 
-from .check import AXES, Finding, place, size_of_body, upright
+from .check import AXES, BODY, SAMPLE, Finding, place, size_of_body, upright
 
 MASS = (1.0, 650.0)  # kg: the heaviest person known weighed 635
 USUAL_MASS = (2.5, 250.0)  # kg
 MARKER_ERROR = 0.1  # m in the mean: with more, the body is not the one that the markers were on
 USUAL_MARKER_ERROR = 0.03
 USUAL_RATE = (5.0, 2000.0)  # frames a second
+USUAL_SPEED = 15.0  # m/s: nobody runs so fast
+USUAL_HEIGHT = 10.0  # m from the origin of the world, up or down
+SMALLEST_TURN = 0.12  # rad, 7 degrees: the largest turn in a pose of a person is larger
 LIES = 0.4  # of its length: a body whose height is less
 NEAR = 0.15  # m: what is within it of the lowest point can carry the body
+
+SURE = 0.5  # confidence of a keypoint
+FEWEST_POINTS = 4  # of a person in an image that say something about them
+RELATIVE = 3.0  # a keypoint no farther from the image's corner is a share of its size, not pixels
+FLAT = 0.01  # breadth of a person's keypoints by their length: none is on one line
+AROUND = 0.1  # of the image's size: how far detectors guess points outside it
+SMALL_PERSON = 24.0  # pixels
 
 Array = NDArray[np.floating[Any]]
 
@@ -44,7 +54,9 @@ def admit(path: str | os.PathLike[str], findings: Iterable[Finding], force: bool
 
 
 def _advised(finding: Finding) -> str:
-    mends = f"{finding.option} if so" if finding.option else finding.advice
+    named = finding.option.split()[-1:]
+    ending = "says otherwise" if named and named[0].isupper() else "if so"  # --units UNIT, and --units mm
+    mends = f"{finding.option} {ending}" if finding.option else finding.advice
     return f"{finding.what}; {mends}" if mends else finding.what
 
 
@@ -60,10 +72,36 @@ def bodies(vertices: Array, template: BodyTemplate, normal: Array, *, up_is_said
     found = size_of_body("vertices", vertices)
     if found[0].level == "wrong":
         return found
-    found += place("vertices", vertices.mean(axis=1))
+    found += _sizes(vertices)
+    away = place("vertices", vertices.mean(axis=1)) or _height(vertices, normal)
     if up_is_said:
-        return found
-    return found + (_stance(vertices, template, normal) or _shape(vertices, template, normal))
+        return found + away
+    return found + away + (_stance(vertices, template, normal) or _shape(vertices, template, normal))
+
+
+def _sizes(vertices: Array) -> list[Finding]:
+    """Of bodies that span something else than the others."""
+    spans = np.linalg.norm(np.ptp(vertices, axis=1), axis=-1)
+    odd = spans[(spans < BODY[0]) | (spans > BODY[1])]
+    if not len(odd):
+        return []
+    verb = "spans" if len(odd) == 1 else "span up to"
+    said = f"vertices: {len(odd)} of {len(spans)} bodies {verb} {odd.max():.4g}, expected {BODY[0]} to {BODY[1]} metres"
+    return [Finding("odd", said)]
+
+
+def evenly(count: int, most: int = SAMPLE) -> NDArray[np.int64]:
+    """Up to `most` numbers from 0 to count − 1, evenly spaced: the bodies that are looked at."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
+
+
+def _height(vertices: Array, normal: Array) -> list[Finding]:
+    """Of bodies in a world whose origin is far below or above them."""
+    height = float(np.median((vertices @ Ground(normal).normal).min(axis=-1)))
+    if abs(height) <= USUAL_HEIGHT:
+        return []
+    side = "above" if height > 0 else "below"
+    return [Finding("odd", f"vertices: {abs(height):.4g} m {side} the origin of their world", option="--units cm")]
 
 
 def _stance(vertices: Array, template: BodyTemplate, normal: Array) -> list[Finding]:
@@ -73,17 +111,18 @@ def _stance(vertices: Array, template: BodyTemplate, normal: Array) -> list[Find
         return []
     ways = vertices[:, points["head"]].mean(axis=1) - vertices[:, points["lower_leg"]].mean(axis=1)
     ground = Ground(normal)
+    heights = vertices @ ground.normal
+    low = {word: heights[:, index].min(axis=1) - heights.min(axis=1) for word, index in points.items()}
+    on_hands_and_feet = (np.maximum(low["forearm"], low["lower_leg"]) < NEAR) & (low["torso"] > NEAR)
     if len(vertices) > 1:
-        return upright("bodies", ways, ground) or [Finding("ok", "bodies: upright and not")]
-    way, height = ways[0] / np.linalg.norm(ways[0]), vertices[0] @ ground.normal
-    low = {word: float(height[index].min() - height.min()) for word, index in points.items()}
+        return upright("bodies", ways[~on_hands_and_feet], ground) or [Finding("ok", "bodies: upright and not")]
+    way = ways[0] / np.linalg.norm(ways[0])
     axis = _axis(way)
     if way @ ground.normal < -0.5:
-        if way @ ground.normal < -0.8 and low["head"] < 1e-3 and low["forearm"] > NEAR:
+        if way @ ground.normal < -0.8 and low["head"][0] < 1e-3 and low["forearm"][0] > NEAR:
             return [Finding("wrong", "stands on its head, with its feet in the air", option=f"--up {axis}")]
         return [Finding("odd", "its head is below its feet", option=f"--up {axis}")]
-    on_hands_and_feet = max(low["forearm"], low["lower_leg"]) < NEAR < low["torso"]
-    if abs(way @ ground.normal) < 0.35 and not on_hands_and_feet:
+    if abs(way @ ground.normal) < 0.35 and not on_hands_and_feet[0]:
         return [Finding("odd", "lies: its head is beside its feet", option=f"--up {axis}")]
     return [Finding("ok", "bodies: heads are above feet")]
 
@@ -129,6 +168,9 @@ def mass(kilograms: float) -> list[Finding]:
     """Whether a body's mass can be a person's."""
     if not np.isfinite(kilograms) or USUAL_MASS[0] <= kilograms <= USUAL_MASS[1]:
         return []
+    if kilograms <= 0:
+        said = f"a body of {kilograms:.4g} kg"
+        return [Finding("wrong", said, "is its surface closed, and do its faces point outwards?")]
     level = "odd" if MASS[0] <= kilograms <= MASS[1] else "wrong"
     return [Finding(level, f"a person of {kilograms:.4g} kg", option="--units UNIT")]
 
@@ -139,6 +181,28 @@ def rate(hertz: float) -> list[Finding]:
         return []
     level = "odd" if np.isfinite(hertz) and hertz > 0 else "wrong"
     return [Finding(level, f"{hertz:.4g} frames a second", option="--rate HZ")]
+
+
+def speed(what: str, positions: Array, seconds: Array | None) -> list[Finding]:
+    """Whether people at positions (T, 3) m move as people do; `seconds` (T,) where they are known."""
+    if seconds is None or len(positions) < 2 or len(positions) != len(seconds):
+        return []
+    moved = np.linalg.norm(np.diff(np.asarray(positions, np.float64), axis=0), axis=-1) / np.diff(seconds)
+    usual = float(np.median(moved[np.isfinite(moved)])) if np.isfinite(moved).any() else 0.0
+    if usual <= USUAL_SPEED:
+        return []
+    said = f"{what}: moves at {usual:.4g} m/s in the median, expected up to {USUAL_SPEED:g}"
+    return [Finding("odd", said, "is its unit (--units) or its rate (--rate) another?")]
+
+
+def degrees(rotations: Sequence[Array]) -> list[Finding]:
+    """Whether rotation vectors (T, n, 3) that were said to be degrees, in radians here, were so."""
+    largest = [np.linalg.norm(np.asarray(each, np.float64), axis=-1).max(axis=-1) for each in rotations]
+    largest = max((float(np.median(each[np.isfinite(each)])) for each in largest if np.isfinite(each).any()), default=0)
+    if not 0 < largest <= SMALLEST_TURN:
+        return []
+    said = f"the pose: with --degrees no joint turns by more than {np.degrees(largest):.2g} degrees"
+    return [Finding("odd", said, "is it in radians?")]
 
 
 def marker_error(metres: float) -> list[Finding]:
@@ -162,3 +226,35 @@ def known_markers(known: Sequence[str], unknown: Sequence[str], fewest: int = 6)
 
 def _some(names: Sequence[str], most: int = 8) -> str:
     return ", ".join(names[:most]) + (", …" if len(names) > most else "")
+
+
+def keypoints(points: Array, size: Array) -> list[Finding]:
+    """Whether points (K, 3) of one person, x and y in pixels and confidence, can lie in an image of `size` (2,).
+
+    Those that the detector is sure of are judged, all that were seen where it is sure of few.
+    """
+    sure = points[:, 2] > SURE
+    seen = np.asarray(points[sure if sure.sum() >= FEWEST_POINTS else points[:, 2] > 0, :2], np.float64)
+    if len(seen) < FEWEST_POINTS:
+        return []
+    image = f"{size[0]:g} × {size[1]:g} pixels"
+    extent = float(np.ptp(seen, axis=0).max())
+    if extent == 0:
+        return [Finding("wrong", f"all {len(seen)} points lie at one place, ({seen[0, 0]:g}, {seen[0, 1]:g})")]
+    if abs(seen).max() <= RELATIVE and min(size) > SMALL_PERSON:
+        said = f"points of {seen.min():.3g} to {seen.max():.3g} look relative to the image"
+        return [Finding("wrong", said, "multiply them by its width and height")]
+    spread = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
+    if spread[1] < FLAT * spread[0]:
+        said = f"all {len(seen)} points lie on one line"
+        return [Finding("wrong", said, "are x and y columns of their own in the file?")]
+    outside = ((seen < -AROUND * size) | (seen > (1 + AROUND) * size)).any(axis=1)
+    if 2 * outside.sum() > len(seen):
+        x, y = seen[:, 0], seen[:, 1]
+        said = f"{outside.sum()} of {len(seen)} points lie outside the image of {image}"
+        said += f": x from {x.min():.0f} to {x.max():.0f}, y from {y.min():.0f} to {y.max():.0f}"
+        return [Finding("wrong", said, "is that its size? (--image-size WxH)")]
+    if extent < SMALL_PERSON:
+        said = f"the person is {extent:.2g} pixels large in an image of {image}"
+        return [Finding("odd", said, "is that its size? (--image-size WxH)")]
+    return [Finding("ok", f"keypoints: a person of {extent:.0f} pixels in an image of {image}")]

@@ -29,7 +29,6 @@ Where it comes from: the project's own site, MOYO; the scripts in its repository
 from __future__ import annotations
 
 import csv
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -41,6 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.body import mesh_file, safe_pickle
+from ipman_rs.files import read_json, regular
 from ipman_rs.ground import Ground
 
 from . import c3d, moyo_stills, safe_xml, sequences
@@ -324,6 +324,7 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
 
     ValueError, naming the file, for what is missing, damaged, with gaps, or at another rate than 60 Hz.
     """
+    regular(path)
     try:
         with Path(path).open(encoding="utf-8-sig", errors="replace", newline="") as stream:
             lines = [row for row in csv.reader(stream) if any(field.strip() for field in row)]
@@ -459,12 +460,13 @@ def _camera(files: Recorded, camera: int) -> tuple[Array, Array, Array]:
     paths = [path for path in paths if any(day in part for part in path.relative_to(files.session).parts)] or paths
     if len(paths) != 1:
         raise ValueError(f"{files.session}: expected one cameras/**/{day}*/**/cameras_param.json, got {len(paths)}")
+    content = read_json(paths[0])
     try:
-        view = json.loads(paths[0].read_text(encoding="utf-8"))[f"cam_{camera}"]
+        view = content[f"cam_{camera}"]
         rotation = np.array(view["rotation"], float).reshape(3, 3)
         position = np.array(view["position"], float).reshape(3)
         focal, center = float(view["focal"]), np.array(view["princpt"], float).reshape(2)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (ValueError, LookupError, TypeError, OverflowError) as error:
         raise ValueError(
             f"{paths[0]}: expected cam_{camera} with focal, princpt, rotation, position: {error!r}"
         ) from None

@@ -9,7 +9,6 @@ name to the number of an image, 30 Hz; image n shows frame 2 n. A `.json` file {
 from __future__ import annotations
 
 import ast
-import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.body.rotations import from_axis_angle
+from ipman_rs.files import parse_json, read_bytes
 
 from .frames import Frames
 
@@ -59,13 +59,9 @@ class Chosen:
 
     def __init__(self, path: str) -> None:
         self.path = Path(path)
+        content = read_bytes(path, MAX_BYTES)
         try:
-            if self.path.stat().st_size > MAX_BYTES:
-                raise ValueError(f"expected a list of some hundred poses, got {self.path.stat().st_size} bytes")
-            text = self.path.read_text(encoding="utf-8")
-            found = _python(text) if self.path.suffix == ".py" else {"": json.loads(text)}
-        except OSError as error:
-            raise ValueError(f"{path}: {error.strerror}") from None
+            found = _python(content.decode()) if self.path.suffix == ".py" else {"": parse_json(content)}
         except (ValueError, SyntaxError, RecursionError, MemoryError) as error:
             raise ValueError(f"{path}: expected the chosen image of each pose: {error}") from None
         for name, images in found.items():

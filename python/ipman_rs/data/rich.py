@@ -23,7 +23,6 @@ Where it comes from: the project's own site, RICH.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -37,7 +36,9 @@ from numpy.typing import NDArray
 from ipman_rs.body import safe_pickle
 from ipman_rs.body.hands import Hands
 from ipman_rs.body.joints import SMPLX
+from ipman_rs.files import read_json
 from ipman_rs.ground import Ground
+from ipman_rs.io.read_mesh import read_points
 
 from . import naming, safe_xml, sequences
 from .check import Finding
@@ -324,14 +325,12 @@ def ground(mesh: Path, to_world: Path) -> Ground:
 
     ValueError, naming the file, for what is missing or damaged, or a ground that is not level in a world that is z up.
     """
-    import trimesh
-
     try:
-        points = np.asarray(trimesh.load(mesh, process=False).vertices, np.float64)  # type: ignore[union-attr]
-    except Exception as error:  # of any type
-        raise ValueError(f"{mesh}: expected a mesh: {error}") from None
-    if len(points) < 3 or not np.isfinite(points).all():
-        raise ValueError(f"{mesh}: expected three vertices or more, finite, got {len(points)}")
+        points = read_points(mesh)
+    except ValueError as error:
+        raise ValueError(f"{mesh}: expected a mesh: {str(error).removeprefix(f'{mesh}: ')}") from error
+    if len(points) < 3:
+        raise ValueError(f"{mesh}: expected three vertices or more, got {len(points)}")
     if np.abs(points).max() > 1000:
         raise ValueError(f"{mesh}: looks like millimetres: vertices up to {np.abs(points).max():.4g} from the origin")
     middle = points.mean(axis=0)
@@ -348,11 +347,11 @@ def ground(mesh: Path, to_world: Path) -> Ground:
 
 def _transform(file: Path) -> tuple[Array, Array, float]:
     """R, t and c of world = c · X R + t."""
+    said = read_json(file)
     try:
-        said = json.loads(file.read_text(encoding="utf-8"))
         rotation, translation = np.array(said["R"], float), np.array(said["t"], float).reshape(3)
         scale = float(np.array(said["c"], float).reshape(()))
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (ValueError, LookupError, TypeError, OverflowError) as error:
         raise ValueError(f"{file}: expected R, t and c of the way to the scan's world: {error!r}") from None
     if rotation.shape != (3, 3) or np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3:
         raise ValueError(f"{file}: R: expected a rotation (3, 3), got {rotation.tolist()}")

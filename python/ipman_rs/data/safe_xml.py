@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any, NoReturn
 from xml.etree import ElementTree
 from xml.parsers import expat
 
+from ipman_rs.files import read_bytes
+
 MAX_BYTES = 1 << 29  # the longest recording of MoYo has a tenth of that
 MAX_DEPTH = 64
+MAX_ATTRIBUTES = 100  # of one element
 
 
 def read(path: str | os.PathLike[str]) -> ElementTree.Element:
     """The root of a document. ValueError, naming the file, if it is missing, damaged, too large, or has a DOCTYPE."""
-    try:
-        size = Path(path).stat().st_size
-        if size > MAX_BYTES:
-            raise ValueError(f"{path}: {size} bytes is more than any file of a data set has ({MAX_BYTES})")
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise ValueError(f"{path}: {error.strerror}") from None
+    data = read_bytes(path, MAX_BYTES)
     builder, depth = ElementTree.TreeBuilder(), 0
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
@@ -28,6 +24,8 @@ def read(path: str | os.PathLike[str]) -> ElementTree.Element:
         depth += 1
         if depth > MAX_DEPTH:
             raise ValueError(f"elements nested more than {MAX_DEPTH} deep")
+        if len(attributes) > MAX_ATTRIBUTES:
+            raise ValueError(f"an element of {len(attributes)} attributes, more than {MAX_ATTRIBUTES}")
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -44,6 +42,8 @@ def read(path: str | os.PathLike[str]) -> ElementTree.Element:
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
     try:
         parser.Parse(data, True)
+    except MemoryError:
+        raise ValueError(f"{path}: needs more memory than there is") from None
     except (expat.ExpatError, ValueError, LookupError) as error:
         raise ValueError(f"{path}: cannot be read as XML: {error}; is the download complete?") from None
     return builder.close()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.body import safe_npz
+from ipman_rs.files import being_written, parse_json
 
 from .alike import as_array
 from .bootstrap import Interval, bootstrap
@@ -133,10 +133,8 @@ class Accumulator:
         rows = np.fromiter(order.values(), np.int64)
         arrays = [column.arrays(rows) for column in columns.values()]
         stacked: dict[str, Any] = {name: np.array([each[name] for each in arrays]) for name in ARRAYS} if arrays else {}
-        part = target.with_name(target.name + ".part")
-        with part.open("wb") as file:
+        with being_written(target) as file:
             np.savez(file, head=np.frombuffer(json.dumps(head).encode(), np.uint8), **stacked)
-        os.replace(part, target)
 
     @classmethod
     def load(cls, path: str | Path) -> Accumulator:
@@ -144,14 +142,14 @@ class Accumulator:
         path = Path(path)
         try:
             return cls._read(path)
-        except (KeyError, TypeError, AttributeError, ValueError) as error:
+        except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
             raise ValueError(
                 f"{path}: no accumulator can be read from it ({error}); if it is a shard's, run that shard again"
             ) from error
 
     @classmethod
     def _read(cls, path: Path) -> Accumulator:
-        head = json.loads(safe_npz.read(path, "head").tobytes())
+        head = parse_json(safe_npz.read(path, "head").tobytes())
         if head["format"] != FORMAT:
             raise ValueError(f"format: expected {FORMAT!r}, got {head['format']!r}")
         metrics, sequences, missing = head["metrics"], head["sequences"], head["missing"]

@@ -6,12 +6,13 @@ there may be "K", the 3 × 3 matrix of OpenCV. What is left out is what `ipman f
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+from ipman_rs.files import read_json
 
 Numbers = tuple[float, ...]
 KEYS = ("R", "t", "focal", "center", "K")
@@ -29,11 +30,7 @@ class KnownCamera:
 
 def read(path: str | os.PathLike[str]) -> KnownCamera:
     """The camera of a file. ValueError, naming file and key, for what is no camera."""
-    try:
-        with open(path, encoding="utf-8") as file:
-            content = json.load(file)
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: not a JSON file: {error}") from None
+    content = read_json(path)
     if not isinstance(content, dict) or not set(content) <= set(KEYS):
         raise ValueError(f"{path}: expected an object with some of {', '.join(KEYS)}, got {_short(content)}")
 
@@ -42,7 +39,7 @@ def read(path: str | os.PathLike[str]) -> KnownCamera:
             return None
         try:
             array = np.asarray(content[key], dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             array = np.empty(0)
         if array.shape != shape or not np.isfinite(array).all():
             wanted = " × ".join(map(str, shape))
@@ -53,7 +50,9 @@ def read(path: str | os.PathLike[str]) -> KnownCamera:
     matrix, center = numbers("K", 3, 3), numbers("center", 2)
     if rotation is not None and (np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0):
         raise ValueError(f"{path}: R: expected a rotation, got {_short(content['R'])}")
-    focal = np.full(2, content["focal"]) if isinstance(content.get("focal"), (int, float)) else numbers("focal", 2)
+    focal = content.get("focal")
+    is_number = isinstance(focal, (int, float)) and not isinstance(focal, bool)
+    focal = np.full(2, focal, np.float64) if is_number else numbers("focal", 2)
     if matrix is not None:
         focal, center = matrix[[0, 1], [0, 1]], matrix[:2, 2]
     if focal is not None and not (np.isfinite(focal) & (focal > 0)).all():

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+from ipman_rs.files import read_yaml
 
 from .solvers import SOLVERS, Options
 from .start import search
@@ -14,6 +18,7 @@ from .terms import TERMS
 from .variables import BLOCKS
 
 FOLDER = Path(__file__).parent / "presets"
+MOST = 1_000_000  # iterations of a stage
 PRESETS = tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
 
 
@@ -69,43 +74,50 @@ def load(name: str | Path) -> Config:
     Raises:
         ValueError: there is no such preset, or the file says something unknown; the message names it.
     """
-    import yaml
-
     path = FOLDER / f"{name}.yaml" if str(name) in PRESETS else Path(name)
-    if not path.is_file():
+    if not os.path.lexists(path):
         raise ValueError(f"preset: expected one of {', '.join(PRESETS)}, or a YAML file, got {str(name)!r}")
+    content = read_yaml(path)
     try:
-        return _config(path.stem, yaml.safe_load(path.read_text()))
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path}: not YAML: {error}") from None
+        return _config(path.stem, content)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
 
 def _config(name: str, content: Any) -> Config:
     _known("the file", content, ("description", "solver", "start", "stages", "terms", "tolerance"))
-    terms = _terms("terms", content.get("terms"))
-    search(content.get("start") or {})
-    stages = tuple(_stage(number, stage, content) for number, stage in enumerate(content.get("stages") or ()))
-    if not stages:
-        raise ValueError("stages: expected at least one, got none")
-    return Config(name, stages, terms, content.get("start") or {})
+    terms, start = _terms("terms", content.get("terms")), content.get("start") or {}
+    _known("start", start, ("search", "yaws", "iterations"))
+    _expect("start, search", start.get("search", ""), "str")
+    search(start)
+    for option in ("yaws", "iterations"):
+        _whole(f"start, {option}", start.get(option, 1), 1)
+    listed = content.get("stages") or ()
+    if not listed or not isinstance(listed, (list, tuple)):
+        raise ValueError(f"stages: expected a list of at least one, got {_short(listed)}")
+    stages = tuple(_stage(number, stage, content) for number, stage in enumerate(listed))
+    return Config(name, stages, terms, start)
 
 
 def _stage(number: int, stage: Any, content: Mapping[str, Any]) -> Stage:
     place = f"stage {number}"
     _known(place, stage, ("name", "free", "weights", "solver", "iterations", "find_ground", "terms"))
-    _known(f"{place}, weights", stage.get("weights") or {}, TERMS)
-    _known(f"{place}, free", dict.fromkeys(stage.get("free") or ()), BLOCKS)
+    for needed in ("free", "weights"):
+        if not stage.get(needed):
+            raise ValueError(f"{place}, {needed}: expected at least one, got none")
+    _known(f"{place}, weights", stage["weights"], TERMS)
+    _expect(f"{place}, free", stage["free"], "Sequence[str]")
+    _known(f"{place}, free", dict.fromkeys(stage["free"]), BLOCKS)
     solver = stage.get("solver", content.get("solver", "levenberg"))
+    _expect(f"{place}, solver", solver, "str")
     _known(f"{place}, solver", {solver: None}, SOLVERS)
-    weights = {}
-    for term, weight in stage["weights"].items():
-        if not isinstance(weight, (int, float)) or isinstance(weight, bool) or not weight >= 0:
-            raise ValueError(f"{place}, weights, {term}: expected a number ≥ 0, got {weight!r}")
-        weights[term] = float(weight)
-    options = Options(**{"iterations": int(stage.get("iterations", 100)), **(content.get("tolerance") or {})})
-    find_ground = bool(stage.get("find_ground", False))
+    weights = {term: _not_negative(f"{place}, weights, {term}", weight) for term, weight in stage["weights"].items()}
+    tolerance = content.get("tolerance") or {}
+    _known("tolerance", tolerance, ("gradient", "decrease"))
+    ends = {name: _not_negative(f"tolerance, {name}", value) for name, value in tolerance.items()}
+    options = Options(_whole(f"{place}, iterations", stage.get("iterations", 100), 0), **ends)
+    find_ground = stage.get("find_ground", False)
+    _expect(f"{place}, find_ground", find_ground, "bool")
     terms = _terms(f"{place}, terms", stage.get("terms"))
     return Stage(str(stage.get("name", number)), tuple(stage["free"]), weights, solver, options, find_ground, terms)
 
@@ -115,18 +127,22 @@ def _terms(place: str, given: Any) -> dict[str, Mapping[str, Any]]:
     given = given or {}
     _known(place, given, TERMS)
     for name, options in given.items():
-        _known(f"{place}, {name}", options, _options(TERMS[name]))
+        known = _options(TERMS[name])
+        _known(f"{place}, {name}", options, known)
+        for option, value in options.items():
+            _expect(f"{place}, {name}, {option}", value, known[option])
     return given
 
 
-def _options(term: type) -> list[str]:
-    """What a term can be told: the arguments of its class after the problem, and those that it hands on."""
-    names: list[str] = []
+def _options(term: type) -> dict[str, str]:
+    """What a term can be told, and of which type: the arguments of its class after the problem, and those that it hands
+    on."""
+    names: dict[str, str] = {}
     for each in inspect.getmro(term):
         if "__init__" not in vars(each):
             continue
         arguments = list(inspect.signature(each.__init__).parameters.values())[2:]
-        names += [argument.name for argument in arguments if argument.kind != argument.VAR_KEYWORD]
+        names |= {each.name: str(each.annotation) for each in arguments if each.kind != each.VAR_KEYWORD}
         if all(argument.kind != argument.VAR_KEYWORD for argument in arguments):
             break
     return names
@@ -134,7 +150,41 @@ def _options(term: type) -> list[str]:
 
 def _known(place: str, given: Any, known: Any) -> None:
     if not isinstance(given, Mapping):
-        raise ValueError(f"{place}: expected names with values, got {given!r}")
+        raise ValueError(f"{place}: expected names with values, got {_short(given)}")
     unknown = [str(key) for key in given if key not in known]
     if unknown:
-        raise ValueError(f"{place}: expected some of {', '.join(known)}, got {', '.join(unknown)}")
+        raise ValueError(f"{place}: expected some of {', '.join(known)}, got {_short(', '.join(unknown))}")
+
+
+def _expect(place: str, value: Any, kind: str) -> None:
+    """ValueError where a value is not of the type that a term writes behind its argument."""
+    if not any(_is(value, one.strip()) for one in kind.split("|")):
+        raise ValueError(f"{place}: expected {kind.replace(' | None', '')}, got {_short(value)}")
+
+
+def _is(value: Any, kind: str) -> bool:
+    if kind in ("float", "int"):
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        return whole or (kind == "float" and isinstance(value, float) and math.isfinite(value))
+    if kind == "Mapping[str, float]":
+        return isinstance(value, Mapping) and all(_is(k, "str") and _is(v, "float") for k, v in value.items())
+    if kind.startswith("Sequence["):
+        return isinstance(value, (list, tuple)) and all(_is(each, kind[9:-1]) for each in value)
+    return isinstance(value, {"str": str, "bool": bool, "None": type(None)}.get(kind, str))
+
+
+def _not_negative(place: str, value: Any) -> float:
+    if not _is(value, "float") or value < 0:
+        raise ValueError(f"{place}: expected a number ≥ 0, got {_short(value)}")
+    return float(value)
+
+
+def _whole(place: str, value: Any, least: int) -> int:
+    if not _is(value, "int") or not least <= value <= MOST:
+        raise ValueError(f"{place}: expected a whole number from {least} to {MOST}, got {_short(value)}")
+    return value
+
+
+def _short(value: Any) -> str:
+    text = str(value)
+    return repr(value) if len(text) <= 60 else f"{text[:57]}..."

@@ -28,7 +28,7 @@ from ipman_rs.data.frames import DataSet, Frames
 from ipman_rs.evaluation.tables.job import Source
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.evaluation.tables.predictions import fingerprint
-from ipman_rs.evaluation.tables.rows import being_written
+from ipman_rs.files import being_written, read_json, regular, write_whole
 
 from . import data_frames, keypoints, photo, presented, start
 from .config import Config, weighs
@@ -145,15 +145,15 @@ class DataFit:
         self.folder.mkdir(parents=True, exist_ok=True)
         file = self.folder / "made_of.json"
         if file.exists():
-            stored = json.loads(file.read_text())
+            found = read_json(file)
+            stored = found if isinstance(found, dict) else {}
             other = [name for name, value in self.made_of.items() if stored.get(name) != value]
             if other:
                 raise ValueError(
                     f"{self.folder}: holds fits of other options ({', '.join(other)} differ); choose another folder "
                     "with -o, or delete this one"
                 )
-        with being_written(file) as out:
-            out.write((json.dumps(self.made_of, indent=1) + "\n").encode())
+        write_whole(file, json.dumps(self.made_of, indent=1) + "\n")
 
     @cached_property
     def made_of(self) -> dict[str, Any]:
@@ -164,7 +164,7 @@ class DataFit:
         listed = [] if self.keypoints is None else sorted(self.keypoints.rglob("*.json"))
         content = hashlib.sha256()
         for path in listed:
-            content.update(str(path.relative_to(self.keypoints or path)).encode() + path.read_bytes())
+            content.update(str(path.relative_to(self.keypoints or path)).encode() + regular(path).read_bytes())
         return {
             "data": self.source.name,
             "split": self.source.split,
@@ -283,7 +283,10 @@ class DataFit:
             raise ValueError(f"no keypoint file {places[0]}")
         size = data_frames.image_size(frame)
         given = None if size is None else (float(size[0]), float(size[1]))
-        return keypoints.read(place, image_size=given)
+        found = keypoints.read(place, image_size=given)
+        if len(found) > 1:
+            raise ValueError(f"{place}: expected the keypoints of one frame, got {len(found)} images")
+        return found
 
     def _fitted(self, seen: Sequence[Seen], gender: str) -> Iterator[dict[str, Any]]:
         body = self.model(gender)
@@ -392,8 +395,7 @@ class DataFit:
             "presented": None if not self.imitates else self.pose or "the recorded pose of each frame",
             "left_out": left_out,
         }
-        with being_written(self.folder / RECORD) as out:
-            out.write((json.dumps(record, indent=1, ensure_ascii=False) + "\n").encode())
+        write_whole(self.folder / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
         return record
 
     def _read(self, number: int) -> dict[str, NDArray[Any]]:

@@ -20,6 +20,11 @@ from .start import SEEN, level_camera
 
 NOTHING_KNOWN = KnownCamera()
 FEWEST = 6  # points seen, below which a body is a guess
+FACE_SEEN = 0.8  # confidence of nose and eyes that the face of a person is turned to the camera
+CENTER = 0.2  # of the image's size: how far a camera's center is from its middle at most
+MIRRORED = (
+    "the face is seen, yet left and right are as from behind: are the points mirrored, or is the person turned away?"
+)
 FEET = (
     "left_ankle",
     "right_ankle",
@@ -134,11 +139,13 @@ def oddities(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, s
     if hips and shoulders:
         down = (hips[0] + hips[1] - shoulders[0] - shoulders[1]) / 2
         if down[1] < -abs(down[0]):
-            flags.append("upside-down: the shoulders are below the hips")
+            flags.append("upside-down: the shoulders are below the hips; y of a keypoint points down")
         turns = [np.sign(left[0] - right[0]) for left, right in (hips, shoulders)]
         crossed = min(abs(left[0] - right[0]) for left, right in (hips, shoulders)) > 0.1 * np.linalg.norm(down)
         if crossed and turns[0] != turns[1]:
             flags.append("left and right may be swapped: hips and shoulders face opposite ways")
+        elif crossed and _mirrored(names, points, confidence, turns[0]):
+            flags.append(MIRRORED)
     if len(where) <= len(names) / 2:
         flags.append(f"only {len(where)} of {len(names)} points were seen")
     if not any(name in where for name in FEET):
@@ -147,6 +154,27 @@ def oddities(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, s
     if outside:
         flags.append(f"{outside} points lie outside the image")
     return flags
+
+
+def _mirrored(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, turn: float) -> bool:
+    """Whether nose and both eyes are surely seen, and the eyes as well as the trunk have left on the image's left."""
+    surely = {name: points[k] for k, name in enumerate(names) if confidence[k] > FACE_SEEN}
+    face = [surely.get(name) for name in ("nose", "left_eye", "right_eye")]
+    nose, left, right = face
+    if nose is None or left is None or right is None:
+        return False
+    return bool(turn < 0 and left[0] < nose[0] < right[0])
+
+
+def unlike(camera: KnownCamera, size: np.ndarray) -> list[str]:
+    """What says that a known camera is of images of another size than (2,), width and height."""
+    if camera.center is None:
+        return []
+    center = np.array(camera.center)
+    if (abs(center - size / 2) < CENTER * size).all():
+        return []
+    said = f"the camera's center ({center[0]:g}, {center[1]:g}) is far from the middle of the {size[0]:g} × {size[1]:g}"
+    return [f"{said} image: is the camera of another image size?"]
 
 
 def _pair(where: dict[str, np.ndarray], joint: str) -> list[np.ndarray]:

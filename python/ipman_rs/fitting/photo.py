@@ -6,11 +6,12 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ipman_rs.files import regular
 
 from .detections import Array, Detections, join
 from .keypoints import mediapipe
@@ -70,12 +71,13 @@ def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     """The pixels (height, width, 3) of an image, turned as its EXIF says. ValueError if unreadable or tiny."""
     from PIL import Image, ImageOps
 
-    if not Path(path).is_file():
-        raise ValueError(f"{path}: no such file")
+    regular(path)
     try:
-        with Image.open(path) as image:
-            pixels = np.array(ImageOps.exif_transpose(image).convert("RGB"))
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(path, formats=("JPEG", "MPO", "PNG")) as image:  # others start programs
+                pixels = np.array(ImageOps.exif_transpose(image).convert("RGB"))
+    except Exception as error:  # damaged bytes can fail in any way
         raise ValueError(f"{path}: expected an image: {error}") from None
     if min(pixels.shape[:2]) < SMALLEST:
         height, width = pixels.shape[:2]

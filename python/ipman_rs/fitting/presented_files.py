@@ -13,7 +13,6 @@ executed.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ipman_rs.body import BodyModel, embedded, joints, pose_arrays, safe_npz, safe_pickle
+from ipman_rs.files import read_json, regular
 from ipman_rs.ground import Ground
 
 Array = NDArray[Any]
@@ -67,7 +67,8 @@ def read(path: Path, body: BodyModel, frame: int | None = None, up: Axis | None 
         )
     length = max(len(piece.rotations) for piece in pieces)
     row = _row(stored, length, frame)
-    pose = pose_arrays.place(pieces, body.joint_names, length)[row]
+    own_mean = None if stored.is_absolute else body.pose_mean
+    pose = pose_arrays.place(pieces, body.joint_names, length, own_mean)[row]
     _check_angles(stored, pose)
     if stored.is_absolute:
         pose = pose - body.pose_mean
@@ -104,10 +105,10 @@ def read_contact(path: Path, body: BodyModel) -> NDArray[np.int64]:
             listed = ", ".join(sorted(stored.names))[:120]
             raise ValueError(f"{path}: expected an array contact, it has {listed or 'nothing'}")
         return _indices(found, f"{path}: contact", body)
+    content = read_json(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
         found = np.array(content["contact"] if isinstance(content, dict) else content)
-    except (OSError, ValueError, KeyError) as error:
+    except (ValueError, KeyError) as error:
         raise ValueError(f"{path}: expected a list of vertices (.json), or contact in .npz or .pkl: {error}") from None
     return _indices(found, f"{path}: contact", body)
 
@@ -130,8 +131,7 @@ class _Stored:
 
     @classmethod
     def open(cls, path: Path) -> _Stored:
-        if not path.is_file():
-            raise ValueError(f"{path}: {'is a folder; name the file in it' if path.is_dir() else 'no such file'}")
+        regular(path)
         if path.suffix.lower() == ".npz":
             return cls(path, safe_npz.names(path), lambda name: safe_npz.read(path, name))
         content = safe_pickle.read(path, "presented pose", "a pose of SMPL, SMPL-X or MoYo", tolerant=True)

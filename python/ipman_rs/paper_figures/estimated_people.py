@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,6 +21,7 @@ from ipman_rs.body.pose_arrays import joints_of
 from ipman_rs.data.frames import DataSet, Frames
 from ipman_rs.evaluation.tables import predictions
 from ipman_rs.evaluation.tables.models import Models
+from ipman_rs.files import read_json
 from ipman_rs.view import Study
 from ipman_rs.view.fitted import camera_of
 
@@ -95,8 +95,8 @@ class FittedFolder:
         """The pixels of a person's photo, None where there is none."""
         record = self.path / name / RECORD
         try:
-            source = Path(str(json.loads(record.read_text(encoding="utf-8"))["source"]))
-        except (ValueError, KeyError, TypeError) as error:
+            source = Path(str(read_json(record)["source"]))
+        except (KeyError, TypeError, IndexError) as error:
             raise ValueError(f"{record}: expected the record of a fit, with its source ({error})") from error
         folders = [] if self.photos is None else [self.photos]
         stems = dict.fromkeys((name, source.stem))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ipman_rs.evaluation.tables.rows import being_written
+from ipman_rs.files import write_whole
 from ipman_rs.plain import plain
 
 if TYPE_CHECKING:
@@ -53,8 +53,7 @@ def write(figure: PaperFigure, folder: Path) -> list[Path]:
     written = []
     for ending, content in contents.items():
         path = folder / f"{figure.name}.{ending}"
-        with being_written(path) as file:
-            file.write(content)
+        write_whole(path, content)
         written.append(path)
     return written
 

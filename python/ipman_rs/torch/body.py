@@ -15,6 +15,7 @@ from ipman_rs import BodyTemplate
 from ipman_rs import body as numpy_body
 
 from . import dispatch, reference, skinning
+from .arrays import dense
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,9 @@ class BodyModel(nn.Module):
         expression: Tensor | None = None,
     ) -> BodyOutput:
         """Posed bodies; arguments, shapes, broadcasting and errors as in `ipman_rs.body.BodyModel.forward`."""
+        for name, value in (("pose", pose), ("betas", betas), ("transl", transl), ("expression", expression)):
+            if value is not None:
+                dense(name, value, whole=True)
         given = [self._pose(pose), self._components("betas", betas, self.body.num_betas)]
         given += [self._components("expression", expression, self.body.num_expressions)]
         given += [self._components("transl", transl, 3, exact=True)]

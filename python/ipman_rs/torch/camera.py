@@ -21,6 +21,8 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from .arrays import dense
+
 
 def camera_to_world(
     vertices_or_orientation: Tensor,
@@ -57,8 +59,8 @@ def camera_to_world(
         ValueError: a shape is wrong, or pelvis comes with vertices, whose place `translation` tells already.
     """
     body = vertices_or_orientation
-    is_orientation = body.shape[-2:] == (3, 3)
     _check("vertices_or_orientation", body, (..., None, 3))
+    is_orientation = body.shape[-2:] == (3, 3)
     _check("translation", translation, (..., 3))
     _check("R", R, (..., 3, 3))
     _check("t", t, (..., 3))
@@ -109,6 +111,7 @@ def _reflection(like: Tensor, flip: bool | Tensor, mirror: Sequence[float]) -> T
 def _check(name: str, tensor: Tensor, shape: tuple) -> None:
     """shape: `...`, then sizes, None for any."""
     sizes = shape[1:]
+    dense(name, tensor, whole=True)
     fits = tensor.ndim >= len(sizes) and all(
         size in (None, got) for size, got in zip(sizes, tensor.shape[-len(sizes) :], strict=True)
     )

@@ -17,7 +17,7 @@ from torch import Tensor
 from ipman_rs import Ground as NumpyGround
 
 from . import device, reference
-from .arrays import single_or_double
+from .arrays import dense, single_or_double
 from .autograd import CompiledValue, CompiledWeighted, Value
 from .ground import Ground, as_ground
 
@@ -68,13 +68,12 @@ def check(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround
     """The batch shape and the ground of arguments that fit together.
 
     Raises:
-        TypeError: vertices is no floating-point tensor.
+        TypeError: vertices is no ordinary floating-point tensor, or the template is none.
         ValueError: vertices does not fit the template, the ground does not broadcast against it, or it requires grad.
     """
-    if not isinstance(vertices, Tensor) or not vertices.is_floating_point():
-        got = vertices.dtype if isinstance(vertices, Tensor) else type(vertices).__name__
-        raise TypeError(f"vertices: expected a floating-point tensor, got {got}; numpy arrays go to ipman_rs itself")
-    shape = vertices.shape
+    if not hasattr(template, "_core"):
+        raise TypeError(f"template: expected ipman_rs.BodyTemplate, got {type(template).__name__}")
+    shape = dense("vertices", vertices).shape
     if len(shape) < 2 or shape[-1] != 3 or shape[-2] != template.num_vertices:
         raise ValueError(
             f"vertices: expected shape (..., {template.num_vertices}, 3) for this template, got {tuple(shape)}"

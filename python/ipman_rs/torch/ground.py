@@ -12,6 +12,9 @@ from torch import Tensor
 from torch._C._functorch import is_functorch_wrapped_tensor
 
 from ipman_rs import Ground as NumpyGround
+from ipman_rs.arrays import plain
+
+from .arrays import dense
 
 Numbers = Tensor | np.ndarray | Sequence[float] | float
 
@@ -122,12 +125,14 @@ def as_numpy_ground(ground: Ground | NumpyGround) -> NumpyGround:
 
 def _tensor(name: str, value: Numbers) -> Tensor:
     if isinstance(value, Tensor):
+        dense(name, value, whole=True)
         if value.requires_grad or _has_tangent(value):
             raise ValueError(f"{name}: a ground that requires grad is not differentiable here; pass {name}.detach()")
         if value.device.type != "cpu" and value.is_floating_point():
             return value
         return value.to(torch.float64)
-    return torch.as_tensor(np.asarray(value, dtype=np.float64))
+    with np.errstate(over="ignore"):  # what double precision cannot hold is refused as not finite
+        return torch.as_tensor(plain(name, value).astype(np.float64))
 
 
 def _has_tangent(tensor: Tensor) -> bool:

@@ -6,7 +6,7 @@ from torch import Tensor
 
 from ipman_rs import BodyTemplate
 from ipman_rs import Ground as NumpyGround
-from ipman_rs.checks import choice, not_negative, number, positive
+from ipman_rs.checks import choice, not_negative, positive
 from ipman_rs.losses import Curve, Points, Wrap
 from ipman_rs.mass import Method
 
@@ -25,7 +25,7 @@ def stability_loss(
 ) -> Tensor:
     """‖g(CoM) − g(CoP)‖ (Eq. 4): vertices (..., V, 3) -> (...), m; gradient 0 where they coincide."""
     quantity = f"stability_loss.{choice('method', method, Method)}"
-    options = (number("alpha", alpha), number("gamma", gamma), not_negative("epsilon", epsilon))
+    options = (not_negative("alpha", alpha), not_negative("gamma", gamma), not_negative("epsilon", epsilon))
     return evaluate(vertices, template, ground, quantity, options, ())
 
 
@@ -46,8 +46,8 @@ def ground_loss(
     points: "samples" or "vertices"; curve: "tanh_squared" (tanh x)² or "tanh_of_square" tanh(x²).
     """
     quantity = f"ground_loss.{choice('points', points, Points)}.{choice('curve', curve, Curve)}"
-    pull_options = (number("alpha1", alpha1), positive("alpha2", alpha2))
-    push_options = (number("beta1", beta1), positive("beta2", beta2))
+    pull_options = (not_negative("alpha1", alpha1), positive("alpha2", alpha2))
+    push_options = (not_negative("beta1", beta1), positive("beta2", beta2))
     options = (*pull_options, *push_options)
     pull, push = evaluate(vertices, template, ground, quantity, options, (2,)).unbind(dim=-1)
     return pull, push
@@ -68,5 +68,5 @@ def balance_cost(
     wrap: "log" log(1 + J), "saturate" J/(1 + J), or "none". A term of this project, not the paper's.
     """
     quantity = f"balance_cost.{choice('wrap', wrap, Wrap)}.{choice('method', method, Method)}"
-    options = (number("alpha", alpha), number("gamma", gamma), positive("sigma", sigma))
+    options = (not_negative("alpha", alpha), not_negative("gamma", gamma), positive("sigma", sigma))
     return evaluate(vertices, template, ground, quantity, options, ())

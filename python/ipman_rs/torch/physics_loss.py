@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 from ipman_rs import BodyTemplate, presets
 from ipman_rs import Ground as NumpyGround
-from ipman_rs.checks import choice
+from ipman_rs.checks import choice, not_negative
 from ipman_rs.losses import Curve, Points, Wrap
 from ipman_rs.mass import Method
 
@@ -35,7 +35,9 @@ class IntuitivePhysicsLoss(nn.Module):
     gradients. When none counts the result is 0 and still has a graph. Half-precision vertices give float32 losses.
 
     Raises:
-        ValueError: unknown preset, reduction, points, curve, method, wrap, or a weight for a term that is not there.
+        ValueError: unknown preset, reduction, points, curve, method, wrap; or a weight for a term that is not there,
+            negative, or no finite number.
+        TypeError: the template or a weight is none.
     """
 
     def __init__(
@@ -63,13 +65,19 @@ class IntuitivePhysicsLoss(nn.Module):
             first = (numbers.alpha, numbers.gamma, numbers.epsilon)
         self._options = (*first, numbers.alpha1, numbers.alpha2, numbers.beta1, numbers.beta2)
 
+        if not hasattr(template, "_core"):
+            raise TypeError(f"template: expected ipman_rs.BodyTemplate, got {type(template).__name__}")
+        if weights is not None and not isinstance(weights, Mapping):
+            raise TypeError(f"weights: expected numbers by the names of terms, got {type(weights).__name__}")
         given = dict(weights or {})
-        unknown = sorted(set(given) - set(self.terms))
+        unknown = sorted(set(given) - set(self.terms), key=str)
         if unknown:
             raise ValueError(
-                f"weights: preset {preset!r} has the terms {', '.join(self.terms)}, got {', '.join(unknown)}"
+                f"weights: preset {preset!r} has the terms {', '.join(self.terms)}, got {', '.join(map(str, unknown))}"
             )
-        self.weights = {term: float(given.get(term, numbers.weights[term])) for term in self.terms}
+        self.weights = {
+            term: not_negative(f"weights: {term}", given.get(term, numbers.weights[term])) for term in self.terms
+        }
         self.template = template
         self.preset = preset
         self.reduction = choice("reduction", reduction, Reduction)
@@ -182,6 +190,8 @@ def _number(counted: Tensor, values: Tensor) -> Tensor:
 
 def _mask(batch_shape: torch.Size, valid: Tensor, vertices: Tensor) -> Tensor:
     """valid (...) as bool (B,) beside the vertices."""
+    if not isinstance(valid, Tensor) or valid.is_nested or valid.layout != torch.strided or valid.is_meta:
+        raise TypeError(f"valid: expected an ordinary bool tensor, got {type(valid).__name__}")
     if valid.dtype != torch.bool or valid.shape != batch_shape:
         raise ValueError(
             f"valid: expected a bool tensor of shape {tuple(batch_shape)}, one a body, "

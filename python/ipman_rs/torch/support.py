@@ -15,7 +15,7 @@ from ipman_rs.checks import choice, positive
 from ipman_rs.mass import Method
 from ipman_rs.support import Contact, Solver
 
-from .arrays import as_array
+from .arrays import as_array, dense
 from .dispatch import evaluate
 from .ground import Ground, as_numpy_ground
 
@@ -72,6 +72,7 @@ def bose(
     "hull" is margin >= 0, on any device; "lp" is the paper's linear programme, solved on the CPU.
     """
     if choice("method", method, Solver) == "hull":
-        return support_margin(vertices.detach(), template, ground, threshold, com_method, contact) >= 0
+        still = dense("vertices", vertices).detach()
+        return support_margin(still, template, ground, threshold, com_method, contact) >= 0
     inside = ip.bose(as_array(vertices), template, as_numpy_ground(ground), threshold, "lp", com_method, contact)
     return torch.as_tensor(inside, device=vertices.device)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import torch
@@ -41,8 +42,8 @@ class Figures:
     lowest: Array
     tilt: Array
 
-    def save(self, path: Path) -> None:
-        np.savez_compressed(path, **vars(self))
+    def save(self, file: BinaryIO) -> None:
+        np.savez_compressed(file, **vars(self))
 
     @classmethod
     def load(cls, path: Path) -> Figures:

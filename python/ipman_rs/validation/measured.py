@@ -12,6 +12,7 @@ from ..data import c3d, force_plates, opensim
 from ..data.external_loads import ExternalLoads
 from ..data.force_plates import ForcePlates, between
 from ..data.tracks import TO_Y_UP
+from ..files import regular
 
 Array = NDArray[np.float64]
 
@@ -97,7 +98,7 @@ def _heads(path: Path) -> list[str]:
 
 def _csv(path: Path) -> tuple[Array, Array]:
     """Times (T,) s and centres of mass (T, 3) m."""
-    heads = _heads(path)
+    heads = _heads(regular(path))
     with path.open(encoding="utf-8", errors="replace", newline="") as stream:
         rows = [(number, row) for number, row in enumerate(csv.reader(stream), 1) if number > 1 and row]
     if not rows:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ipman_rs.files import being_written
+
 from . import colors
 from .camera import Camera
 from .picture import camera_on, draw_body, draw_picture, heat_top, new_page, save
@@ -146,4 +148,5 @@ def write_beside(before: Study, after: Path, camera: Camera, path: Path) -> None
     stream = BytesIO()
     draw_picture(before, 0, stream, camera)
     stream.seek(0)
-    imsave(path, np.hstack([imread(stream), imread(after)]))
+    with being_written(path) as file:
+        imsave(file, np.hstack([imread(stream), imread(after)]))

@@ -85,6 +85,7 @@ def _body(study: Study, folder: Path | None) -> dict[str, Any]:
         "name": study.name,
         "source": study.source,
         "notes": list(study.notes),
+        "flags": list(study.flags),
         "pictures": _pictures(study, folder),
         "method": study.com_method,
         "preset": study.preset.name,

@@ -9,6 +9,8 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
+from ipman_rs.files import being_written
+
 from . import colors
 from .camera import Camera, look_at
 from .geometry import floor_lines, grid_step, pressure_at, vertex_normals
@@ -69,7 +71,11 @@ def save(figure: Figure, path: Path | IO[bytes]) -> None:
     """Write a PNG; characters of a name that the font lacks become boxes without a word."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
-        figure.savefig(path, dpi=100, format="png")
+        if not isinstance(path, Path):
+            figure.savefig(path, dpi=100, format="png")
+            return
+        with being_written(path) as file:
+            figure.savefig(file, dpi=100, format="png")
 
 
 def heat_top(study: Study) -> float:

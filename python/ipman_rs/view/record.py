@@ -44,6 +44,7 @@ def study_record(study: Study) -> dict[str, Any]:
         "source": study.source,
         **fitted,
         "notes": list(study.notes),
+        "flags": list(study.flags),
         "preset": plain(asdict(study.preset)),
         "ground": {"normal": plain(study.ground.normal), "height": plain(study.ground.height)},
         "template": {

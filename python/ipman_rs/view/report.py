@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ipman_rs.files import being_written, write_whole
+
 from .fitted import draw_fitted
 from .floor import draw_floor_view
 from .html import page
@@ -38,7 +40,7 @@ def write_report(
     directory.mkdir(parents=True, exist_ok=True)
     excerpts = [study.excerpt() for study in studies]
     record = json.dumps(report_record(excerpts, failures), allow_nan=False, ensure_ascii=False, indent=1)
-    (directory / "report.json").write_text(record + "\n", encoding="utf-8")
+    write_whole(directory / "report.json", record + "\n")
     progress("report.json")
     names = safe_names([study.name for study in studies])
     folders = [directory if len(studies) == 1 and not own_folders else directory / name for name in names]
@@ -47,7 +49,7 @@ def write_report(
         for written in _write_study(study, folder):
             progress(written)
     path = directory / "report.html"
-    path.write_text(page(excerpts, failures, folders), encoding="utf-8")
+    write_whole(path, page(excerpts, failures, folders))
     progress("report.html")
     return path
 
@@ -70,7 +72,8 @@ def _has_timeline(study: Study) -> bool:
 def _write_study(study: Study, folder: Path) -> Iterator[str]:
     # Packing millions of numbers would take longer than finding them.
     save = np.savez_compressed if study.num_frames <= MAX_LISTED_FRAMES else np.savez
-    save(folder / "report.npz", allow_pickle=False, **study_arrays(study))
+    with being_written(folder / "report.npz") as file:
+        save(file, allow_pickle=False, **study_arrays(study))
     yield "report.npz"
     if study.fitted is not None:
         yield from _write_fitted(study, folder)

@@ -32,7 +32,7 @@ class Study:
     for every quantity of ``ip.analyze``, plus ``com_cop_distance``, m; ``polygons`` the base of support of each frame,
     (K, 3), of a long sequence only those of the frames that are listed; ``pressure`` (K, S) at the samples of the
     frames ``key_frames`` (K,); ``frames`` (T,) the frames' numbers, where these are some of a longer sequence;
-    ``fitted`` of a body that was fitted to an image.
+    ``fitted`` of a body that was fitted to an image; ``notes`` what was assumed, ``flags`` what is odd.
     """
 
     name: str
@@ -51,6 +51,7 @@ class Study:
     notes: tuple[str, ...] = field(default=())
     frames: np.ndarray | None = None
     fitted: Fitted | None = None
+    flags: tuple[str, ...] = ()
 
     @property
     def num_frames(self) -> int:
@@ -119,6 +120,7 @@ def study(
     seconds: np.ndarray | None = None,
     source: str = "",
     notes: Sequence[str] = (),
+    flags: Sequence[str] = (),
     progress: Callable[[int], None] = lambda done: None,
 ) -> Study:
     """Analyse the frames ``vertices`` (T, V, 3), one body (V, 3), or a `PosedSequence`, on one ground.
@@ -158,6 +160,7 @@ def study(
         seconds=seconds,
         source=source,
         notes=tuple(notes),
+        flags=tuple(flags),
     )
 
 

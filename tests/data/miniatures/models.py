@@ -8,8 +8,11 @@ import ipman_rs as ip
 from ipman_rs.body import joint_regressors, joints
 
 
-def _written(path, names, parents, own, width, **more):
-    """A model file whose joints are the vertices nearest to the embedded body's. `own`: its name of a joint."""
+def _written(path, names, parents, own, width, rest_of_shape=0.0, **more):
+    """A model file whose joints are the vertices nearest to the embedded body's. `own`: its name of a joint.
+
+    rest_of_shape: the size of what components after the tenth do, beside the first ten.
+    """
     body = ip.load_body("anny-lite")
     rest = body()
     weights = np.zeros((body.num_vertices, len(names)))
@@ -23,7 +26,7 @@ def _written(path, names, parents, own, width, **more):
     np.savez(
         path,
         v_template=rest.vertices,
-        shapedirs=np.concatenate([0.9 * body.shapedirs, np.zeros((body.num_vertices, 3, 10))], axis=2)[..., :width],
+        shapedirs=np.concatenate([0.9 * body.shapedirs, rest_of_shape * body.shapedirs[::-1]], axis=2)[..., :width],
         posedirs=np.zeros((body.num_vertices, 3, 9 * (len(names) - 1))),
         J_regressor=regressor,
         weights=weights,
@@ -39,6 +42,20 @@ def smplx(path):
     more = {f"hands_mean{side}": np.full(45, 0.1) for side in "lr"}
     more |= {f"hands_components{side}": np.eye(45) for side in "lr"}
     _written(path, joints.SMPLX, parents, lambda name: name.replace("hand", "index1"), 20, **more)
+
+
+def smplh(path, betas=16):
+    """With so many betas, and hands that move nothing."""
+    parents = np.array([-1, *joints.SMPL_PARENTS[1:22], *[20] * 15, *[21] * 15])
+    more = {f"hands_mean{side}": np.full(45, 0.1) for side in "lr"}
+    more |= {f"hands_components{side}": np.eye(45) for side in "lr"}
+    _written(path, joints.SMPLH, parents, lambda name: name.replace("hand", "index1"), betas, 0.01, **more)
+
+
+def smplx_with_a_face(path):
+    """SMPL-X whose ten expressions move vertices."""
+    parents = np.array([-1, *joints.SMPL_PARENTS[1:22], *[15] * 3, *[20] * 15, *[21] * 15])
+    _written(path, joints.SMPLX, parents, lambda name: name.replace("hand", "index1"), 20, 0.1)
 
 
 def smpl(path):

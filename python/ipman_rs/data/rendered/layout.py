@@ -8,10 +8,12 @@ which shards there are to be, what they were made with, and the names of the key
 
 from __future__ import annotations
 
-import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from ipman_rs.files import read_json
 
 INDEX = "index.json"
 FORMAT = "ipman_rs rendered images, 1"
@@ -48,16 +50,16 @@ def plan(counts: dict[str, int], shard_size: int) -> list[Shard]:
 def read_index(folder: Path) -> dict[str, Any]:
     """The index of a folder. ValueError, saying what is wrong, if it has none."""
     path = folder / INDEX
-    if not path.is_file():
+    if not os.path.lexists(path):
         raise ValueError(f"{folder}: no {INDEX}; expected a folder that `ipman data render` wrote")
+    index = read_json(path)
     try:
-        index = json.loads(path.read_text(encoding="utf-8"))
         if index["format"] != FORMAT:
             raise ValueError(f"expected the format {FORMAT!r}, got {index['format']!r}")
         if not {"settings", "counts", "keypoint_names"} <= set(index):
             raise ValueError("expected settings, counts and keypoint_names")
         shards_of(index)
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, LookupError, TypeError) as error:
         raise ValueError(f"{path}: no index of rendered images: {error}") from None
     return index
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import io
-import json
 import tarfile
 import warnings
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.body.joints import SMPL
+from ipman_rs.files import parse_json, regular
 from ipman_rs.ground import Ground
 
 from ..frames import Cameras, Frames, Rows
@@ -87,12 +86,12 @@ class Rendered:
         """Of one image. BadSample if they are missing, damaged or not finite."""
         name = str(self.names[row])
         try:
-            record = json.loads(self._bytes(row, "json"))
+            record = parse_json(self._bytes(row, "json"))
             with np.load(io.BytesIO(self._bytes(row, "npz")), allow_pickle=False) as stored:
                 arrays = {key: stored[key] for key in (*SHAPES, "keypoints", "visible")}
             if not isinstance(record, dict) or not {"static", "kind"} <= set(record):
                 raise ValueError("json: expected static and kind")
-        except (ValueError, KeyError, OSError, EOFError, RecursionError, zipfile.BadZipFile) as error:
+        except Exception as error:  # damaged bytes can fail in any way
             raise self._bad(name, f"labels cannot be read: {error}") from None
         count = len(self.keypoint_names)
         for key, shape in {**SHAPES, "keypoints": (count, 3), "visible": (count,)}.items():
@@ -113,7 +112,7 @@ class Rendered:
                 if image.size != (size, size):
                     raise ValueError(f"expected {size} x {size} pixels, got {image.size}")
                 return np.asarray(image.convert("RGB"))
-        except (ValueError, OSError, SyntaxError, Image.DecompressionBombError) as error:
+        except Exception as error:
             raise self._bad(name, f"image cannot be read: {error}") from None
 
     def _labels_or_none(self, row: int) -> Labels | None:
@@ -180,9 +179,9 @@ def members(path: Path) -> dict[str, Place]:
     """The files of a shard, as far as it can be read."""
     found: dict[str, Place] = {}
     try:
-        with tarfile.open(path, "r:") as archive:
+        with tarfile.open(regular(path), "r:") as archive:
             for member in archive:
                 found[member.name] = member.offset_data, member.size
-    except (tarfile.TarError, OSError) as error:
+    except Exception as error:  # damaged bytes can fail in any way
         warnings.warn(f"{path}: damaged after {len(found)} files: {error}", stacklevel=2)
     return found

@@ -7,7 +7,6 @@ import io
 import itertools
 import json
 import multiprocessing
-import os
 import tarfile
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import ProcessPoolExecutor
@@ -16,6 +15,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ipman_rs.files import being_written, write_whole
 from ipman_rs.processes import end_with_parent
 
 from .figures import keypoint_names
@@ -45,14 +45,15 @@ def write(
     progress(done)
     with closing(packed(settings, missing, workers)) as samples:
         for shard in missing:
-            part = folder / f".{shard.name}.part"
-            with tarfile.open(part, "w", format=tarfile.USTAR_FORMAT) as archive:
+            with (
+                being_written(folder / shard.name) as file,
+                tarfile.open(fileobj=file, mode="w", format=tarfile.USTAR_FORMAT) as archive,
+            ):
                 for key, contents in itertools.islice(samples, shard.count):
                     for ending, content in contents.items():
                         add(archive, f"{key}.{ending}", content)
                     done += 1
                     progress(done)
-            os.replace(part, folder / shard.name)
     return sum(shard.count for shard in missing)
 
 
@@ -72,15 +73,14 @@ def begin(folder: Path, index: dict[str, Any]) -> None:
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{folder}: expected a folder, got a file")
     if not path.exists():
-        others = sorted(each.name for each in folder.iterdir()) if folder.exists() else []
+        entries = folder.iterdir() if folder.exists() else ()
+        others = sorted(each.name for each in entries if not each.name.startswith(f".{INDEX}."))  # of a killed run
         if others:
             raise ValueError(
                 f"{folder}: expected an empty folder or one of rendered images, got {others[0]}; name another"
             )
         folder.mkdir(parents=True, exist_ok=True)
-        part = folder / f".{INDEX}.part"
-        part.write_text(json.dumps(index, indent=1))
-        os.replace(part, path)
+        write_whole(path, json.dumps(index, indent=1))
         return
     begun = read_index(folder)
     for name in index:

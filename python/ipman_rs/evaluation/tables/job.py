@@ -23,13 +23,13 @@ from ipman_rs import __version__, data
 from ipman_rs.body import safe_npz
 from ipman_rs.data import check
 from ipman_rs.data.frames import DataSet, Frames
+from ipman_rs.files import being_written, read_json, write_whole
 from ipman_rs.ground import Ground
 
 from . import predictions as predicted
 from .columns import Columns, columns
 from .joints import Definition, Regressors, define
 from .models import Models
-from .rows import being_written
 
 PIECE = 4096  # frames: some seconds of work, and small in memory
 OWN = "own"  # the data set of the user's own files, in the form of predictions
@@ -161,7 +161,7 @@ class Job:
         self.place.mkdir(parents=True, exist_ok=True)
         file = self.place / "made_of.json"
         if file.exists():
-            self._compare(json.loads(file.read_text()))
+            self._compare(read_json(file))
         if self.predictions != TRUTH and len(self.estimates) < len(self.data) and not self.partial:
             raise ValueError(
                 f"{self.predictions}: has {len(self.estimates):,} frames, but the data set {self.source.name} has "
@@ -170,8 +170,7 @@ class Job:
         if self.predictions != TRUTH:
             self._check_axes()
         _ = self.definition
-        with being_written(file) as out:
-            out.write((json.dumps(self.made_of, indent=1) + "\n").encode())
+        write_whole(file, json.dumps(self.made_of, indent=1) + "\n")
 
     def _check_axes(self) -> None:
         """ValueError where the estimated people lie or hang along another axis than the data set's up."""
@@ -214,7 +213,8 @@ class Job:
     def key(self) -> str:
         return hashlib.sha256(json.dumps(self.made_of, sort_keys=True).encode()).hexdigest()
 
-    def _compare(self, stored: dict[str, Any]) -> None:
+    def _compare(self, stored: Any) -> None:
+        stored = stored if isinstance(stored, dict) else {}
         other = [name for name, value in self.made_of.items() if stored.get(name) != value]
         if other:
             raise ValueError(

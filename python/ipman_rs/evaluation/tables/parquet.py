@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +12,9 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from .rows import RowsOnDisk, being_written
+from ipman_rs.files import being_written
+
+from .rows import RowsOnDisk
 
 _BATCH = 4096  # rows
 
@@ -31,14 +34,16 @@ def read(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, A
     """The columns of predictions, unpacked into a folder, and what is one for all frames. ValueError if damaged."""
     from .predictions import FOR_ALL, NUMBERS, TEXT
 
-    pyarrow, _ = needed()
+    needed()
     try:
         with _opened(path) as file:
             known = set(file.schema_arrow.names)
             columns = {name: _unpacked(path, file, name, unpacked) for name in (*TEXT, *NUMBERS) if name in known}
             common = {name: _one(path, file, name) for name in FOR_ALL if name in known and file.metadata.num_rows}
-    except (pyarrow.ArrowInvalid, pyarrow.ArrowNotImplementedError, OSError) as error:
-        if isinstance(error, OSError) and error.errno is not None:
+    except Exception as error:  # damaged bytes can fail in any way
+        if isinstance(error, OSError) and error.errno not in (None, errno.EINVAL):
+            raise  # the disk is full, say
+        if str(error).startswith(f"{path}: "):
             raise
         raise ValueError(f"{path}: not a Parquet file that can be read ({error}); is it complete?") from error
     return columns, common

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from ipman_rs.body import safe_npz
 from ipman_rs.data import check
 from ipman_rs.data.frames import Frames, Rows
+from ipman_rs.files import regular
 from ipman_rs.ground import Ground
 
 from . import parquet
@@ -101,7 +102,7 @@ def read(path: str | Path, unpacked: Path) -> Predictions:
 def fingerprint(path: Path) -> str:
     """Of a file's bytes: which predictions a result belongs to."""
     digest = hashlib.sha256()
-    with path.open("rb") as file:
+    with regular(path).open("rb") as file:
         while chunk := file.read(1 << 20):
             digest.update(chunk)
     return digest.hexdigest()

@@ -14,6 +14,7 @@ import jinja2
 import numpy as np
 
 from ipman_rs import __version__
+from ipman_rs.files import being_written, cell, write_whole
 
 from ..bootstrap import Interval
 from . import parquet
@@ -21,7 +22,6 @@ from .figures import FIGURES, Figure
 from .job import Job
 from .joints import COUNTED, Definition
 from .paper import Table
-from .rows import being_written
 from .summary import EDGES, Difference, Measured, frames_of
 
 NAME = "evaluation"
@@ -63,8 +63,7 @@ def write(report: Report, folder: Path, jobs: list[Job], progress: Callable[[int
     """The files; `progress` is told how many frames more are in frames.parquet."""
     files = {**{name: text.encode() for name, text in texts(report).items()}, **_plot(report)}
     for name, content in files.items():
-        with being_written(folder / name) as file:
-            file.write(content)
+        write_whole(folder / name, content)
     written = [folder / name for name in files]
     return [*written, *write_frames(folder / "frames.parquet", report, jobs, progress)]
 
@@ -217,21 +216,21 @@ def _csv(report: Report) -> str:
     lines.writerow(["method", "figure", "unit", "mean", "low", "high", "std", "frames", "sequences", "without"])
     for method, printed in (report.table.published if report.table else {}).items():
         for name, value in printed.items():
-            lines.writerow([f"{method} (printed)", FIGURES[name].title, FIGURES[name].unit, value, *[""] * 6])
+            lines.writerow([cell(f"{method} (printed)"), FIGURES[name].title, FIGURES[name].unit, value, *[""] * 6])
     for each in report.measured:
         for name, summary in each.summary.items():
             figure, found = FIGURES[name], each.intervals[name]
             numbers = [value * figure.factor for value in (summary.mean, found.low, found.high, summary.std)]
             told = [repr(float(value)) if np.isfinite(value) else "" for value in numbers]
             counts = [summary.frames, len(each.clusters[name].names), sum(summary.missing.values())]
-            lines.writerow([each.name, figure.title, figure.unit, *told, *counts])
+            lines.writerow([cell(each.name), figure.title, figure.unit, *told, *counts])
     for each in report.differences:
         for name, found in each.intervals.items():
             figure = FIGURES[name]
             told = [
                 repr(float(v * figure.factor)) if np.isfinite(v) else "" for v in (found.mean, found.low, found.high)
             ]
-            label = f"{each.name} − {each.baseline}"
+            label = cell(f"{each.name} − {each.baseline}")
             lines.writerow([label, figure.title, figure.unit, *told, "", each.frames[name], "", ""])
     return text.getvalue()
 
@@ -246,7 +245,7 @@ def _sequences(report: Report) -> str:
             figure = FIGURES[name]
             for sequence, total, count in zip(found.names, found.sums, found.counts, strict=True):
                 mean = repr(float(total / count * figure.factor))
-                lines.writerow([each.name, sequence, figure.title, figure.unit, mean, int(count)])
+                lines.writerow([cell(each.name), cell(str(sequence)), figure.title, figure.unit, mean, int(count)])
     return text.getvalue()
 
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import os
+import errno
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from ipman_rs.body import safe_npz
 from ipman_rs.data.frames import Rows
+from ipman_rs.files import being_written, regular
 
 BLOCK = 1 << 16  # rows that are gone through at a time
 _CHUNK = 1 << 22  # bytes that are unpacked at a time
@@ -32,7 +34,7 @@ class RowsOnDisk:
         return self.shape[0]
 
     def __getitem__(self, rows: Rows) -> NDArray[Any]:
-        """Those rows, in this order. OSError where the file has become shorter."""
+        """Those rows, in this order. OSError where the file has become shorter, ValueError where text is none."""
         numbers = np.arange(len(self))[rows] if isinstance(rows, slice) else np.asarray(rows)
         found = np.empty((len(numbers), *self.shape[1:]), self.dtype)
         width = self.dtype.itemsize * int(np.prod(self.shape[1:], dtype=int))
@@ -43,7 +45,10 @@ class RowsOnDisk:
                 if len(part) != (stop - start) * width:
                     raise OSError(f"{self.path}: ends early; was it changed meanwhile?")
                 found[start:stop] = np.frombuffer(part, self.dtype).reshape(stop - start, *self.shape[1:])
-        return found
+        try:
+            return safe_npz.checked_text(found)
+        except ValueError as error:
+            raise ValueError(f"{self.path}: {error}") from None
 
     def blocks(self, size: int = BLOCK) -> Iterator[NDArray[Any]]:
         """All rows, `size` after the other."""
@@ -64,6 +69,7 @@ def of_npz(path: Path, name: str, unpacked: Path) -> RowsOnDisk:
 
     Nothing is executed. ValueError if it is damaged, holds Python objects, or lacks some of the bytes that it claims.
     """
+    regular(path)
     try:
         with zipfile.ZipFile(path) as archive:
             member = archive.getinfo(f"{name}.npy")
@@ -76,7 +82,7 @@ def of_npz(path: Path, name: str, unpacked: Path) -> RowsOnDisk:
                     _copy(stream, place, member.file_size)
         return _header(place, 0, member.file_size)
     except Exception as error:  # damaged bytes can fail in any way (zlib, struct, header syntax)
-        if isinstance(error, OSError) and error.errno is not None:
+        if isinstance(error, OSError) and error.errno not in (None, errno.EINVAL):
             raise  # the disk is full, say, which is no fault of the file
         raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
 
@@ -119,29 +125,3 @@ def _copy(stream: Any, place: Path, size: int) -> None:
             if copied > size:
                 raise ValueError(f"unpacks to more than the {size} bytes that it claims")
             file.write(chunk)
-
-
-class being_written:
-    """A file that appears under its name when it is whole: a process that dies leaves the old one, or none.
-
-    with being_written(path) as file: file.write(...)
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.part = path.with_name(f".{path.name}.{os.getpid()}.part")
-
-    def __enter__(self) -> BinaryIO:
-        self.file = self.part.open("wb")
-        return self.file
-
-    def __exit__(self, kind: Any, *_: Any) -> None:
-        try:
-            with self.file:
-                if kind is None:
-                    self.file.flush()
-                    os.fsync(self.file.fileno())
-            if kind is None:
-                os.replace(self.part, self.path)
-        finally:
-            self.part.unlink(missing_ok=True)

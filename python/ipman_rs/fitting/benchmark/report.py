@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.evaluation import Interval, paired
+from ipman_rs.files import being_written, read_json, write_whole
 from ipman_rs.plain import plain
 
 from . import scenes
@@ -59,17 +61,17 @@ def write(found: Found, run: Benchmark) -> Path:
             "blocks": [_record(*block) for block in found],
         }
     )
-    (run.folder / f"{NAME}.json").write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
+    write_whole(run.folder / f"{NAME}.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
     _write_csv(found, run.folder / f"{NAME}.csv")
     return render(run.folder)
 
 
 def render(folder: Path) -> Path:
     """The page and the plot of the JSON that is in the folder; the page's path."""
-    record = json.loads((folder / f"{NAME}.json").read_text())
+    record = read_json(folder / f"{NAME}.json")
     _plot(record["blocks"], folder / f"{NAME}.svg")
     path = folder / f"{NAME}.md"
-    path.write_text(page(record))
+    write_whole(path, page(record))
     return path
 
 
@@ -254,7 +256,7 @@ def _number(value: float, digits: int) -> str:
 
 def _write_csv(found: Found, path: Path) -> None:
     """A line a body and row."""
-    with path.open("w", newline="") as file:
+    with being_written(path) as stream, io.TextIOWrapper(stream, "utf-8", newline="") as file:
         lines = csv.writer(file)
         head: list[str] | None = None
         for block, truth, results in found:
@@ -289,5 +291,5 @@ def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:
     for key, axis in zip(DIFFERENCES, axes[-1], strict=True):
         unit = "points" if "BoSE" in key else "mm"
         axis.set_xlabel(f"{key} against the baseline, {unit}", fontsize=9)
-    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}):
-        figure.savefig(path, metadata={"Date": None})
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}), being_written(path) as file:
+        figure.savefig(file, format="svg", metadata={"Date": None})

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import torch
 
+from ipman_rs.files import being_written
+
 from ..config import Config
 from ..fit import Fit, StageReport, fit, one_thread
 from .measure import Figures, figures, snapped
@@ -112,7 +114,8 @@ class Benchmark:
         seconds = (time.process_time() - begun) / task.problem.num_bodies
         reasons = np.array([stage.reasons for stage in found.stages])
         variables: dict[str, Any] = {name: value.numpy() for name, value in found.variables.items()}
-        np.savez(place, seconds=seconds, reasons=reasons, **variables)
+        with being_written(place) as file:
+            np.savez(file, seconds=seconds, reasons=reasons, **variables)
 
     def place(self, block: Block, preset: Config) -> Path:
         """The file of a fit: named by all that decides it."""

@@ -16,6 +16,7 @@ from trimesh.triangles import closest_point, points_to_barycentric
 import ipman_rs as ip
 import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel, load_body
+from ipman_rs.files import being_written
 
 from ..landmarks import Landmarks, known
 from .scenes import Scene
@@ -52,7 +53,8 @@ class Truth:
         return cls(**{field.name: np.array([row[field.name] for row in rows]) for field in dataclasses.fields(cls)})
 
     def save(self, path: Path) -> None:
-        np.savez_compressed(path, **vars(self))
+        with being_written(path) as file:
+            np.savez_compressed(file, **vars(self))
 
     @classmethod
     def load(cls, path: Path) -> Truth:

@@ -1,80 +1,183 @@
-"""COCO's JSON with 17 keypoints: an annotation file, a list of results, or a single person.
+"""COCO's JSON, and what detectors write in its manner: an annotation file, a list of results, or a single person.
 
 {"images": [{"id", "file_name", "width", "height"}, ...], "annotations": [{"image_id", "keypoints": [x, y, v, ...]}]}
 [{"image_id", "keypoints": [x, y, score, ...]}, ...]        {"keypoints": [[x, y], ...], "keypoint_scores": [...]}
 
+The points are COCO's 17, Halpe's 26 or 136 (AlphaPose), COCO-WholeBody's 133, or MediaPipe's 33 (TensorFlow.js); their
+number says which. They may be {"x", "y", "score"} each, or {"x": [...], "y": [...], "visible": [...]} together (YOLO).
 Every image with labelled people becomes a row. People without an image_id are taken to be in the same image.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from .people import Array, Image, confident, numbers
+from . import layouts
+from .layouts import COCO_17 as NAMES
+from .layouts import Layout
+from .people import Array, Image, Person, array, counts, each, finite, numbers, plain, scored, size_of, track_of
 
-NAMES = (
-    "nose", "left_eye", "right_eye", "left_ear", "right_ear", "left_shoulder", "right_shoulder", "left_elbow",
-    "right_elbow", "left_wrist", "right_wrist", "left_hip", "right_hip", "left_knee", "right_knee", "left_ankle",
-    "right_ankle",
-)  # fmt: skip
+LAYOUTS: dict[int, tuple[str, Layout]] = {
+    17: ("COCO", NAMES),
+    26: ("Halpe", layouts.HALPE_26),
+    33: ("MediaPipe", layouts.MEDIAPIPE_33),
+    133: ("COCO-WholeBody", layouts.COCO_WHOLEBODY_133),
+    136: ("Halpe", layouts.HALPE_136),
+}
+PARTS = {"foot_kpts": 6, "face_kpts": 68, "lefthand_kpts": 21, "righthand_kpts": 21}  # of COCO-WholeBody, beside 17
+SCORES = ("keypoint_scores", "keypoints_scores", "scores", "keypoints_visible")
+SCORE = ("score", "confidence", "visibility", "visible")  # of a point that is an object
+TRACKS = ("track_id", "tracking_id", "idx")
+ELSE = ("keypoints3D", "keypoints_3d", "face_keypoints", "face_kpts", "face_keypoints_2d", "keypoints3d")
+FACE = "68 points of the face"
 
 
 def matches(content: Any) -> bool:
-    people = entries(content)
-    return people is not None and not (people and "foot_kpts" in people[0]) and _count(people) != 133
+    return entries(content) is not None
 
 
 def images(content: Any, source: str) -> list[Image]:
-    return by_image(content, source, lambda entry, place: points_of(entry, len(NAMES), place))
+    """People sorted into their images."""
+    described = _described(content, source)
+    grouped: dict[Any, list[tuple[int, Any]]] = {}
+    for index, entry in enumerate(entries(content) or []):
+        if entry.get("num_keypoints") == 0:  # COCO lists people without keypoints, too
+            continue
+        identity = entry.get("image_id")
+        if identity is not None and not isinstance(identity, (int, float, str)):
+            raise ValueError(
+                f"{source}: annotations[{index}]: image_id: expected a number or a name, got {plain(identity)}"
+            )
+        grouped.setdefault(identity, []).append((index, entry))
+    found = []
+    for identity, people in grouped.items():
+        about = described.get(identity, {})
+        label = about.get("file_name", identity)
+        place = source if label is None else f"{source}: {plain(label)}"
+        read = [each([entry], lambda entry, _, index=index: person(entry, f"{source}: annotations[{index}]"), source)[0]
+                for index, entry in people]  # fmt: skip
+        found.append(Image(place, read, size_of(about, place)))
+    return found or [Image(source, [])]
 
 
 def entries(content: Any) -> list[Any] | None:
     """The people of a file in COCO's form, None if it is none."""
     if isinstance(content, dict) and "annotations" in content:
         content = content["annotations"]
+        if not content:
+            return [] if isinstance(content, list) else None
     elif isinstance(content, dict) and "keypoints" in content:
         content = [content]
     if not isinstance(content, list) or not all(isinstance(entry, dict) for entry in content):
         return None
-    return content if not content or "keypoints" in content[0] else None
+    return content if any("keypoints" in entry for entry in content) else None
 
 
-def _count(people: list[Any]) -> int:
-    """How many keypoints the first person has."""
-    keypoints = people[0]["keypoints"] if people else []
-    flat = isinstance(keypoints, list) and not (keypoints and isinstance(keypoints[0], list))
-    return len(keypoints) // 3 if flat else len(keypoints)
+def _described(content: Any, source: str) -> dict[Any, dict[str, Any]]:
+    """What an annotation file says about its images, by their ids. ValueError if its points are not a body's."""
+    if not isinstance(content, dict):
+        return {}
+    categories, listed = content.get("categories"), content.get("images")
+    for category in categories if isinstance(categories, list) else []:
+        if isinstance(category, dict) and isinstance(category.get("keypoints"), list):
+            named(category["keypoints"], f"{source}: categories")
+    known = [image for image in listed if isinstance(image, dict)] if isinstance(listed, list) else []
+    return {image["id"]: image for image in known if isinstance(image.get("id"), (int, float, str))}
 
 
-def by_image(content: Any, source: str, person: Callable[[Any, str], Array]) -> list[Image]:
-    """People sorted into their images; `person` turns an entry into points (K, 3)."""
-    listed = content.get("images", []) if isinstance(content, dict) else []
-    described = {image["id"]: image for image in listed if isinstance(image, dict) and "id" in image}
-    found: dict[Any, Image] = {}
-    for index, entry in enumerate(entries(content) or []):
-        if entry.get("num_keypoints") == 0:  # COCO lists people without keypoints, too
-            continue
-        identity = entry.get("image_id")
-        if identity not in found:
-            about = described.get(identity, {})
-            label = about.get("file_name", identity)
-            size = (float(about["width"]), float(about["height"])) if {"width", "height"} <= set(about) else None
-            found[identity] = Image(source if label is None else f"{source}: {label}", [], size)
-        found[identity].people.append(person(entry, f"{source}: annotations[{index}]"))
-    return list(found.values()) or [Image(source, [])]
+def named(names: Sequence[Any], place: str) -> None:
+    """ValueError if a file says of its points that the first is no nose: then the order is none of `LAYOUTS`."""
+    if names and plain(names[0]).lower() != "nose":
+        said = ", ".join(plain(name) for name in names[:3])
+        raise ValueError(f"{place}: expected {counts(LAYOUTS)} points from the nose on, got {said}, …")
 
 
-def points_of(entry: Any, count: int, place: str, field: str = "keypoints") -> Array:
-    """Points (count, 3): x, y and score, or x, y and COCO's flag (0 not labelled, 1 hidden, 2 visible)."""
-    place = f"{place}: {field}"
-    if field not in entry:
-        raise ValueError(f"{place}: expected {count} points, got none")
-    if field == "keypoints" and "keypoint_scores" in entry:
-        points = numbers(entry[field], count, 2, place)
-        points = np.concatenate([points, numbers(entry["keypoint_scores"], count, 1, f"{place}: scores")], axis=1)
+def person(entry: Any, place: str) -> Person:
+    """A person's points and scores, or COCO's flags (0 not labelled, 1 hidden, 2 visible). ValueError."""
+    if not isinstance(entry, dict) or "keypoints" not in entry:
+        raise ValueError(f"{place}: expected keypoints, got none")
+    if "foot_kpts" in entry:
+        points, notes = _parts(entry, place), ()
     else:
-        points = numbers(entry[field], count, 3, place)
-    return confident(points, place)
+        points, notes = _points(entry, f"{place}: keypoints")
+    names = LAYOUTS[len(points)][1]
+    corner = (points[:, :2] == 0).all(axis=1) & (points[:, 2] > 0)
+    if corner.any():  # where trackers put what they did not find
+        points[corner, 2] = 0.0
+        notes = (*notes, "points at 0, 0 taken as not seen")
+    unused = [key for key in ELSE if entry.get(key) and not (key in PARTS and "foot_kpts" in entry)]
+    unused += [FACE] if len(points) in (133, 136) else []
+    track = next((track_of(entry[key]) for key in TRACKS if key in entry), None)
+    return Person(names, scored(points, place), track=track, notes=notes, unused=tuple(unused))
+
+
+def _parts(entry: dict[str, Any], place: str) -> Array:
+    """COCO-WholeBody's points, whose face and hands may be missing."""
+    body = [_flags(numbers(entry["keypoints"], len(NAMES), 3, f"{place}: keypoints"))]
+    for field, count in PARTS.items():
+        given = entry.get(field)
+        points = numbers(given, count, 3, f"{place}: {field}") if given else np.zeros((count, 3))
+        body.append(_flags(points))
+    return np.concatenate(body)
+
+
+def _points(entry: dict[str, Any], place: str) -> tuple[Array, tuple[str, ...]]:
+    """The points (K, 3) of one of the known layouts, and what was assumed of them."""
+    given, scores = entry["keypoints"], next((entry[key] for key in SCORES if isinstance(entry.get(key), list)), None)
+    if isinstance(given, list) and given and all(isinstance(point, dict) for point in given):
+        given, scores = _of_objects(given, scores, place)
+    elif isinstance(given, dict) and "x" in given and "y" in given:
+        scores = next((given[key] for key in ("visible", "confidence", "score") if key in given), scores)
+        given = _columns(given, place)
+    points = array(given, place)
+    if points.ndim == 1:
+        points = _rows(points, 3 if scores is None else 2, place)
+    if points.ndim != 2 or len(points) not in LAYOUTS or points.shape[1] not in (2, 3):
+        raise ValueError(f"{place}: expected {counts(LAYOUTS)} points of x, y and score, got {_count(points)}")
+    if points.shape[1] == 3:
+        if scores is not None:
+            raise ValueError(f"{place}: expected x and y beside keypoint_scores, got x, y and z: these are 3D points")
+        return _flags(finite(points, place)), ()
+    if scores is None:
+        return np.column_stack([finite(points, place), np.ones(len(points))]), ("no scores: all points taken as seen",)
+    seen = array(scores, f"{place}: scores").reshape(-1)
+    if len(seen) != len(points):
+        raise ValueError(f"{place}: scores: expected {len(points)} numbers, got {len(seen)}")
+    return finite(np.column_stack([points, np.nan_to_num(seen, nan=0.0)]), place), ()
+
+
+def _rows(flat: Array, columns: int, place: str) -> Array:
+    """A flat list as points."""
+    if len(flat) == 0 or len(flat) % columns:
+        raise ValueError(f"{place}: expected {counts(LAYOUTS)} points of {columns} numbers, got {len(flat)} numbers")
+    return flat.reshape(-1, columns)
+
+
+def _of_objects(given: list[Any], scores: Any, place: str) -> tuple[Any, Any]:
+    """Points and scores out of [{"x", "y", "score"}, ...]."""
+    if not all("x" in point and "y" in point for point in given):
+        raise ValueError(f"{place}: expected x and y of every point")
+    key = next((key for key in SCORE if all(key in point for point in given)), None)
+    points = [[point["x"], point["y"]] for point in given]
+    return points, scores if key is None else [point[key] for point in given]
+
+
+def _columns(given: dict[str, Any], place: str) -> Array:
+    x, y = (array(given[axis], f"{place}: {axis}").reshape(-1) for axis in ("x", "y"))
+    if len(x) != len(y):
+        raise ValueError(f"{place}: expected as many x as y, got {len(x)} and {len(y)}")
+    return np.column_stack([x, y])
+
+
+def _flags(points: Array) -> Array:
+    """Points with COCO's flags as scores; a label of 0, 1 or 2 is no measure of confidence."""
+    if np.isin(points[~np.isnan(points[:, 2]), 2], (0, 1, 2)).all():
+        points[:, 2] = points[:, 2].clip(0, 1)
+    return points
+
+
+def _count(points: Array) -> str:
+    return f"{len(points)} of {points.shape[1]} numbers" if points.ndim == 2 else f"shape {points.shape}"

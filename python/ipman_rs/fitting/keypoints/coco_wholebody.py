@@ -7,26 +7,21 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from . import coco
-from .hand import hand
-from .people import Array, Image
+from .coco import images
+from .layouts import COCO_WHOLEBODY_133 as NAMES
 
-FEET = tuple(f"{side}_{point}" for side in ("left", "right") for point in ("big_toe", "small_toe", "heel"))
-NAMES = (*coco.NAMES, *FEET, *(None,) * 68, *hand("left"), *hand("right"))
-PARTS = {"keypoints": 17, "foot_kpts": 6, "face_kpts": 68, "lefthand_kpts": 21, "righthand_kpts": 21}
+__all__ = ["NAMES", "images", "matches"]
 
 
 def matches(content: Any) -> bool:
-    return coco.entries(content) is not None and not coco.matches(content)
+    people = coco.entries(content)
+    return bool(people) and ("foot_kpts" in people[0] or _count(people[0].get("keypoints")) == len(NAMES))
 
 
-def images(content: Any, source: str) -> list[Image]:
-    return coco.by_image(content, source, _person)
-
-
-def _person(entry: Any, place: str) -> Array:
-    if "foot_kpts" not in entry:
-        return coco.points_of(entry, len(NAMES), place)
-    return np.concatenate([coco.points_of(entry, count, place, field) for field, count in PARTS.items()])
+def _count(keypoints: Any) -> int:
+    """How many keypoints a person has."""
+    if not isinstance(keypoints, list):
+        return 0
+    flat = not (keypoints and isinstance(keypoints[0], (list, dict)))
+    return len(keypoints) // 3 if flat else len(keypoints)

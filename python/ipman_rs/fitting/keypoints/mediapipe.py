@@ -4,90 +4,183 @@
  "landmarks": [[x, y, z, visibility], ...],           x and y relative to the image's width and height
  "world_landmarks": [[x, y, z, visibility], ...]}     metres from between the hips, y down, z away from the camera
 
-Read are also `pose_landmarks`, `poseLandmarks`, `pose_world_landmarks`, `poseWorldLandmarks` and `worldLandmarks`,
-points as {"x", "y", "z", "visibility"}, a bare list of 33 points, and x and y in pixels: they are taken for relative
-where no visible one is beyond ±3. Relative ones need an image size, in the file or given.
+Read are also the names of MediaPipe's APIs (`pose_landmarks`, `poseLandmarks`, `pose_world_landmarks`, ...), protobuf's
+`MessageToDict` ({"landmark": [...]}), points as {"x", "y", "z", "visibility"} in a list or by their names, a bare list
+of 33 points, lists of such people, and lists of such images. x and y in pixels are read, too: points are taken for
+relative where no visible one is beyond ±3. Relative ones need an image size, in the file or given.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .people import Array, Image, confident, numbers
+from .layouts import MEDIAPIPE_33 as NAMES
+from .people import Array, Image, Person, numbers, plain, scored, size_of, width_height
 
-
-def _both(point: str) -> tuple[str, str]:
-    return f"left_{point}", f"right_{point}"
-
-
-NAMES = (
-    "nose", None, "left_eye", None, None, "right_eye", None, *_both("ear"), None, None, *_both("shoulder"),
-    *_both("elbow"), *_both("wrist"), *_both("pinky"), *_both("index"), *_both("thumb"), *_both("hip"), *_both("knee"),
-    *_both("ankle"), *_both("heel"), *_both("big_toe"),
-)  # fmt: skip
 FORMAT = "mediapipe-pose"
-IMAGE_KEYS = ("landmarks", "pose_landmarks", "poseLandmarks")
+IMAGE_KEYS = ("landmarks", "pose_landmarks", "poseLandmarks", "landmark", "normalized_landmarks", "normalizedLandmarks")
 WORLD_KEYS = ("world_landmarks", "pose_world_landmarks", "poseWorldLandmarks", "worldLandmarks")
-RELATIVE = 3.0
+LANDMARK_NAMES = (
+    "nose", "left_eye_inner", "left_eye", "left_eye_outer", "right_eye_inner", "right_eye", "right_eye_outer",
+    "left_ear", "right_ear", "mouth_left", "mouth_right", *(str(name) for name in NAMES[11:31]), "left_foot_index",
+    "right_foot_index",
+)  # fmt: skip
+AROUND = ("frames", "results", "poses")
+ALL_SEEN = "no visibility: all points taken as seen"
 
 
 def matches(content: Any) -> bool:
-    if isinstance(content, dict):
-        return any(key in content for key in IMAGE_KEYS)
-    return (
-        isinstance(content, list)
-        and len(content) > 0
-        and isinstance(content[0], dict)
-        and {"x", "y"} <= set(content[0])
-    )
+    return bool(_frames(content))
 
 
 def images(content: Any, source: str) -> list[Image]:
-    """A single image; points relative to it are scaled where the file has its size."""
-    given = content if isinstance(content, dict) else {"landmarks": content}
-    found = _points(given, IMAGE_KEYS, source)
-    if found is None:
-        return [Image(source, [])]
+    """A row for each image of the file."""
+    frames = _frames(content)
+    size = _size(content, source) if isinstance(content, dict) else None
+    found = []
+    for index, frame in enumerate(frames):
+        place = source if len(frames) == 1 else f"{source}: frame {index}"
+        given = {"landmarks": frame} if isinstance(frame, list) else frame or {}
+        found.append(Image(place, _people(given, place), _size(given, place) or size))
+    return found
+
+
+def _frames(content: Any) -> list[Any]:
+    """The images of a file: objects with one of the keys, in a list or by name, or lists of points or of people."""
+    if isinstance(content, dict):
+        if _has_landmarks(content):
+            return [content]
+        inside = next((content[key] for key in AROUND if isinstance(content.get(key), list)), [*content.values()])
+        return inside if _are_frames(inside) else []
+    if not isinstance(content, list) or not content:
+        return []
+    if _are_frames(content):
+        return content
+    return [content] if _is_point(content[0]) or _is_person(content[0]) else []
+
+
+def _has_landmarks(content: Any) -> bool:
+    return isinstance(content, dict) and any(key in content for key in (*IMAGE_KEYS, *WORLD_KEYS))
+
+
+def _are_frames(content: list[Any]) -> bool:
+    """Whether these are images; one in which nobody was found may be null or empty."""
+    return any(map(_has_landmarks, content)) and all(not frame or isinstance(frame, dict) for frame in content)
+
+
+def _is_point(value: Any) -> bool:
+    return isinstance(value, dict) and "x" in value and "y" in value
+
+
+def _is_person(value: Any) -> bool:
+    """Whether this is a list of points, as objects or as three or four numbers, or an object around one."""
+    if isinstance(value, dict):
+        return any(isinstance(value.get(key), list) for key in ("landmark", "landmarks"))
+    return isinstance(value, list) and len(value) > 0 and (_is_point(value[0]) or isinstance(value[0], list))
+
+
+def _size(given: dict[str, Any], place: str) -> tuple[float, float] | None:
     size = given.get("image_size")
-    width_height = None if size is None else tuple(numbers(size, 1, 2, f"{source}: image_size")[0].tolist())
-    image = Image(source, [found[:, [0, 1, 3]]], width_height, _points(given, WORLD_KEYS, source))
-    return [image]
+    if isinstance(size, (dict, list)):
+        return size_of(size, place) if isinstance(size, dict) else width_height(size, place)
+    if size is not None:
+        raise ValueError(f"{place}: image_size: expected width and height, got {plain(size)}")
+    return size_of(given, place)
 
 
-def is_relative(points: Array) -> bool:
-    """Whether the x and y of points (33, 3) are shares of the image's width and height."""
-    seen = points[points[:, 2] > 0.5] if (points[:, 2] > 0.5).any() else points
-    return bool((abs(seen[:, :2]) <= RELATIVE).all())
-
-
-def _points(given: dict[str, Any], keys: tuple[str, ...], source: str) -> Array | None:
-    """The points (33, 4), None if there are none under these keys."""
-    key = next((key for key in keys if given.get(key)), None)
+def _people(given: dict[str, Any], place: str) -> list[Person | str]:
+    """Everybody in one image, with their world landmarks where there are as many."""
+    key = next((key for key in IMAGE_KEYS if given.get(key)), None)
+    world_key = next((key for key in WORLD_KEYS if given.get(key)), None)
     if key is None:
-        return None
-    points = given[key]
+        if world_key is None:
+            return []
+        raise ValueError(f"{place}: {world_key}: expected landmarks in the image, too: metres are no places in it")
+    people = _listed(given[key])
+    worlds = [] if world_key is None else _listed(given[world_key])
+    unused = tuple(
+        name
+        for name in given
+        if ("landmark" in name.lower() or "mask" in name.lower()) and name not in (key, world_key) and given[name]
+    )
+    if worlds and len(worlds) != len(people):
+        worlds, unused = [], (*unused, str(world_key))
+    found: list[Person | str] = []
+    for index, points in enumerate(people):
+        where = f"{place}: {key}" + (f"[{index}]" if len(people) > 1 else "")
+        try:
+            four, notes = _points(points, where)
+            world = _points(worlds[index], f"{place}: {world_key}")[0] if worlds else None
+            if world is not None:
+                world = np.nan_to_num(world)
+                world[:, 3] = world[:, 3].clip(0, 1)
+            found.append(Person(NAMES, four[:, [0, 1, 3]], world, notes=notes, unused=unused))
+        except ValueError as error:
+            found.append(str(error))
+    return found
+
+
+def _listed(value: Any) -> list[Any]:
+    """The people under a key: several in a list, or one."""
+    if isinstance(value, list) and value and _is_person(value[0]):
+        return value
+    if isinstance(value, list) and value and all(point == [] for point in value):
+        return []
+    several = isinstance(value, list) and any(_is_person(person) for person in value)
+    return value if several else [value]
+
+
+def _points(points: Any, place: str) -> tuple[Array, tuple[str, ...]]:
+    """A person's points (33, 4), and what was assumed of them."""
     if isinstance(points, dict):
-        points = points.get("landmark", points)
-    if isinstance(points, list) and len(points) == 1:  # a list of people with one of them
-        points = points[0]
-    place = f"{source}: {key}"
-    if isinstance(points, list):
-        points = [_four(point, f"{place}[{index}]") for index, point in enumerate(points)]
-    four = numbers(points, len(NAMES), 4, place)
-    confident(four[:, 1:], place)
-    return np.column_stack([four[:, :3], four[:, 3].clip(0, 1)])
+        points = next((points[key] for key in ("landmark", "landmarks") if key in points), points)
+    if isinstance(points, dict):
+        points = _by_name(points, place)
+    if not isinstance(points, list) or len(points) not in (len(NAMES), 4 * len(NAMES)):
+        got = f"{len(points)}" if isinstance(points, list) else type(points).__name__
+        raise ValueError(f"{place}: expected {len(NAMES)} points, got {got}")
+    if not all(isinstance(point, (dict, list)) for point in points):
+        return _visible(numbers(points, len(NAMES), 4, place), place), ()
+    rows = [_four(point, f"{place}[{index}]") for index, point in enumerate(points)]
+    assumed = any(row[3] is None for row in rows)
+    four = numbers([[*row[:3], 1.0 if row[3] is None else row[3]] for row in rows], len(NAMES), 4, place)
+    return _visible(four, place), (ALL_SEEN,) if assumed else ()
 
 
-def _four(point: Any, place: str) -> Any:
-    if not isinstance(point, dict):
-        return point
-    if not {"x", "y"} <= set(point):
-        raise ValueError(f"{place}: expected x and y, got {', '.join(point) or 'nothing'}")
-    return [point["x"], point["y"], point.get("z", 0.0), point.get("visibility", 1.0)]
+def _visible(four: Array, place: str) -> Array:
+    """Points (33, 4) whose visibility can be one. ValueError for others."""
+    scored(four[:, 1:], place)
+    return four
+
+
+def _by_name(points: dict[str, Any], place: str) -> list[Any]:
+    """Points by MediaPipe's names of them, in any case, in its order."""
+    given = {str(name).lower().replace(" ", "_"): point for name, point in points.items()}
+    missing = [name for name in LANDMARK_NAMES if name not in given]
+    if missing:
+        raise ValueError(f"{place}: expected MediaPipe's {len(NAMES)} points, got none of the name {missing[0]}")
+    return [given[name] for name in LANDMARK_NAMES]
+
+
+def _four(point: Any, place: str) -> list[Any]:
+    """x, y, z and visibility, None where it is not known."""
+    if isinstance(point, list):
+        if len(point) not in (2, 3, 4):
+            raise ValueError(f"{place}: expected x, y, z and visibility, got {len(point)} numbers")
+        return [*point[:3], *([0.0] if len(point) == 2 else []), point[3] if len(point) == 4 else None]
+    if not _is_point(point):
+        raise ValueError(f"{place}: expected x and y, got {_keys(point)}")
+    seen = next((point[key] for key in ("visibility", "score", "presence") if point.get(key) is not None), None)
+    return [point["x"], point["y"], point.get("z", 0.0), seen]
+
+
+def _keys(point: Iterable[Any]) -> str:
+    return ", ".join(str(key) for key in point)[:80] or "nothing"
 
 
 def write(path: str | Path, image: str, size: tuple[int, int], landmarks: Array, world: Array) -> None:

@@ -12,7 +12,6 @@ z = A leaky(C θ + d) + b with two matrices multiplied out beforehand in float64
 from __future__ import annotations
 
 import os
-import pickle
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from torch import Tensor
 from torch.nn.functional import leaky_relu
 
 from ipman_rs.body import joints
+from ipman_rs.files import regular
 
 from ..candidate import Candidate
 from ..problem import Problem
@@ -59,25 +59,28 @@ def affine(map: Tensor, rows: Tensor) -> Tensor:
 
 def load(path: Path) -> tuple[Tensor, Tensor]:
     """The encoder's two affine maps, (512, 64) and (32, 513). ValueError if the file is not such a checkpoint."""
+    regular(path)
     try:
         content = torch.load(path, map_location="cpu", weights_only=True)
-    except (pickle.UnpicklingError, RuntimeError, EOFError) as error:
+    except Exception as error:  # damaged bytes can fail in any way
         raise ValueError(
             f"{path}: cannot be read as a file of tensors, and nothing else is loaded. If it is a VPoser v2 checkpoint "
             "with more in it, save its `state_dict` by itself where you trust it: torch.save({'state_dict': ...})"
         ) from error
     state = content.get("state_dict", content) if isinstance(content, dict) else {}
+    state = state if isinstance(state, dict) else {}
     encoder = {
-        name.partition("encoder_net.")[2]: value.double()
+        str(name).partition("encoder_net.")[2]: value
         for name, value in state.items()
         if "encoder_net." in str(name) and isinstance(value, Tensor)
     }
     try:
+        encoder = {name: value.double() for name, value in encoder.items()}
         first = _after_norm(_linear(encoder, "2"), encoder, "1")
         second = _after_norm(_linear(encoder, "6"), encoder, "4")
         for layer in ("7", "8.mu"):
             second = _linear(encoder, layer) @ second
-    except (KeyError, RuntimeError) as error:
+    except Exception as error:  # tensors that are missing, sparse, or of other shapes
         raise ValueError(
             f"{path}: expected the encoder of VPoser v2 (batch norm, linear, batch norm, three linear), got "
             f"{', '.join(encoder) or 'no encoder_net'}: {error}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import torch
 
@@ -48,7 +48,7 @@ class Keypoints:
             self._drawn(TRAINING, self.people, lambda done: progress(done, count))
             self._drawn(SPLITS[self.split], self.bodies, lambda done: progress(self.people + done, count))
 
-    def see(self, seed: int, plan: Drill, place: Path) -> None:
+    def see(self, seed: int, plan: Drill, file: BinaryIO) -> None:
         """Nothing: keypoints are given."""
 
     def training(self, seen: Path | None = None) -> Batch:

@@ -4,10 +4,9 @@ regressor from keypoints is trained on what it finds."""
 from __future__ import annotations
 
 import dataclasses
-import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import torch
@@ -17,6 +16,7 @@ import ipman_rs.data
 import ipman_rs.torch as ipt
 from ipman_rs.body import load_body
 from ipman_rs.data.rendered import Rendered
+from ipman_rs.files import being_written
 
 from ..augment import Augmenting, normalised
 from ..batch import Batch
@@ -71,7 +71,7 @@ class Pictures:
             if not place.exists():
                 _save(_cut(data, cuts, progress), place)
 
-    def see(self, seed: int, plan: Drill, place: Path) -> None:
+    def see(self, seed: int, plan: Drill, file: BinaryIO) -> None:
         """The file gets the backbone, and the keypoints (n, K, 3) that it finds in the crops that are trained on."""
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
@@ -83,7 +83,7 @@ class Pictures:
         generator = torch.Generator().manual_seed(seed)
         parts = (crops[start : start + AT_ONCE] for start in range(0, len(crops), AT_ONCE))
         found = torch.cat([found_by(eye, tinted(part, generator)) for part in parts])
-        torch.save({"backbone": eye.state_dict(), "keypoints": found}, place)
+        torch.save({"backbone": eye.state_dict(), "keypoints": found}, file)
 
     def training(self, seen: Path | None = None) -> Batch:
         """With what was seen as inputs, else with crops."""
@@ -184,6 +184,5 @@ def _cut(data: Rendered, cuts: int, progress: Progress | None) -> Batch:
 
 def _save(batch: Batch, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_suffix(".part")
-    torch.save(vars(batch), beside)
-    os.replace(beside, path)
+    with being_written(path) as file:
+        torch.save(vars(batch), file)

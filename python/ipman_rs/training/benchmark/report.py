@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -12,6 +13,8 @@ from typing import Any
 import jinja2
 import numpy as np
 from numpy.typing import NDArray
+
+from ipman_rs.files import being_written, write_whole
 
 from ..figures import Figures
 from .claims import UNITS, judged
@@ -47,11 +50,11 @@ def write(found: Found, run: Benchmark) -> Path:
         "rows": [asdict(row) for row in run.rows],
         "blocks": [_record(tilt, results) for tilt, results in found.items()],
     }
-    (run.folder / f"{name}.json").write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
+    write_whole(run.folder / f"{name}.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
     _write_csv(found, run.folder / f"{name}.csv")
     _plot(record["blocks"], run.folder / f"{name}.svg")
     path = run.folder / f"{name}.md"
-    path.write_text(page(record))
+    write_whole(path, page(record))
     return path
 
 
@@ -148,7 +151,7 @@ def _signed(value: float, digits: int = 1) -> str:
 
 def _write_csv(found: Found, path: Path) -> None:
     """A line a body, row and seed."""
-    with path.open("w", newline="") as file:
+    with being_written(path) as stream, io.TextIOWrapper(stream, "utf-8", newline="") as file:
         lines = csv.writer(file)
         lines.writerow(["labels", "row", "seed", "body", *COLUMNS])
         for tilt, results in found.items():
@@ -183,8 +186,9 @@ def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:
         axis.set_title(f"{key} against HMR*, {'mm' if key == 'PVE' else 'points'}", fontsize=9)
         axis.tick_params(labelsize=8)
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
-    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "training_benchmark"}):
-        figure.savefig(path, metadata={"Date": None})
+    fonts = matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "training_benchmark"})
+    with fonts, being_written(path) as file:
+        figure.savefig(file, format="svg", metadata={"Date": None})
 
 
 def _row(block: dict[str, Any], name: str) -> dict[str, Any]:

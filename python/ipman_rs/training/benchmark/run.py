@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import torch
 
+from ipman_rs.files import being_written
 from ipman_rs.fitting.fit import one_thread
 from ipman_rs.presets import get
 from ipman_rs.processes import end_with_parent
@@ -89,14 +89,12 @@ class Benchmark:
         place = self._place(job)
         if place.exists():
             return
-        beside = place.with_suffix(".part.npz")
-        with one_thread():
+        with one_thread(), being_written(place) as file:
             if job.tilt is None:
                 assert self.plan.first
-                self.task.see(job.seed, self.plan.first, beside)
+                self.task.see(job.seed, self.plan.first, file)
             else:
-                self._train(job, job.tilt, beside)
-        os.replace(beside, place)
+                self._train(job, job.tilt, file)
 
     def _all(self, jobs: Sequence[Job], workers: int) -> Iterable[None]:
         waiting = [job for job in jobs if not self._place(job).exists()]
@@ -124,7 +122,7 @@ class Benchmark:
         seen = self._seen(job.seed)
         return job.tilt is None or seen is None or seen.exists()
 
-    def _train(self, job: Job, tilt: float, place: Path) -> None:
+    def _train(self, job: Job, tilt: float, file: BinaryIO) -> None:
         """The file gets weights, or figures of a row."""
         model, data, posing = self.task.lifter(job.seed), self._data(job.seed, tilt), self.task.posing()
         if job.row is not None:
@@ -136,10 +134,10 @@ class Benchmark:
         plan, seed = (self.plan.base, job.seed) if job.row is None else (self.plan.fine, 1000 + job.seed)
         drill(model, lambda batch: loss(model(batch.inputs), batch)[0], data, self.task.noisy, plan, seed)
         if job.row is None:
-            torch.save(model.state_dict(), place)
+            torch.save(model.state_dict(), file)
         else:
             truth = self._truth(job.seed)
-            figures(estimated(model, truth.inputs), truth, posing).save(place)
+            figures(estimated(model, truth.inputs), truth, posing).save(file)
 
     def _data(self, seed: int, tilt: float) -> Batch:
         """The last one is kept."""

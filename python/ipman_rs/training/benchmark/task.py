@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, BinaryIO, Protocol
 
 import torch
 
@@ -49,7 +49,7 @@ class Task(Protocol):
         """Draw or read the data, and keep them in files."""
         ...
 
-    def see(self, seed: int, plan: Drill, place: Path) -> None:
+    def see(self, seed: int, plan: Drill, file: BinaryIO) -> None:
         """Learn to see keypoints; what `training` and `truth` need of it goes into a file."""
         ...
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ipman_rs.body import joints, load_body, poses
+from ipman_rs.files import being_written
 from ipman_rs.fitting.benchmark.scenes import FAMILIES, TRIES, perturbed, settle
 
 Array = NDArray[np.floating]
@@ -43,7 +44,8 @@ class Bodies:
         return Bodies(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
     def save(self, path: Path) -> None:
-        np.savez_compressed(path, **vars(self))
+        with being_written(path) as file:
+            np.savez_compressed(file, **vars(self))
 
     @classmethod
     def load(cls, path: Path) -> Bodies:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
-import pickle
 from typing import Any
 
 import torch
 
+from ipman_rs.files import regular
+
 
 def read_checkpoint(path: str | os.PathLike[str]) -> Any:
     """The content, on the CPU. ValueError, naming the file, if it cannot be read."""
+    regular(path)
     try:
         return torch.load(path, map_location="cpu", weights_only=True)
-    except (OSError, RuntimeError, EOFError, ValueError, KeyError, pickle.UnpicklingError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+    except Exception as error:  # damaged bytes can fail in any way
+        reason = str(error).splitlines()[0] if str(error).strip() else type(error).__name__
         raise ValueError(f"{path}: cannot be read as a checkpoint of plain tensors: {reason}") from None

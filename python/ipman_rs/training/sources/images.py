@@ -15,6 +15,7 @@ from torch import Tensor
 from ipman_rs.body import BodyModel, rotations
 from ipman_rs.body.embedded import kind_of
 from ipman_rs.data import DataSet, Frames
+from ipman_rs.files import regular
 
 from ..augment import Augmentation, Augmenting, Pixels, cut, follow, normalised, to_crop
 from ..posing import HIPS, REGRESSED
@@ -172,7 +173,7 @@ class Images:
             return Image.fromarray(own(row))
         if frame.images is None:
             raise BadSample(f"{frame.names[0]}: no image")
-        with Image.open(self.folder / str(frame.images[0])) as image:
+        with Image.open(regular(self.folder / str(frame.images[0])), formats=("JPEG", "MPO", "PNG")) as image:
             return image.convert("RGB")
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from ipman_rs.files import parse_yaml, read_yaml
 from ipman_rs.presets import PRESETS
 
 from ..augment import Augmenting
@@ -90,14 +92,7 @@ def load(path: Path, changes: Sequence[str] = ()) -> Config:
 
     ValueError, naming the file and the entry, for what is unknown or of the wrong kind.
     """
-    import yaml
-
-    try:
-        content = yaml.safe_load(path.read_text())
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read: {error}") from None
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path}: not YAML: {error}") from None
+    content = read_yaml(path)
     try:
         if not isinstance(content, dict):
             raise ValueError(f"expected names with values, got {content!r}")
@@ -142,8 +137,6 @@ def plain(settings: Config) -> dict[str, Any]:
 
 
 def _change(content: dict[str, Any], change: str) -> None:
-    import yaml
-
     name, given, value = change.partition("=")
     if not given:
         raise ValueError(f"{change}: expected name=value")
@@ -152,7 +145,10 @@ def _change(content: dict[str, Any], change: str) -> None:
         content = content.setdefault(group, {})
         if not isinstance(content, dict):
             raise ValueError(f"{name}: {group} has no entries")
-    content[last] = yaml.safe_load(value)
+    try:
+        content[last] = parse_yaml(value)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
 
 
 def _made(kind: Any, content: Any, place: str) -> Any:
@@ -179,6 +175,8 @@ def _value(hint: Any, value: Any, place: str) -> Any:
             raise ValueError(f"{place}: expected a list of data sets, got {value!r}")
         return tuple(_made(DataSet, one, f"{place}[{number}]") for number, one in enumerate(value))
     if hint is float and isinstance(value, (int, float)) and not isinstance(value, bool):
+        if not math.isfinite(value):
+            raise ValueError(f"{place}: expected a finite number, got {value!r}")
         return float(value)
     if hint is str and isinstance(value, (str, int)) and not isinstance(value, bool):
         return str(value)

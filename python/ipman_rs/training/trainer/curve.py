@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import csv
+import errno
+import io
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import lightning
+
+from ipman_rs.files import write_whole
 
 
 class Curve(lightning.Callback):
@@ -36,13 +40,20 @@ class Curve(lightning.Callback):
             self._write("validation.csv", trainer.global_step, found)
 
     def _write(self, name: str, step: int, numbers: Mapping[str, float]) -> None:
-        path = self.folder / name
-        fresh = not path.exists()
-        with path.open("a", newline="") as file:
-            lines = csv.writer(file)
-            if fresh:
-                lines.writerow(["step", *numbers])
-            lines.writerow([step, *(repr(value) for value in numbers.values())])
+        path, text = self.folder / name, io.StringIO()
+        lines = csv.writer(text)
+        if not path.exists():
+            lines.writerow(["step", *numbers])
+        lines.writerow([step, *(repr(value) for value in numbers.values())])
+        content = text.getvalue().encode()
+        with path.open("ab", buffering=0) as file:
+            end = file.tell()
+            try:
+                if file.write(content) != len(content):
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            except OSError:  # whole lines stay
+                file.truncate(end)
+                raise
 
 
 def _drop_after(path: Path, last: int) -> None:
@@ -51,6 +62,4 @@ def _drop_after(path: Path, last: int) -> None:
     head, *lines = path.read_text().splitlines(keepends=True)
     # A kill may have cut the last line short.
     kept = [line for line in lines if line.endswith("\n") and int(line.partition(",")[0]) <= last]
-    rest = path.with_suffix(".rest")
-    rest.write_text("".join([head, *kept]))
-    os.replace(rest, path)
+    write_whole(path, "".join([head, *kept]))

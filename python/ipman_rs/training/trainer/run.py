@@ -11,8 +11,10 @@ import lightning
 from lightning.pytorch.callbacks import ModelCheckpoint
 from lightning.pytorch.loggers import TensorBoardLogger
 
+from ipman_rs.files import write_whole
+
 from .checkpoints import AtEnd, WholeFiles
-from .config import Config, config, plain
+from .config import Config, load, plain
 from .curve import Curve
 from .module import Training
 
@@ -69,7 +71,7 @@ def _keep(settings: Config, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / SETTINGS
     if path.exists():
-        before = config(yaml.safe_load(path.read_text()))
+        before = load(path)
         same = {name: getattr(before, name) for name in FREE if name != "steps" or before.schedule == "constant"}
         changed = dataclasses.replace(settings, **same)
         for entry in dataclasses.fields(Config):
@@ -77,7 +79,7 @@ def _keep(settings: Config, folder: Path) -> None:
                 raise ValueError(
                     f"{folder}: has a run with another {entry.name} ({path}); choose another folder, or remove it"
                 )
-    path.write_text(yaml.safe_dump(plain(settings), sort_keys=False))
+    write_whole(path, yaml.safe_dump(plain(settings), sort_keys=False))
 
 
 def _callbacks(settings: Config, folder: Path) -> list[lightning.Callback]:

@@ -258,6 +258,8 @@
     $("source").textContent = body.source;
     $("method").textContent = body.method === "pcom" ? "(part-wise, pCoM)" : "(exact)";
     $("heat-top").textContent = `${body.top >= 3 ? "≥ " : ""}${+body.top.toPrecision(2)}`;
+    $("flags").replaceChildren(...body.flags.map((flag) => element("li", flag)));
+    $("flags").hidden = !body.flags.length;
     $("notes").replaceChildren(...body.notes.map((note) => element("li", note)));
     $("pictures-card").hidden = !body.pictures.length;
     $("pictures").replaceChildren(...body.pictures.map(({ title, src }) => {

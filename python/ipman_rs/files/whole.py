@@ -1,0 +1,93 @@
+"""Files that are there whole or not at all, whoever else writes into the folder and whenever the process ends."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import secrets
+from pathlib import Path
+from typing import Any, BinaryIO
+
+try:
+    from fcntl import LOCK_EX, LOCK_NB, flock
+except ImportError:  # Windows, which deletes no file that is open
+    LOCK_EX = LOCK_NB = 0
+
+    def flock(fd: Any, operation: int) -> None: ...
+
+
+_PART = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{12}\.part")
+
+
+class being_written:
+    """A file that appears under its name when it is whole: a process that dies leaves the old one, or none.
+
+    with being_written(path) as file: file.write(...)
+
+    It is written beside its place, under a name of its own, and then moved; a failure removes it. What a killed process
+    left of the same file is removed by the next that writes it: a living writer holds a lock.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+
+    def __enter__(self) -> BinaryIO:
+        _remove_leftovers(self.path)
+        self.part, self.file = _part(self.path)
+        return self.file
+
+    def __exit__(self, kind: Any, *_: Any) -> None:
+        try:
+            try:
+                if kind is None:
+                    self.file.flush()
+                    os.fsync(self.file.fileno())
+                    if os.name != "nt":
+                        os.replace(self.part, self.path)  # still locked, so that nobody takes it for a leftover
+            finally:
+                self.file.close()
+            if kind is None and os.name == "nt":
+                os.replace(self.part, self.path)
+        finally:
+            self.part.unlink(missing_ok=True)
+
+
+def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
+    """Write a file, text as UTF-8, so that it is there whole or not at all. Raises OSError."""
+    with being_written(path) as file:
+        file.write(content.encode() if isinstance(content, str) else content)
+
+
+def _part(path: Path) -> tuple[Path, BinaryIO]:
+    """A new file beside the path, open and locked."""
+    name = path.name.encode()[:200].decode(errors="ignore")  # file systems allow 255 bytes
+    while True:
+        part = path.with_name(f".{name}.{secrets.token_hex(6)}.part")
+        file = part.open("xb")
+        try:
+            flock(file, LOCK_EX | LOCK_NB)
+        except BlockingIOError:  # another process takes it for a leftover
+            file.close()
+            continue
+        except OSError:  # a file system without locks, on which no leftovers are removed
+            return part, file
+        if part.exists():
+            return part, file
+        file.close()
+
+
+def _remove_leftovers(path: Path) -> None:
+    """Unlocked parts of the same file."""
+    name = path.name.encode()[:200].decode(errors="ignore")
+    try:
+        entries = [entry for entry in os.scandir(path.parent) if entry.name.startswith(f".{name}.")]
+    except OSError:
+        return
+    for entry in entries:
+        known = _PART.fullmatch(entry.name)
+        if known is None or known["name"] != name:
+            continue
+        with contextlib.suppress(OSError), open(entry.path, "rb") as left:
+            flock(left, LOCK_EX | LOCK_NB)
+            os.unlink(entry.path)

@@ -1,0 +1,1 @@
+"""Bodies from files. `read_mesh.read_mesh(path)` reads .obj, .ply, .stl, .glb and .gltf files."""

@@ -1,0 +1,60 @@
+"""Meshes from .obj, .ply, .stl, .glb and .gltf files, in the order of their vertices."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import gltf, obj, ply, repair, stl
+from .repair import Mesh
+
+PARSERS = {".obj": obj.parse, ".ply": ply.parse, ".stl": stl.parse}
+ENDINGS = (*PARSERS, ".glb", ".gltf")
+
+
+def read_mesh(path: Path) -> Mesh:
+    """The surface in a file: what it holds is joined, posed by its skin, and repaired where a note says so.
+
+    ValueError, naming the file, for what is missing, damaged, of another kind, or no surface.
+    """
+    mesh = _parsed(path)
+    if not len(mesh.vertices) or not len(mesh.faces):
+        count = len(mesh.vertices)
+        what = f"it is a point cloud of {count} vertices and no faces" if count else "it is empty"
+        raise _unreadable(path, f"{what}, no surface; reconstruct one (MeshLab) or export the mesh")
+    try:
+        return repair.repaired(mesh)
+    except ValueError as error:
+        raise _unreadable(path, str(error)) from error
+
+
+def read_points(path: Path) -> NDArray[np.float64]:
+    """All vertices (V, 3) of a file, with or without faces. ValueError, naming the file."""
+    mesh = _parsed(path)
+    if not len(mesh.vertices) or not np.isfinite(mesh.vertices).all():
+        raise _unreadable(path, f"expected finite vertices, got {len(mesh.vertices)}")
+    return mesh.vertices
+
+
+def _parsed(path: Path) -> Mesh:
+    kind = path.suffix.lower()
+    if kind not in ENDINGS:
+        raise ValueError(f"{path}: unknown kind {kind or 'without ending'!r}; expected {' '.join(ENDINGS)}")
+    if not path.is_file():
+        raise ValueError(f"{path}: expected a mesh file, got {'no ordinary file' if path.exists() else 'no such file'}")
+    try:
+        content = path.read_bytes()
+        return PARSERS[kind](content) if kind in PARSERS else gltf.parse(content, path.parent)
+    except MemoryError:
+        raise
+    except ValueError as error:
+        raise _unreadable(path, str(error)) from error
+    except Exception as error:  # damaged bytes fail in any way
+        raise _unreadable(path, f"{type(error).__name__}: {str(error)[:160]}") from error
+
+
+def _unreadable(path: Path, reason: str) -> ValueError:
+    advice = "" if ";" in reason else "; export it again"
+    return ValueError(f"{path}: is no readable {path.suffix.lower()} mesh: {reason}{advice}")
