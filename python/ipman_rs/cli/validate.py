@@ -11,6 +11,7 @@ import click
 
 from .errors import FileError
 from .fit import needs
+from .options import METRES, RATE, UNIT, UP, force
 
 
 @click.command()
@@ -31,17 +32,37 @@ from .fit import needs
     help="Fit about so many frames a second. Accelerations, and with them the ZMP, need 24 or more.",
 )  # fmt: skip
 @click.option(
-    "--up", type=click.Choice(["x", "y", "z"]),
-    help="Which axis is up in markers and forces. Default: what a .c3d says, y in .trc, .mot and .sto.",
+    "--up", type=UP, metavar="AXIS",
+    help="What points up in markers, forces and centres of mass. Default: what a .c3d says, y in .trc, .mot and .sto.",
+)  # fmt: skip
+@click.option(
+    "--units", type=UNIT, metavar="UNIT",
+    help=f"Unit of the lengths in marker files: {', '.join(METRES)}, or a number of metres. Default: what they say.",
 )  # fmt: skip
 @click.option(
     "--force-units", "force_unit", type=click.Choice(["m", "cm", "mm"]), default="m", show_default=True,
     help="Unit of the centres of pressure in .mot and .sto, which do not say it.",
 )  # fmt: skip
+@click.option(
+    "--recorded-rate", type=RATE, metavar="HZ", help="Frames a second of the markers, where their files are wrong."
+)
+@click.option(
+    "--markers", type=click.Path(path_type=Path), metavar="FILE",
+    help="Places of markers with other names, as `ipman fit --markers` has them.",
+)  # fmt: skip
 @click.option("--subject", metavar="NAME", help="Whose markers (NAME:LASI), where a marker file has several people's.")
-@click.option("--force", is_flag=True, help="Compare also what cannot be a person.")
+@force
 @click.option("--fresh", is_flag=True, help="Fit again what was fitted before with the same files and options.")
-def validate(folder: Path, output: Path, model: str, person: str, rate: float, fresh: bool, **said: Any) -> None:
+def validate(
+    folder: Path,
+    output: Path,
+    model: str,
+    person: str,
+    rate: float,
+    fresh: bool,
+    recorded_rate: float | None,
+    **said: Any,
+) -> None:
     """Compare the engine's centre of mass, centre of pressure and pressure with measurements.
 
     FOLDER holds recordings of one person: markers (.trc, .c3d), force plates (.mot, .sto, or
@@ -67,6 +88,7 @@ def validate(folder: Path, output: Path, model: str, person: str, rate: float, f
     from . import console, validate_run
 
     try:
+        said["rate"] = recorded_rate
         plan = validate_run.plan(folder, output, model, person, rate, not fresh, **said)
     except (ValueError, ImportError) as error:
         raise click.UsageError(str(error)) from error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from ..body import safe_npz
 from ..data import check, judge, opensim
-from ..data.force_plates import ForcePlates, standing
+from ..data.force_plates import ForcePlates
 from ..data.tracks import Tracks
 from ..files import write_whole
 from ..fitting import config, markers
-from ..fitting.recorded import FEWEST
+from ..fitting.markers import own
+from ..fitting.recorded import FEWEST, judged_tracks
 from ..validation import Comparison, computed, figures, measured, pictures, report
 from ..validation.figures import SPREAD
 from ..validation.folder import Kinds, Trial, find
@@ -36,21 +37,19 @@ STILL = 0.01, 0.5  # m, s: whose markers move less about their means, for so lon
 
 @dataclass(frozen=True)
 class Plan:
-    """What one command is to do. `person`: "auto", "none", or the name of the recording whose shape is kept; `up` and
-    `force_unit` as the user says them of all files."""
+    """What one command is to do. `person`: "auto", "none", or the name of the recording whose shape is kept; `pace`:
+    frames a second that are fitted; `force_unit`: of the points in files of forces, which do not say it."""
 
     folder: Path
     output: Path
     trials: list[Trial]
     settings: Settings
     person: str
-    rate: float
+    pace: float
     resume: bool
     notes: list[str]
     unreadable: dict[Path, str]
-    up: str | None = None
     force_unit: str = "m"
-    force: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,17 +83,31 @@ class Told:
     failures: list[FileError] = field(default_factory=list)
 
 
-def plan(folder: Path, output: Path, model: str, person: str, rate: float, resume: bool, **said: Any) -> Plan:
-    """ValueError for a folder without recordings to compare, a recording or body model that is not there."""
+def plan(
+    folder: Path,
+    output: Path,
+    model: str,
+    person: str,
+    pace: float,
+    resume: bool,
+    force_unit: str = "m",
+    **of_markers: Any,
+) -> Plan:
+    """`pace`: frames a second to fit; `of_markers`: what `Settings` has of marker files.
+
+    ValueError for a folder without recordings to compare, a recording or body model that is not there.
+    """
     import ipman_rs as ip
 
     trials, notes, unreadable = find(folder, KINDS, output)
     names = [trial.name for trial in trials]
     if person not in ("auto", "none", *names):
         raise ValueError(f"--person: expected auto, none or one of {', '.join(names)}, got {person!r}")
-    ip.load_body(model)  # before anything is fitted
-    settings = Settings(config.load("markers"), model, subject=said.pop("subject", None))
-    return Plan(folder, output, trials, settings, person, rate, resume, notes, unreadable, **said)
+    settings = Settings(config.load("markers"), model, **of_markers)
+    body = ip.load_body(model)  # before anything is fitted
+    if settings.markers is not None:
+        own.read(settings.markers, body)
+    return Plan(folder, output, trials, settings, person, pace, resume, notes, unreadable, force_unit)
 
 
 def run(plan: Plan) -> tuple[list[Record], list[str], list[FileError]]:
@@ -127,8 +140,7 @@ def _person(plan: Plan, recordings: list[Measured], told: Told) -> list[Record]:
             if name == chosen:
                 told.notes.append(f"{name} could not be compared: the others found their shapes themselves")
             continue
-        if fit["unknown"]:
-            told.notes.append(f"{name}: markers without a known place, not used: {_some(fit['unknown'])}")
+        told.notes += [f"{name}: {note}" for note in fit["notes"] if note not in one.tracks.notes]
         if np.isnan(weight) and _weighs(records[-1]):
             weight = records[-1]["mass"]["plates"]
     return records
@@ -156,15 +168,11 @@ def _weighs(record: Record) -> bool:
     return quiet and mass["plates_std"] < SPREAD * mass["plates"] and not record["frames_beside_plates"]
 
 
-def _some(names: list[str], most: int = 12) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
-
-
 def _read(plan: Plan, trial: Trial, told: Told) -> Measured | None:
     """A recording's files, judged before anything is fitted; None, and a failure, if its markers cannot be used."""
     try:
         tracks = _tracks(plan, trial)
-        flags = [*_admitted(trial.markers, _of_markers(tracks), plan.force)]
+        flags = [*_admitted(trial.markers, _of_markers(plan, tracks), plan.settings.force)]
         told.notes += [f"{trial.name}: {note}" for note in tracks.notes]
     except FileError as error:
         told.failures.append(error)
@@ -189,21 +197,21 @@ def _read(plan: Plan, trial: Trial, told: Told) -> Measured | None:
 
 
 def _tracks(plan: Plan, trial: Trial) -> Tracks:
+    said = plan.settings
     try:
-        return markers.read(trial.markers, plan.up, plan.settings.subject)
-    except (ValueError, ImportError) as error:
+        return markers.read(trial.markers, said.up, said.subject, said.units, said.rate)
+    except ValueError as error:
         raise FileError(trial.markers, str(error)) from error
 
 
-def _of_markers(tracks: Tracks) -> list[check.Finding]:
-    """Whether units, axes and rate of markers can be right."""
-    some = np.unique(np.linspace(0, len(tracks) - 1, check.SAMPLE).astype(int))
-    seen = tracks.confidence[some] > 0
-    points = np.where(seen[..., None], tracks.points[some], np.nan)
-    found = check.size_of_body("markers", points)
-    if not any(each.level == "wrong" for each in found):
-        found += standing("markers", tracks.points[some], seen, "y")
-    return found + (judge.rate(tracks.rate) if len(tracks) > 1 else [])
+def _of_markers(plan: Plan, tracks: Tracks) -> list[check.Finding]:
+    """What the judge says of the markers before they are fitted; here --rate is another one."""
+    import ipman_rs as ip
+
+    said = plan.settings
+    names = None if said.markers is None else own.read(said.markers, ip.load_body(said.model))
+    found = judged_tracks(tracks, names, said.up is not None)
+    return [replace(each, option=each.option.replace("--rate", "--recorded-rate")) for each in found]
 
 
 def _admitted(path: Path, findings: Iterable[check.Finding], force: bool) -> tuple[str, ...]:
@@ -218,7 +226,7 @@ def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
     """Raises FileError for plates that cannot be read, or tell nothing of this recording."""
     assert trial.forces is not None
     try:
-        found = measured.plates(trial.forces, plan.up, plan.force_unit, trial.loads)
+        found = measured.plates(trial.forces, plan.settings.up, plan.force_unit, trial.loads)
     except (ValueError, ImportError) as error:
         raise FileError(trial.forces, str(error)) from error
     for each in opensim.loaded(found, tracks.times):
@@ -229,7 +237,7 @@ def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
 def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
     assert trial.com is not None
     try:
-        found = measured.center_of_mass(trial.com, tracks.times, plan.up, plan.settings.subject)
+        found = measured.center_of_mass(trial.com, tracks.times, plan.settings.up, plan.settings.subject)
     except ValueError as error:
         raise FileError(trial.com, str(error)) from error
     if not np.isfinite(found).any():
@@ -240,7 +248,7 @@ def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
 
 
 def _fitted(plan: Plan, one: Measured, person: str | None) -> Record:
-    every = max(1, round((one.tracks.rate or 1.0) / plan.rate))
+    every = max(1, round((one.tracks.rate or 1.0) / plan.pace))
     recording = Recording(one.trial.name, str(one.trial.markers), [one.trial.markers])
     return kept(recording, plan.settings, Pace(every), plan.output, plan.resume, person)
 
@@ -276,8 +284,7 @@ def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told)
         write_whole(folder / name, content)
     fitted = {"shape_from": fit["shape_from"], "markers": fit["mean_marker_error_m"], "converged": fit["converged"]}
     record = {**figures(compared), "body": plan.settings.model, "fit": fitted, "files": sorted(files)}
-    odd = [*judge.marker_error(fit["mean_marker_error_m"]), *judge.mass(record["mass"]["volume_mean"])]
-    return {**record, "flags": [*one.flags, *_admitted(trial.markers, odd, plan.force), *record["flags"]]}
+    return {**record, "flags": [*dict.fromkeys([*one.flags, *fit["flags"], *record["flags"]])]}
 
 
 def _drawn(compared: Comparison, stored: Any, points: NDArray[np.float64], told: Told) -> dict[str, bytes]:

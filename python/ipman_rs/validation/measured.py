@@ -15,6 +15,7 @@ from ..data.tracks import TO_Y_UP
 from ..files import regular
 
 Array = NDArray[np.float64]
+Up = tuple[float, float, float] | None  # a direction in a file's own axes; None: as it says
 
 NEITHER = "it has neither forces nor a centre of mass"
 CSV_COLUMNS = ("time_s", "com_x_m", "com_y_m", "com_z_m")
@@ -51,19 +52,21 @@ def has_center_of_mass(path: Path) -> bool:
         return False
 
 
-def plates(path: Path, up: str | None = None, unit: str = "m", loads: ExternalLoads | None = None) -> ForcePlates:
+def plates(path: Path, up: Up = None, unit: str = "m", loads: ExternalLoads | None = None) -> ForcePlates:
     """The force plates of a `.c3d`, `.mot` or `.sto` file, y up. ValueError, naming the file, for what is not right.
 
-    `up`: which axis of the file is up, if that is not what it says, or y; `unit`: of the points of a `.mot` or `.sto`;
+    `up`: what points up in the file, if that is not what it says, or y; `unit`: of the points of a `.mot` or `.sto`;
     `loads`: in which of its columns the forces are.
     """
     if path.suffix.lower() == ".c3d":
         found = c3d.read(path)
-        return force_plates.of_recording(found, up).turned(TO_Y_UP[up or found.up])
-    return opensim.plates(opensim.storage(path), unit, up or "y", loads).turned(TO_Y_UP[up or "y"])
+        axis = _axis(up, found.up, path)
+        return force_plates.of_recording(found, axis).turned(TO_Y_UP[axis])
+    axis = _axis(up, "y", path)
+    return opensim.plates(opensim.storage(path), unit, axis, loads).turned(TO_Y_UP[axis])
 
 
-def center_of_mass(path: Path, times: Array, up: str | None = None, subject: str | None = None) -> Array:
+def center_of_mass(path: Path, times: Array, up: Up = None, subject: str | None = None) -> Array:
     """A measured centre of mass (n, 3) m at these times, y up, NaN outside the file's. ValueError, naming the file.
 
     `up` as in `plates`; `subject`: whose, where a `.c3d` has several people.
@@ -73,13 +76,23 @@ def center_of_mass(path: Path, times: Array, up: str | None = None, subject: str
         points = found.center_of_mass(subject)
         if points is None:
             raise ValueError(f"{path}: expected a centre of mass by a model such as Plug-in Gait, it has none")
-        return between(found.times, points @ TO_Y_UP[up or found.up].T, times)
+        return between(found.times, points @ TO_Y_UP[_axis(up, found.up, path)].T, times)
     if path.suffix.lower() == ".csv":
         own, points = _csv(path)
     else:
         table = opensim.storage(path)
         own, points = table.times, opensim.center_of_mass(table)
-    return between(own, points @ TO_Y_UP[up or "y"].T, times)
+    return between(own, points @ TO_Y_UP[_axis(up, "y", path)].T, times)
+
+
+def _axis(up: Up, usual: str, path: Path) -> str:
+    """The axis that points up, of which `turned` knows the way to y. ValueError for another direction."""
+    if up is None:
+        return usual
+    named = [axis for axis, one in zip("xyz", np.eye(3), strict=True) if np.array_equal(up, one)]
+    if not named:
+        raise ValueError(f"{path}: up: expected x, y or z for forces and centres of mass, got {tuple(up)}")
+    return named[0]
 
 
 def judge(path: Path) -> str:
