@@ -229,7 +229,8 @@ def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
         found = measured.plates(trial.forces, plan.settings.up, plan.force_unit, trial.loads)
     except (ValueError, ImportError) as error:
         raise FileError(trial.forces, str(error)) from error
-    for each in opensim.loaded(found, tracks.times):
+    centers = found.at(tracks.times).center()
+    for each in opensim.loaded(found, tracks.times) or opensim.among(centers, tracks, "centre of pressure"):
         raise FileError(trial.forces, f"{each.what}; {each.advice}")
     return found
 
@@ -244,6 +245,8 @@ def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
         first, last = tracks.times[0], tracks.times[-1]
         what = f"no centre of mass while the markers were recorded, t {first:.2f} to {last:.2f} s"
         raise FileError(trial.com, f"{what}; are both of one recording, with one clock?")
+    for each in opensim.among(found, tracks, "centre of mass"):
+        raise FileError(trial.com, f"{each.what}; {each.advice}")
     return found
 
 

@@ -38,6 +38,7 @@ Array = NDArray[np.float64]
 
 COM = "center_of_mass"  # begins the columns of the whole body's centre of mass
 FAR = 20.0  # m: no plate or person is farther from the origin of a laboratory
+LONGER = 100  # times as long as the markers, without as many more samples: forces whose times are in another unit
 BESIDE = 0.5  # m: a centre of mass farther than that outside the markers is in other units or axes
 # ground_force_vx beside ground_torque_x; ground_force_1_vx beside ground_force_1_mx; f1_1 beside p1_1 and m1_1.
 OPENSIM_FORCE = re.compile(r"(.*)vx$")
@@ -219,6 +220,8 @@ def loaded(found: ForcePlates, times: Array) -> list[Finding]:
     said = f"forces t {begin:.2f} to {end:.2f} s, markers t {first:.2f} to {last:.2f} s"
     if end < first or begin > last:
         return [Finding("wrong", f"times do not overlap: {said}", "are both of one recording, with one clock?")]
+    if end - begin > LONGER * (last - first) and len(found) < LONGER * len(times):
+        return [Finding("wrong", f"times look like milliseconds: {said}", "expected seconds")]
     during = (found.times >= first) & (found.times <= last)
     loads = found.loads[during]
     most = float(np.nanmax(loads)) if np.isfinite(loads).any() else 0.0
@@ -346,19 +349,24 @@ def _frames(
 
 def _com_at(table: Storage, tracks: Tracks) -> Array:
     """(T, 3) m at the markers' times; NaN outside the storage's. ValueError if it is nowhere near the markers."""
-    points = center_of_mass(table)
-    found = between(table.times, points, tracks.times)
+    found = between(table.times, center_of_mass(table), tracks.times)
+    for each in among(found, tracks, "centre of mass"):
+        raise ValueError(f"{table.source}: {each.what}; {each.advice}")
+    return found
+
+
+def among(points: Array, tracks: Tracks, what: str) -> list[Finding]:
+    """Whether a centre of mass or of pressure (T, 3) m, NaN where there is none, is where the markers are."""
     seen = tracks.confidence.any(axis=1)
     shown = tracks.confidence[seen][..., None] > 0
     low = np.where(shown, tracks.points[seen], np.inf).min(axis=1)
     high = np.where(shown, tracks.points[seen], -np.inf).max(axis=1)
-    away = np.linalg.norm(np.maximum(0, np.maximum(low - found[seen], found[seen] - high)), axis=1)
-    if np.isfinite(away).any() and np.nanmedian(away) > BESIDE:
-        raise ValueError(
-            f"{table.source}: the centre of mass is {np.nanmedian(away):.2f} m outside the markers of {tracks.source}; "
-            "expected it among them: are both in metres, y up, and of one recording?"
-        )
-    return found
+    away = np.linalg.norm(np.maximum(0, np.maximum(low - points[seen], points[seen] - high)), axis=1)
+    away = away[np.isfinite(away)]
+    if not len(away) or np.median(away) <= BESIDE:
+        return []
+    said = f"the {what} is {np.median(away):.2f} m outside the markers of {tracks.source}"
+    return [Finding("wrong", said, "expected it among them: are both in metres, y up, and of one recording?")]
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
@@ -386,15 +394,16 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
             found += standing(file.name, tracks.points, tracks.confidence > 0, "y")
             found += sequences.told(file.name, _frames(name, tracks, list(tracks.names), forces, loads, com))
             if forces is not None:
-                found += _of_forces(plates(storage(forces), loads=loads), tracks.times, forces.name)
+                found += _of_forces(plates(storage(forces), loads=loads), tracks, forces.name)
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
     return found
 
 
-def _of_forces(found: ForcePlates, times: Array, name: str) -> list[Finding]:
+def _of_forces(found: ForcePlates, tracks: Tracks, name: str) -> list[Finding]:
+    judged = loaded(found, tracks.times) or among(found.at(tracks.times).center(), tracks, "centre of pressure")
     said = [Finding("odd", f"{name}: {note}") for note in found.notes]
-    return said + [Finding(each.level, f"{name}: {each.what}", each.advice) for each in loaded(found, times)]
+    return said + [Finding(each.level, f"{name}: {each.what}", each.advice) for each in judged]
 
 
 @dataclass(frozen=True)
