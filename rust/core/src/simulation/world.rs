@@ -1,6 +1,7 @@
 //! One body in a world of its own, in the engine rapier.
 
 use super::Place;
+use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, scale};
 use crate::solid::{GRAVITY, Solid};
 use rapier3d_f64::prelude::*;
@@ -28,7 +29,7 @@ impl Fall<'_> {
         self.set_accuracy(&mut world.integration_parameters);
         self.lay_ground(&mut world);
         let body = self.put_body(&mut world, centre);
-        let mut places = Vec::with_capacity(looks.len());
+        let mut places = memory::with_capacity(looks.len());
         let mut done = 0;
         for &look in looks {
             for _ in done..look {
