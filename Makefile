@@ -32,13 +32,15 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard rust-toolchain.toml) 
 	$(shell find rust -type d -o -name '*.rs' -o -name Cargo.toml)
 BINARY := python/ipman_rs/_core.abi3.so
 
-.PHONY: help demo demo-poses demo-fit test test-rust test-python test-levels lint format wheel bench clean FORCE
+.PHONY: help demo demo-poses demo-fit test test-rust test-python test-levels fuzz deny lint format wheel bench clean FORCE
 
 help:
 	@echo 'make demo     demo-poses: the named poses of the embedded body, analysed, report in $(OUT); and'
 	@echo '              demo-fit: a body fitted to the keypoints of a photo, report in $(FIT_OUT) (IMAGE=photo.png draws it'
 	@echo '              under them; installs torch, some minutes the first time, and takes ten seconds afterwards)'
 	@echo 'make test     every test, Rust and Python (installs torch and the test tools)'
+	@echo 'make fuzz     the Rust fuzz targets, FUZZ_SECONDS=60 each (an hour by hand: FUZZ_SECONDS=3600 FUZZ_SEED=2)'
+	@echo 'make deny     licences, sources and known holes of the Rust crates (installs cargo-deny; needs a network)'
 	@echo 'make lint     formats and lints checked, nothing changed'
 	@echo 'make format   sources formatted'
 	@echo 'make wheel    one wheel for all Pythons >= 3.10 in dist/, tried alone in a clean environment'
@@ -80,6 +82,14 @@ test-levels: $(VENV)/test-tools | test-python
 	for level in $$(python -c 'from ipman_rs import _core; print(*_core.simd_levels()[1:])'); do \
 		echo "CPU level $$level"; \
 		IPMAN_SIMD=$$level OMP_NUM_THREADS=1 python -m pytest -n auto $(LEVEL_TESTS); done
+
+# On stable Rust, with overflow checks; rust/fuzz/src/lib.rs says how cargo-fuzz runs the same targets.
+fuzz:
+	cargo run --locked -p ipman-fuzz -- all $(or $(FUZZ_SECONDS),60) $(or $(FUZZ_SEED),1)
+
+deny:
+	cargo deny --version >/dev/null 2>&1 || cargo install --locked cargo-deny
+	cargo deny --locked check licenses bans sources advisories
 
 lint: $(VENV)/test-tools $(VENV)/lint-tools
 	cargo fmt --all --check

@@ -213,10 +213,8 @@ def base_of_support(
     vertices: NDArray[Any],
     normal: NDArray[np.float64],
     height: NDArray[np.float64],
-) -> tuple[
-    NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]
-]:
-    """The corners (N, 3) of all polygons, and how many each has (B,); areas, margins and numbers of contacts, (B,) each."""
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """The corners (N, 3) of all polygons, and how many each has; areas, margins and numbers of contacts; (B,) each."""
 
 def bose_lp(
     template: Template,

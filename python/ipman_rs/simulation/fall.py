@@ -184,9 +184,7 @@ def _cross_check(
     solids = Solids.of_rows(
         _core.solids(template._core, options.densities, options.contact, vertices, normal, height)
     )  # fmt: skip
-    touching = of_each(
-        *_core.touching(template._core, options.shape, options.resolution, vertices, normal, height)
-    )
+    touching = of_each(*_core.touching(template._core, options.shape, options.resolution, vertices, normal, height))
     starts = solids.is_solid & ~(options.snap & ((solids.status & Status.NO_CONTACT) != 0))
     status = solids.status | np.where(starts & [len(points) == 0 for points in touching], Status.NOT_SIMULATED, 0)
     places = np.full((len(status), 1 + len(options.looks), 12), np.nan)

@@ -12,6 +12,9 @@ use std::sync::{Mutex, OnceLock};
 /// Items a thread does between two questions for an interruption.
 const WAVE: usize = 4;
 
+/// What the small vectors of a wave take at most, bytes: they are not asked for one by one.
+const WAVE_BYTES: usize = 1 << 20;
+
 /// Runs `f` on every item, on the pool if `parallel`. Between waves the calling thread asks whether to give up.
 pub fn each<I: Send>(
     items: Vec<I>,
@@ -27,7 +30,7 @@ pub fn each<I: Send>(
             if interrupted() {
                 return Err(Error::Interrupted);
             }
-            memory::ask(0);
+            memory::ask(WAVE_BYTES);
             let wave = items.by_ref().take(length);
             match pool {
                 None => wave.for_each(f),

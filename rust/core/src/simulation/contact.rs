@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::number::vector::Vec3;
+use crate::threads::num_threads;
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::parry::transformation::try_convex_hull;
 use rapier3d_f64::parry::transformation::vhacd::{VHACD, VHACDParameters};
@@ -34,7 +35,7 @@ impl Shape {
         let corners = match self {
             Shape::Hull => corners(&points)?,
             Shape::Decomposition { resolution, faces } => {
-                memory::ask(VOXEL_BYTES * (*resolution as usize).pow(3));
+                memory::ask(VOXEL_BYTES * (*resolution as usize).pow(3) * num_threads());
                 let parameters = VHACDParameters { resolution: *resolution, ..VHACDParameters::default() };
                 let parts = VHACD::decompose(&parameters, &points, faces, false);
                 let hulls = parts.compute_convex_hulls(parameters.convex_hull_downsampling);
@@ -46,11 +47,11 @@ impl Shape {
     }
 }
 
-/// What the engine's voxels and hulls take at most, bytes each: it does not ask for them.
+/// What the engine's voxels and hulls take at most, bytes each: it does not ask for them, and every thread may be there.
 const VOXEL_BYTES: usize = 32;
 const HULL_BYTES: usize = 512;
 
 fn corners(points: &[Vector]) -> Option<Vec<Vector>> {
-    memory::ask(HULL_BYTES * points.len());
+    memory::ask(HULL_BYTES * points.len() * num_threads());
     try_convex_hull(points).ok().map(|(corners, _)| corners).filter(|corners| corners.len() >= 4)
 }
