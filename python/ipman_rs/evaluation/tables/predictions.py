@@ -112,8 +112,7 @@ def read(path: str | Path, unpacked: Path, reading: Reading | None = None) -> Pr
     `reading`: as the options of a command say; errors name these.
     """
     path = Path(path)
-    if not path.is_file():
-        raise ValueError(f"{path}: {'is a folder; name the file' if path.is_dir() else 'there is no such file'}")
+    regular(path)
     if path.suffix.lower() not in (".npz", ".parquet"):
         raise ValueError(f"{path}: expected predictions in .npz or .parquet, got {path.suffix or 'no ending'}")
     content = fingerprint(path)
