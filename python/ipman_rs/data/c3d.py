@@ -7,10 +7,11 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ipman_rs.files import regular
 
 from . import c3d_format
 from .c3d_format import Parameters, several
@@ -121,9 +122,7 @@ class Recording:
 
 def read(path: str | os.PathLike[str]) -> Recording:
     """The content of a C3D file. ValueError, naming the file, if it is missing, damaged or shorter than it says."""
-    path = Path(path)
-    if not path.is_file():
-        raise ValueError(f"{path}: no such file")
+    path = regular(path)
     try:
         content = c3d_format.content(path.read_bytes())
     except OSError as error:

@@ -303,9 +303,9 @@ def _indices(found: Array | None, place: str, body: BodyModel) -> NDArray[np.int
         return np.flatnonzero(values)
     if values.dtype.kind not in "iuf" or not np.isfinite(values).all() or not np.equal(values, np.round(values)).all():
         raise ValueError(f"{place}: expected indices of vertices, whole numbers")
-    vertices = np.unique(values).astype(np.int64)
+    vertices = np.unique(values)
     if vertices[0] < 0 or vertices[-1] >= count:
         raise ValueError(
-            f"{place}: expected vertices 0 to {count - 1} of {body.name}, got {vertices[0]} to {vertices[-1]}"
+            f"{place}: expected vertices 0 to {count - 1} of {body.name}, got {vertices[0]:g} to {vertices[-1]:g}"
         )
-    return vertices
+    return vertices.astype(np.int64)

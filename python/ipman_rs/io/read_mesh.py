@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.files import regular
+
 from . import gltf, obj, ply, repair, stl
 from .repair import Mesh
 
@@ -42,8 +44,7 @@ def _parsed(path: Path) -> Mesh:
     kind = path.suffix.lower()
     if kind not in ENDINGS:
         raise ValueError(f"{path}: unknown kind {kind or 'without ending'!r}; expected {' '.join(ENDINGS)}")
-    if not path.is_file():
-        raise ValueError(f"{path}: expected a mesh file, got {'no ordinary file' if path.exists() else 'no such file'}")
+    regular(path)
     try:
         content = path.read_bytes()
         return PARSERS[kind](content) if kind in PARSERS else gltf.parse(content, path.parent)
