@@ -211,7 +211,7 @@ def _check_angles(stored: _Stored, pose: Array) -> None:
     """ValueError for what are no rotation vectors in radians."""
     if not np.isfinite(pose).all():
         raise ValueError(f"{stored.path}: the pose is not finite")
-    largest = float(np.linalg.norm(pose, axis=-1).max())
+    largest = float(np.linalg.norm(np.clip(pose, -1e100, 1e100), axis=-1).max())  # whose squares are finite
     if largest > LARGEST_ANGLE:
         raise ValueError(
             f"{stored.path}: the pose looks like degrees: a joint turns by {largest:.4g}; expected rotation vectors in "

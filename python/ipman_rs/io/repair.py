@@ -123,6 +123,8 @@ def welded(mesh: Mesh) -> Mesh:
 
 def _open_edges(faces: Indices) -> Indices:
     """(E, 2) the edges that have a face on one side only, lower vertex first."""
+    if not len(faces):
+        return np.empty((0, 2), faces.dtype)
     width = faces.max(initial=0) + 1
     low, high = np.minimum(faces, np.roll(faces, -1, axis=1)), np.maximum(faces, np.roll(faces, -1, axis=1))
     key = np.sort((low * width + high).reshape(-1))
