@@ -95,7 +95,7 @@ def test_what_is_wrong_in_a_trc(tmp_path, text, message):
 def test_files_that_are_no_markers(tmp_path):
     with pytest.raises(ValueError, match=r"expected a file of markers \(.trc, .c3d\), got .bvh"):
         markers.read(tmp_path / "a.bvh")
-    with pytest.raises(ValueError, match="a.trc: No such file"):
+    with pytest.raises(ValueError, match="a.trc: there is no such file"):
         markers.read(tmp_path / "a.trc")
     (tmp_path / "b.trc").write_text(trc(["1\t0\t1\t2\t3\t4\t5\t6"]))
     with pytest.raises(ValueError, match="up: expected x, y or z, got 'w'"):
@@ -110,7 +110,7 @@ def test_a_damaged_c3d(tmp_path):
     (tmp_path / "a.c3d").write_bytes(b"no markers in here" * 100)
     with pytest.raises(ValueError, match="a.c3d: expected a C3D file"):
         markers.read(tmp_path / "a.c3d")
-    with pytest.raises(ValueError, match="b.c3d: no such file"):
+    with pytest.raises(ValueError, match="b.c3d: there is no such file"):
         markers.read(tmp_path / "b.c3d")
 
 

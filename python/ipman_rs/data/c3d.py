@@ -7,10 +7,11 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ipman_rs.files.regular import read_bytes
 
 from . import c3d_format
 from .c3d_format import Parameters, several
@@ -19,6 +20,7 @@ from .units import metres
 
 Array = NDArray[np.float64]
 
+MAX_BYTES = 1 << 32  # an hour of ten plates and of two hundred markers is smaller
 AGAIN = "write it again with Mokka or the program that recorded it"
 GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS", "SYMBOLIC")  # of POINT
 OUTPUTS = re.compile(r".*(?:Angles?|Moment|Force|Power|GRF|Progress\w*)(?:Harrington)?|Cent(?:re|er)OfMass\w*")
@@ -121,13 +123,9 @@ class Recording:
 
 def read(path: str | os.PathLike[str]) -> Recording:
     """The content of a C3D file. ValueError, naming the file, if it is missing, damaged or shorter than it says."""
-    path = Path(path)
-    if not path.is_file():
-        raise ValueError(f"{path}: no such file")
+    data = read_bytes(path, MAX_BYTES)
     try:
-        content = c3d_format.content(path.read_bytes())
-    except OSError as error:
-        raise ValueError(f"{path}: {error.strerror}") from None
+        content = c3d_format.content(data)
     except ValueError as error:
         said = str(error)
         raise ValueError(f"{path}: {said}" if said.endswith("?") else f"{path}: {said}; {AGAIN}") from None
