@@ -25,6 +25,10 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 unexport CONDA_PREFIX PYTHONHOME PYTHONPATH
 MATURIN_DEVELOP = maturin develop --release --locked $$([ -x $(BIN)/uv ] && echo --uv)
+# What is installed does not differ by day: `make lock` writes these versions anew.
+LOCK := requirements.lock
+export PIP_CONSTRAINT := $(CURDIR)/$(LOCK)
+export UV_CONSTRAINT := $(CURDIR)/$(LOCK)
 PIP = $$([ -x $(BIN)/uv ] && echo uv pip || echo python -m pip)
 
 # What the compiled module is made of; the folders too, so that a deleted file counts.
@@ -32,7 +36,7 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard rust-toolchain.toml) 
 	$(shell find rust -type d -o -name '*.rs' -o -name Cargo.toml)
 BINARY := python/ipman_rs/_core.abi3.so
 
-.PHONY: help demo demo-poses demo-fit test test-rust test-python test-levels lint format wheel bench clean FORCE
+.PHONY: help demo demo-poses demo-fit test test-rust test-python test-levels fuzz lint format wheel bench lock audit clean FORCE
 
 help:
 	@echo 'make demo     demo-poses: the named poses of the embedded body, analysed, report in $(OUT); and'
@@ -43,6 +47,9 @@ help:
 	@echo 'make format   sources formatted'
 	@echo 'make wheel    one wheel for all Pythons >= 3.10 in dist/, tried alone in a clean environment'
 	@echo 'make bench    every peer, into docs/performance.md (QUICK=1: the most important ones, in three minutes)'
+	@echo 'make fuzz     damaged files and odd calls: FUZZ_SECONDS=25 of each, FUZZ_SEED=0; hours by hand'
+	@echo 'make lock     requirements.lock, the versions of all that the other targets install, written anew (needs a network)'
+	@echo 'make audit    known faults of what is installed and linked: pip-audit and cargo deny (needs a network)'
 	@echo 'make clean    remove what was built (.venv, target, out, dist)'
 	@echo 'PYTHON=python3.12 make …   chooses the interpreter of a new .venv'
 
@@ -58,7 +65,7 @@ demo-fit: $(VENV)/fit-tools | $(if $(filter demo,$(MAKECMDGOALS)),demo-poses)
 	@echo
 	@echo 'The fitted body: $(abspath $(FIT_OUT))/report.html   (parameters, mesh and pictures: $(FIT_OUT)/basketball)'
 
-test: test-rust test-python test-levels
+test: test-rust test-python test-levels fuzz
 	@echo
 	@echo 'All tests passed: Rust (cargo) and Python (pytest).'
 
@@ -81,6 +88,14 @@ test-levels: $(VENV)/test-tools | test-python
 		echo "CPU level $$level"; \
 		IPMAN_SIMD=$$level OMP_NUM_THREADS=1 python -m pytest -n auto $(LEVEL_TESTS); done
 
+# A minute in all. The same FUZZ_SEED tries the same cases; a case that went wrong is repeated with --case.
+FUZZ_SECONDS ?= 25
+FUZZ_SEED ?= 0
+
+fuzz: $(VENV)/test-tools | test-python
+	OMP_NUM_THREADS=1 python tools/fuzz_readers.py --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)
+	OMP_NUM_THREADS=1 python tools/fuzz_api.py --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)
+
 lint: $(VENV)/test-tools $(VENV)/lint-tools
 	cargo fmt --all --check
 	cargo clippy --locked --workspace --all-targets -- -D warnings
@@ -102,6 +117,16 @@ wheel: $(VENV)/wheel-tools
 bench: $(VENV)/bench-tools
 	python -m benchmarks $(if $(QUICK),--quick)
 
+lock: $(VENV)/created
+	env -u PIP_CONSTRAINT -u UV_CONSTRAINT uv pip compile pyproject.toml --quiet --no-header --universal --upgrade \
+		--python-version 3.10 $(addprefix --extra ,fit c3d train render evaluate figures) \
+		$(addprefix --group ,test bench lint wheel build audit) -o $(LOCK)
+
+audit: $(VENV)/audit-tools
+	pip-audit --requirement $(LOCK) --no-deps --disable-pip
+	cargo deny --version >/dev/null 2>&1 || cargo install --locked cargo-deny
+	cargo deny check
+
 clean:
 	rm -rf $(VENV) target out dist $(BINARY)
 
@@ -120,23 +145,27 @@ $(VENV)/built: $(SOURCES) $(if $(wildcard $(BINARY)),,FORCE) | $(VENV)/created
 	$(MATURIN_DEVELOP)
 	touch $@
 
-$(VENV)/fit-tools: pyproject.toml | $(VENV)/built
+$(VENV)/fit-tools: pyproject.toml $(LOCK) | $(VENV)/built
 	$(MATURIN_DEVELOP) --extras fit
 	touch $@
 
-$(VENV)/test-tools: pyproject.toml | $(VENV)/built
+$(VENV)/test-tools: pyproject.toml $(LOCK) | $(VENV)/built
 	$(MATURIN_DEVELOP) --extras fit,c3d,render,train,evaluate --group test
 	touch $@
 
-$(VENV)/bench-tools: pyproject.toml | $(VENV)/test-tools
+$(VENV)/bench-tools: pyproject.toml $(LOCK) | $(VENV)/test-tools
 	$(PIP) install --quiet --group bench
 	touch $@
 
-$(VENV)/lint-tools: pyproject.toml | $(VENV)/created
+$(VENV)/lint-tools: pyproject.toml $(LOCK) | $(VENV)/created
 	$(PIP) install --quiet --group lint
 	touch $@
 
-$(VENV)/wheel-tools: pyproject.toml | $(VENV)/created
+$(VENV)/audit-tools: pyproject.toml $(LOCK) | $(VENV)/created
+	$(PIP) install --quiet --group audit
+	touch $@
+
+$(VENV)/wheel-tools: pyproject.toml $(LOCK) | $(VENV)/created
 	$(PIP) install --quiet --group wheel
 	touch $@
 

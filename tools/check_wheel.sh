@@ -18,7 +18,7 @@ fi
 
 # From here on nothing of the repository or of its environment is in reach.
 python=$(python -c 'import sys; print(sys._base_executable)')
-unset VIRTUAL_ENV PYTHONPATH PYTHONHOME
+unset VIRTUAL_ENV PYTHONPATH PYTHONHOME PIP_CONSTRAINT UV_CONSTRAINT
 cd "$room"
 "$python" -m venv clean
 clean/bin/python -m pip install --quiet --disable-pip-version-check "$wheel"

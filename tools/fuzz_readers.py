@@ -79,11 +79,11 @@ def kinds() -> list[Kind]:
 
 def _meshes() -> list[Kind]:
     from ipman_rs.cli import mesh_files
-    from ipman_rs.cli.measure import read
+    from ipman_rs.cli.measure import Request, read
     from ipman_rs.cli.parts import read_parts
 
     def mesh(path: Path) -> Any:
-        return read(path, None)
+        return read(path, Request())
 
     def parts(path: Path) -> Any:
         return read_parts(path, FACES, None)
@@ -116,15 +116,15 @@ def _bodies() -> list[Kind]:
     from miniatures import amass, models
 
     from ipman_rs.body import joint_regressors
-    from ipman_rs.cli.measure import read
+    from ipman_rs.cli.measure import Request, read
     from ipman_rs.data import open as open_data
-    from ipman_rs.fitting import presented_files
+    from ipman_rs.fitting import presented, presented_files
 
     body = ip.load_body("anny-lite")
     pose = np.zeros((2, body.num_joints, 3), np.float32)
 
     def parameters(path: Path) -> Any:
-        return read(path, None)
+        return read(path, Request())
 
     def recorded(path: Path) -> Any:
         return open_data("amass", path)[:]
@@ -138,8 +138,8 @@ def _bodies() -> list[Kind]:
         Kind("amass.npz", _written(amass.motion, "a.npz", frames=3), damage.of_npz, parameters, command),
         Kind("amass_data.npz", _written(amass.motion, "a.npz", frames=3), damage.of_npz, recorded),
         Kind("smpl.npz", _written(models.smpl, "a.npz"), damage.of_npz, ip.load_body),
-        Kind("pose.npz", npz(poses=np.zeros((2, 156)), trans=np.zeros((2, 3)), contact=np.array([1, 2])), damage.of_npz,
-             lambda path: (presented_files.load(path, body), presented_files.read_contact(path, body))),
+        Kind("pose.npz", npz(poses=np.zeros((1, 156)), trans=np.zeros((1, 3)), contact=np.array([1, 2])), damage.of_npz,
+             lambda path: (presented.load(path, body), presented_files.read_contact(path, body))),
         Kind("contact.json", b'{"contact": [1, 2, 3]}', damage.of_json,
         lambda path: presented_files.read_contact(path, body)),
         Kind("regressor.npy", _written(np.save, "a.npy", np.zeros((17, 9))), damage.of_npy, joint_regressors.read),
@@ -216,27 +216,31 @@ def _recordings() -> list[Kind]:
 
 
 def _pickles() -> list[Kind]:
-    from miniatures import threedpw
+    from miniatures import models, threedpw
 
     from ipman_rs.body import safe_pickle
-    from ipman_rs.fitting import presented_files
+    from ipman_rs.fitting import presented
 
     def arrays(path: Path) -> Any:
         content = safe_pickle.read(path, "sequence", "a file", tolerant=True)
         for name, value in content.items():
+            if isinstance(value, (str, int, float, list)):
+                continue
             try:
                 safe_pickle.as_array(value)
             except ValueError as error:
                 raise ValueError(f"{path}: {name}: {error}") from None
 
-    plain = {"poses": np.zeros((2, 72)), "betas": np.zeros(10), "gender": "m", "list": [1, 2.0, "x"]}
+    plain = {"pose": np.zeros((1, 72)), "betas": np.zeros(10), "gender": "m", "list": [1, 2.0, "x"]}
+    with np.load(io.BytesIO(_written(models.smpl, "a.npz"))) as stored:
+        model = dict(stored)
     body = ip.load_body("anny-lite")
     return [
         Kind("two.pkl", pickle.dumps(plain, 2), damage.of_pickle, arrays),
         Kind("five.pkl", pickle.dumps(plain, 5), damage.of_pickle, arrays),
         Kind("threedpw.pkl", threedpw.pickled(threedpw.content(frames=2)), damage.of_pickle, arrays),
-        Kind("pose.pkl", pickle.dumps(plain, 2), damage.of_pickle, lambda path: presented_files.load(path, body)),
-        Kind("smpl.pkl", pickle.dumps(plain, 2), damage.of_pickle, ip.load_body),
+        Kind("pose.pkl", pickle.dumps(plain, 2), damage.of_pickle, lambda path: presented.load(path, body)),
+        Kind("smpl.pkl", pickle.dumps(model, 2), damage.of_pickle, ip.load_body),
     ]
 
 
@@ -256,10 +260,16 @@ def _tensors() -> list[Kind]:
 
     state = {"settings": {"body": "anny"}, "state_dict": {"model.a": torch.zeros(3, 4), "model.b": torch.ones(2)}}
     old = saved(state, _use_new_zipfile_serialization=False)
+    sizes = {"1": (63,), "2": (4, 63), "4": (4,), "6": (4, 4), "7": (4, 4), "8.mu": (2, 4)}
+    encoder = {f"encoder_net.{layer}.weight": torch.ones(size) for layer, size in sizes.items()}
+    encoder |= {f"encoder_net.{layer}.bias": torch.ones(size[0]) for layer, size in sizes.items()}
+    encoder |= {
+        f"encoder_net.{layer}.running_{what}": torch.ones(sizes[layer]) for layer in "14" for what in ("mean", "var")
+    }
     return [
         Kind("new.ckpt", saved(state), damage.of_bytes, read_checkpoint),
         Kind("old.ckpt", old, damage.of_bytes, read_trained),
-        Kind("vposer.pt", saved({"encoder_net.1.weight": torch.ones(4)}), damage.of_bytes, vposer.load),
+        Kind("vposer.pt", saved(encoder), damage.of_bytes, vposer.load),
     ]
 
 
@@ -340,6 +350,22 @@ def _on_the_command_line(kind: Kind, path: Path) -> None:
         raise Wrong(f"{kind.name}: ipman {kind.command[0]} ended with {done.exit_code}: {done.output[-200:]!r}")
 
 
+def _warm_up() -> None:
+    """Reads every undamaged file, and tries every command once: what children need is then imported."""
+    with tempfile.TemporaryDirectory(prefix="fuzz") as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for kind in kinds():
+            path = Path(folder) / kind.name
+            path.write_bytes(kind.content)
+            try:
+                kind.read(path)
+            except (ValueError, FileError) as error:
+                print(f"the undamaged file is refused: {error}", file=sys.stderr)
+            path.write_bytes(b"")
+            if kind.command:
+                _on_the_command_line(kind, path)
+
+
 if __name__ == "__main__":
-    kinds()
+    _warm_up()
     run(case, (__doc__ or "").splitlines()[0])

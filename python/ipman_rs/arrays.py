@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ipman_rs.checks import body_template
+
 if TYPE_CHECKING:
     from ipman_rs.ground import Ground
     from ipman_rs.template import BodyTemplate
@@ -45,8 +47,7 @@ class Bodies:
     """A batch of posed bodies of one template: `vertices` (B, V, 3) and the free batch `shape` that B stands for."""
 
     def __init__(self, vertices: ArrayLike, template: BodyTemplate) -> None:
-        if not hasattr(template, "_core"):
-            raise TypeError(f"template: expected ipman_rs.BodyTemplate, got {type(template).__name__}")
+        body_template(template)
         array = plain("vertices", vertices)
         expected = (template.num_vertices, 3)
         if array.ndim < 2 or array.shape[-2:] != expected:

@@ -21,9 +21,18 @@ def number(name: str, value: float) -> float:
         value, (int, float, np.integer, np.floating)
     ):
         raise TypeError(f"{name}: expected a number, got {_shown(value)}")
+    if isinstance(value, np.floating):
+        value = value.item()  # half precision has no LARGEST
     if not -LARGEST <= value <= LARGEST:  # math.isfinite would stop torch.compile
         raise ValueError(f"{name}: expected a finite number of at most {LARGEST:g}, got {_shown(value)}")
     return float(value)
+
+
+def body_template(value: Any) -> Any:
+    """`value`, if it is a template."""
+    if not hasattr(value, "_core"):
+        raise TypeError(f"template: expected ipman_rs.BodyTemplate, got {type(value).__name__}")
+    return value
 
 
 def positive(name: str, value: float, unit: str = "metres") -> float:

@@ -51,6 +51,7 @@ def binary_center_of_pressure(
     τ, m.
     """
     metres = positive("threshold", threshold)
+    Bodies(vertices, template).over(ground)  # that they fit together
     samples = np.asarray(sample_surface(vertices, template))
     contact = np.abs(ground.signed_height(samples)) < metres
     found = np.full((*samples.shape[:-2], 3), np.nan, samples.dtype)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.arrays import Bodies, plain
-from ipman_rs.checks import LARGEST, SMALLEST
+from ipman_rs.checks import LARGEST, SMALLEST, body_template
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 
@@ -49,6 +49,7 @@ def mass_properties(vertices: ArrayLike, template: BodyTemplate, density: ArrayL
 
 def densities(density: ArrayLike, template: BodyTemplate) -> list[float]:
     """One density or one a part, checked."""
+    body_template(template)
     with np.errstate(over="ignore"):
         values = plain("density", density).astype(np.float64)
     if values.shape not in {(), (1,), (template.num_parts,)}:

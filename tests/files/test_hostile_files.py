@@ -3,6 +3,7 @@
 import io
 import os
 import socket
+import sys
 
 import numpy as np
 import pytest
@@ -249,3 +250,25 @@ def test_the_command_line_says_one_line(tmp_path):
         assert isinstance(done.exception, SystemExit), repr(done.exception)
         assert done.exit_code in (1, 2)
         assert "mine.json" in done.output
+
+
+def test_names_of_inputs_that_no_file_can_have(tmp_path):
+    for name in ("x" * 300 + ".obj", "loop.obj"):
+        path = tmp_path / name
+        if name == "loop.obj":
+            path.symlink_to(path)
+        done = CliRunner().invoke(main, ["analyze", str(path), "-o", str(tmp_path / "out")])
+        assert isinstance(done.exception, SystemExit), repr(done.exception)
+        assert done.exit_code == 1
+        assert "cannot be opened" in done.output
+        done = CliRunner().invoke(main, ["data", "check", "amass", str(path)])
+        assert isinstance(done.exception, SystemExit), repr(done.exception)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are bytes on Linux alone")
+def test_names_that_are_no_text(tmp_path):
+    """A name of bytes that are no UTF-8 is read, and the report about it written."""
+    path = tmp_path / os.fsdecode(b"body\xff.obj")
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    done = CliRunner().invoke(main, ["analyze", str(path), "-o", str(tmp_path / "out")])
+    assert not isinstance(done.exception, UnicodeError), done.exception

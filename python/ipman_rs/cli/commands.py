@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ import click
 
 from .benchmark import benchmark
 from .data import data
-from .errors import FileError, warnings_in_one_line
+from .errors import FileError, one_line, warnings_in_one_line
 from .evaluate import evaluate
 from .figure import figure
 from .fit import fit
@@ -38,7 +39,26 @@ def _version(context: click.Context, _parameter: click.Parameter, wanted: bool) 
         context.exit()
 
 
-@click.group(context_settings=_CONTEXT)
+class _Commands(click.Group):
+    """What no command can do anything about ends in one line: a name that no file can have, a full disk, no memory."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        for stream in (sys.stdout, sys.stderr):  # names of files need not be text, and terminals not know all letters
+            if hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+        try:
+            return super().invoke(ctx)
+        except MemoryError:
+            said = "needs more memory than there is"
+        except OSError as error:
+            if error.errno == errno.EPIPE:  # whoever read the output has left
+                raise
+            said = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+        click.echo(f"ipman: error: {one_line(said)}", err=True)
+        sys.exit(1)
+
+
+@click.group(cls=_Commands, context_settings=_CONTEXT)
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Show the version.")
 @click.pass_context
 def main(context: click.Context) -> None:

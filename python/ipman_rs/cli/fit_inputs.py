@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -51,7 +52,7 @@ def expand(inputs: Iterable[Path]) -> list[Path]:
     """The files, and those in the folders, by name. Raises FileError for a folder without any."""
     files: list[Path] = []
     for path in inputs:
-        if not path.is_dir():
+        if not os.path.isdir(path):
             files.append(path)
             continue
         inside = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in ENDINGS and entry.is_file())
@@ -64,8 +65,10 @@ def expand(inputs: Iterable[Path]) -> list[Path]:
 def items(path: Path, reading: Reading) -> list[Item]:
     """The people of one file: one an image, and none of a photo yet. Raises FileError."""
     kind = path.suffix.lower()
-    if not path.is_file():
-        raise FileError(path, "there is no such file")
+    try:
+        regular(path)
+    except ValueError as error:
+        raise FileError(path, str(error)) from None
     if kind in IMAGES:
         return [Item(path.stem, path, str(path), photo=path)]
     if kind not in KEYPOINTS:

@@ -241,7 +241,8 @@ class _Plate:
         loads = force @ up
         loads = loads[np.isfinite(loads)]
         sign = -1.0 if loads.size and -loads.min() > max(loads.max(), LOADED) else 1.0
-        return sign * force, np.where(np.isfinite(points), points, np.nan), sign * np.nan_to_num(moment)
+        force, points = (np.where(np.isfinite(part), part, np.nan) for part in (force, points))
+        return sign * force, points, sign * np.nan_to_num(moment)
 
     @cached_property
     def axes(self) -> Array:

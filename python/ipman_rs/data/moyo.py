@@ -299,7 +299,8 @@ def _uncrop(crop: Element, whole: NDArray[np.float32], place: str) -> None:
             f"({column}, {row})"
         )
     try:
-        values = np.array((crop.findtext("cells") or "").split(), np.float32)
+        with np.errstate(over="ignore"):  # what is too large is refused as infinite
+            values = np.array((crop.findtext("cells") or "").split(), np.float32)
     except ValueError as error:
         raise ValueError(f"{place}: expected numbers: {error}") from None
     if values.size != width * height:

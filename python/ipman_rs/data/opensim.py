@@ -195,7 +195,10 @@ def plates(table: Storage, unit: str = "m", up: str = "y", loads: ExternalLoads 
         raise ValueError(f"{table.source}: expected ground forces, such as ground_force_vx, it has {_some(table)}")
     forces, points, moments = (np.stack(part, axis=1) for part in zip(*wrenches, strict=True))
     scale = METRES[unit]
-    found = ForcePlates(table.times, forces, points * scale, moments * scale, UP[up], table.source)
+    forces, points, moments = (  # beside NaN, infinity: a centre of pressure without a load
+        np.where(np.isfinite(part), part, np.nan) for part in (forces, points * scale, moments * scale)
+    )
+    found = ForcePlates(table.times, forces, points, moments, UP[up], table.source, notes=table.notes)
     _plausible(found, up)
     return on_the_body(found)
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import codecs
 import os
 import re
-import stat
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ipman_rs.files.regular import read_bytes
 
 MAX_BYTES = 1 << 31  # an hour of sixty markers at 250 Hz has a third of that
 NOT_A_NUMBER = re.compile(r"[-+]?(?:s|q)?nan(?:\(\w*\))?|[-+]?1\.#(?:ind|qnan|snan|nan)\d*|n/?a", re.IGNORECASE)
@@ -18,16 +18,8 @@ INFINITY = re.compile(r"([-+]?)(?:1\.#inf\d*|inf(?:inity)?)", re.IGNORECASE)
 
 
 def lines(path: str | os.PathLike[str]) -> list[str]:
-    """The lines of a file. ValueError, naming it, if it is missing, no ordinary file, or larger than any recording."""
-    try:
-        about = os.stat(path)
-        if not (stat.S_ISREG(about.st_mode) or stat.S_ISDIR(about.st_mode)):
-            raise ValueError(f"{path}: expected an ordinary file, got a device or pipe")
-        if about.st_size > MAX_BYTES:
-            raise ValueError(f"{path}: {about.st_size} bytes is more than any recording has ({MAX_BYTES})")
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise ValueError(f"{path}: {error.strerror}") from None
+    """The lines of an ordinary file. ValueError, naming it, as `files.regular.read_bytes`."""
+    data = read_bytes(path, MAX_BYTES)
     wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     return data.decode("utf-16" if wide else "utf-8-sig", errors="replace").splitlines()
 

@@ -56,7 +56,7 @@ class being_written:
 def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
     """Write a file, text as UTF-8, so that it is there whole or not at all. Raises OSError."""
     with being_written(path) as file:
-        file.write(content.encode() if isinstance(content, str) else content)
+        file.write(content.encode(errors="replace") if isinstance(content, str) else content)  # names need not be text
 
 
 def _part(path: Path) -> tuple[Path, BinaryIO]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..files import regular
 from . import gltf, obj, ply, repair, stl
 from .repair import Mesh
 
@@ -42,8 +43,7 @@ def _parsed(path: Path) -> Mesh:
     kind = path.suffix.lower()
     if kind not in ENDINGS:
         raise ValueError(f"{path}: unknown kind {kind or 'without ending'!r}; expected {' '.join(ENDINGS)}")
-    if not path.is_file():
-        raise ValueError(f"{path}: expected a mesh file, got {'no ordinary file' if path.exists() else 'no such file'}")
+    regular(path)
     try:
         content = path.read_bytes()
         return PARSERS[kind](content) if kind in PARSERS else gltf.parse(content, path.parent)
@@ -51,6 +51,8 @@ def _parsed(path: Path) -> Mesh:
         raise
     except ValueError as error:
         raise _unreadable(path, str(error)) from error
+    except KeyError as error:
+        raise _unreadable(path, f"it lacks {error}") from error
     except Exception as error:  # damaged bytes fail in any way
         raise _unreadable(path, f"{type(error).__name__}: {str(error)[:160]}") from error
 

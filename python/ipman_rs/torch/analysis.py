@@ -11,6 +11,7 @@ from torch import Tensor
 import ipman_rs as ip
 from ipman_rs import BaseOfSupport, BodyTemplate, presets
 from ipman_rs import Ground as NumpyGround
+from ipman_rs.checks import body_template
 
 from .arrays import as_array, memory, single_or_double
 from .ground import Ground, as_numpy_ground
@@ -54,6 +55,7 @@ def analyze(
 ) -> Analysis:
     """Every quantity of each body with the constants of a preset, as `ipman_rs.analyze`: vertices (..., V, 3)."""
     constants = presets.get(preset)
+    body_template(template)
     method = "exact" if template.num_parts == 1 else "pcom"
     body, where = (vertices, template), (vertices, template, ground)
     curve = (constants.alpha, constants.gamma)

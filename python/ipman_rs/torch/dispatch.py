@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 
 from ipman_rs import Ground as NumpyGround
+from ipman_rs.checks import body_template
 
 from . import device, reference
 from .arrays import dense, single_or_double
@@ -71,8 +72,7 @@ def check(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround
         TypeError: vertices is no ordinary floating-point tensor, or the template is none.
         ValueError: vertices does not fit the template, the ground does not broadcast against it, or it requires grad.
     """
-    if not hasattr(template, "_core"):
-        raise TypeError(f"template: expected ipman_rs.BodyTemplate, got {type(template).__name__}")
+    body_template(template)
     shape = dense("vertices", vertices).shape
     if len(shape) < 2 or shape[-1] != 3 or shape[-2] != template.num_vertices:
         raise ValueError(

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 from ipman_rs import BodyTemplate, presets
 from ipman_rs import Ground as NumpyGround
-from ipman_rs.checks import choice, not_negative
+from ipman_rs.checks import body_template, choice, not_negative
 from ipman_rs.losses import Curve, Points, Wrap
 from ipman_rs.mass import Method
 
@@ -65,8 +65,7 @@ class IntuitivePhysicsLoss(nn.Module):
             first = (numbers.alpha, numbers.gamma, numbers.epsilon)
         self._options = (*first, numbers.alpha1, numbers.alpha2, numbers.beta1, numbers.beta2)
 
-        if not hasattr(template, "_core"):
-            raise TypeError(f"template: expected ipman_rs.BodyTemplate, got {type(template).__name__}")
+        body_template(template)
         if weights is not None and not isinstance(weights, Mapping):
             raise TypeError(f"weights: expected numbers by the names of terms, got {type(weights).__name__}")
         given = dict(weights or {})

@@ -6,7 +6,7 @@ from torch import Tensor
 
 from ipman_rs import BodyTemplate
 from ipman_rs import Ground as NumpyGround
-from ipman_rs.checks import not_negative
+from ipman_rs.checks import body_template, not_negative
 
 from .dispatch import evaluate
 from .ground import Ground
@@ -17,7 +17,7 @@ def pressure(
 ) -> Tensor:
     """Relative pressure of each sample (Eq. 2): 1 − αh below the ground, e^{−γh} above: (..., V, 3) -> (..., S)."""
     options = (not_negative("alpha", alpha), not_negative("gamma", gamma))
-    return evaluate(vertices, template, ground, "pressure", options, (template.num_samples,))
+    return evaluate(vertices, template, ground, "pressure", options, (body_template(template).num_samples,))
 
 
 def center_of_pressure(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from torch import Tensor
 
 from ipman_rs import BodyTemplate, MassProperties
+from ipman_rs.checks import body_template
 from ipman_rs.volume import densities, unpack_mass_properties
 
 from .dispatch import evaluate
@@ -14,7 +15,7 @@ from .dispatch import evaluate
 
 def part_volumes(vertices: Tensor, template: BodyTemplate) -> Tensor:
     """Volume of each closed part: vertices (..., V, 3) -> (..., P), m³."""
-    return evaluate(vertices, template, None, "part_volumes", (), (template.num_parts,))
+    return evaluate(vertices, template, None, "part_volumes", (), (body_template(template).num_parts,))
 
 
 def mass_properties(

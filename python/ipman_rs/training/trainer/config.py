@@ -175,7 +175,7 @@ def _value(hint: Any, value: Any, place: str) -> Any:
             raise ValueError(f"{place}: expected a list of data sets, got {value!r}")
         return tuple(_made(DataSet, one, f"{place}[{number}]") for number, one in enumerate(value))
     if hint is float and isinstance(value, (int, float)) and not isinstance(value, bool):
-        if not math.isfinite(value):
+        if math.isnan(value) or (math.isinf(value) and place != "clip"):  # a clip of infinity is none
             raise ValueError(f"{place}: expected a finite number, got {value!r}")
         return float(value)
     if hint is str and isinstance(value, (str, int)) and not isinstance(value, bool):
