@@ -54,9 +54,9 @@ class Ground:
     def signed_height(self, points: ArrayLike) -> NDArray[np.float64]:
         """h(u), metres above the ground. points (..., 3) for one ground, (..., N, 3) for one ground a body."""
         normal, height = self._beside_points()
-        where = plain("points", points).astype(np.float64, copy=False)
         # Axis by axis: a sum along an axis of 3 takes many times as long.
         with np.errstate(over="ignore", invalid="ignore"):  # points near the end of the range have no finite height
+            where = plain("points", points).astype(np.float64, copy=False)
             x, y, z = (where[..., axis] * normal[..., axis] for axis in range(3))
             return x + y + z - height
 

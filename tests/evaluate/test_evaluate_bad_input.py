@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import zipfile
 
@@ -227,3 +228,18 @@ def test_parquet_rows_that_do_not_fit(tmp_path, guessed):
     refused(bad([*flat[:-1], None]), r"pose: a row is missing \(null\)", tmp_path)
     body[8] = "anny"
     refused(bad(flat), "body: expected one for all frames", tmp_path)
+
+
+def test_names_that_a_spreadsheet_would_run(tmp_path):
+    """Names of sequences and files become text in CSV, and numbers stay numbers."""
+    true = files.truth(frames=40)
+    names = np.array(['=HYPERLINK("http://x")', "+1", "-1", "@SUM(A1)"])[np.arange(40) // 10]
+    guessed = files.predictions(true)
+    saved = files.save(tmp_path / "=cmd.npz", guessed)
+    job = files.job(tmp_path / "out", saved, files.save(tmp_path / "true.npz", dict(true, sequences=names)))
+    files.finish([job])
+    with (tmp_path / "out" / "sequences.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert {row["sequence"] for row in rows} == {f"'{name}" for name in names.tolist()}
+    assert {row["method"] for row in rows} == {"'=cmd"}
+    assert all(np.isfinite(float(row["mean"])) and int(row["frames"]) == 10 for row in rows)

@@ -169,8 +169,8 @@ def with_nan():
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ('{"people": [', "some.json: expected JSON: "),
-        ("[" * 100_000, "some.json: expected JSON: "),
+        ('{"people": [', "some.json: is no JSON: "),
+        ("[" * 100_000, "some.json: is no JSON: "),
         ({"people": []}, "some.json: expected a person, got none"),
         ({"people": 3}, "people: expected a list, got int"),
         ({"annotations": []}, "some.json: expected a person, got none"),
@@ -205,10 +205,10 @@ def test_what_is_wrong_in_a_file(written, content, message):
 
 
 def test_files_that_are_none(tmp_path):
-    with pytest.raises(ValueError, match="none.json: no such file"):
+    with pytest.raises(ValueError, match="none.json: there is no such file"):
         keypoints.read(tmp_path / "none.json")
     (tmp_path / "image.json").write_bytes(b"\x89PNG\xff\xfe")
-    with pytest.raises(ValueError, match="image.json: expected JSON, got a file that is no text"):
+    with pytest.raises(ValueError, match="image.json: is no JSON: it is no text"):
         keypoints.read(tmp_path / "image.json")
 
 

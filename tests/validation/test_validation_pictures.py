@@ -7,10 +7,10 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="matplotlib is an extra")
 
-import ipman_rs as ip  # noqa: E402
-from ipman_rs.data.force_plates import ForcePlates  # noqa: E402
-from ipman_rs.validation import Comparison, computed, pictures  # noqa: E402
-from ipman_rs.validation.pictures import Floor  # noqa: E402
+import ipman_rs as ip
+from ipman_rs.data.force_plates import ForcePlates
+from ipman_rs.validation import Comparison, computed, pictures
+from ipman_rs.validation.pictures import Floor
 
 FRAMES = 40
 TIMES = np.arange(FRAMES) / 25.0

@@ -129,10 +129,10 @@ def _open(path: Path) -> tuple[Read, set[str]]:
 
 def _parents(path: Path, kintree: NDArray[np.float64]) -> NDArray[np.int64]:
     """Parent of each joint; upstream marks the root with 2**32 - 1 or with -1."""
-    parents = np.concatenate([[-1], kintree[0, 1:]]).astype(np.int64)
+    parents = np.concatenate([[-1], kintree[0, 1:]])
     if not ((parents[1:] >= 0) & (parents[1:] < np.arange(1, len(parents)))).all():
         raise ValueError(f"{path}: kintree_table: each joint after the root must name an earlier joint as its parent")
-    return parents
+    return parents.astype(np.int64)
 
 
 def _faces(path: Path, faces: NDArray[np.float64], num_vertices: int) -> NDArray[np.int64]:

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files.regular import read_bytes
+from ipman_rs.files import read_bytes
 
 from . import c3d_format
 from .c3d_format import Parameters, several

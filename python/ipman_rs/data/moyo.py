@@ -285,7 +285,7 @@ def _anywhere(element: Element, tag: str, path: str | os.PathLike[str]) -> Eleme
 
 def _pair(element: Element, tag: str, path: str | os.PathLike[str]) -> tuple[int, int]:
     x, y = (safe_xml.number(element, f"{tag}/{axis}", path) for axis in "xy")
-    if x != int(x) or y != int(y):
+    if not (x.is_integer() and y.is_integer()):
         raise ValueError(f"{path}: {tag.removeprefix('.//')}: expected whole numbers, got {x} and {y}")
     return int(x), int(y)
 

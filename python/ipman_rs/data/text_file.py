@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files.regular import read_bytes
+from ipman_rs.files import read_bytes
 
 MAX_BYTES = 1 << 31  # an hour of sixty markers at 250 Hz has a third of that
 NOT_A_NUMBER = re.compile(r"[-+]?(?:s|q)?nan(?:\(\w*\))?|[-+]?1\.#(?:ind|qnan|snan|nan)\d*|n/?a", re.IGNORECASE)
@@ -18,7 +18,7 @@ INFINITY = re.compile(r"([-+]?)(?:1\.#inf\d*|inf(?:inity)?)", re.IGNORECASE)
 
 
 def lines(path: str | os.PathLike[str]) -> list[str]:
-    """The lines of an ordinary file. ValueError, naming it, as `files.regular.read_bytes`."""
+    """The lines of a file. ValueError, naming it, if it is missing, no ordinary file, or larger than any recording."""
     data = read_bytes(path, MAX_BYTES)
     wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     return data.decode("utf-16" if wide else "utf-8-sig", errors="replace").splitlines()

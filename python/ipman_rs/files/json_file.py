@@ -37,6 +37,8 @@ def parse_json(data: bytes) -> Any:
         if _SURROGATE.search(text):
             json.dumps(content, ensure_ascii=False).encode()  # half a character cannot be written anywhere
         return content
+    except UnicodeDecodeError:
+        raise ValueError("it is no text") from None
     except RecursionError:
         raise ValueError("it is nested too deep") from None
     except MemoryError:

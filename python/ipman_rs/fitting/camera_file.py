@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ipman_rs.checks import LARGEST
 from ipman_rs.files import read_json
 
 Numbers = tuple[float, ...]
@@ -41,7 +42,7 @@ def read(path: str | os.PathLike[str]) -> KnownCamera:
             array = np.asarray(content[key], dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
             array = np.empty(0)
-        if array.shape != shape or not np.isfinite(array).all():
+        if array.shape != shape or not (np.abs(array) <= LARGEST).all():
             wanted = " × ".join(map(str, shape))
             raise ValueError(f"{path}: {key}: expected {wanted} finite numbers, got {_short(content[key])}")
         return array
@@ -55,7 +56,7 @@ def read(path: str | os.PathLike[str]) -> KnownCamera:
     focal = np.full(2, focal, np.float64) if is_number else numbers("focal", 2)
     if matrix is not None:
         focal, center = matrix[[0, 1], [0, 1]], matrix[:2, 2]
-    if focal is not None and not (np.isfinite(focal) & (focal > 0)).all():
+    if focal is not None and not ((focal > 0) & (focal <= LARGEST)).all():
         raise ValueError(f"{path}: focal: expected positive pixels, got {_short(focal.tolist())}")
     arrays = (rotation, translation, focal, center)
     return KnownCamera(*(None if array is None else tuple(array.ravel().tolist()) for array in arrays))

@@ -211,7 +211,7 @@ def _check_angles(stored: _Stored, pose: Array) -> None:
     """ValueError for what are no rotation vectors in radians."""
     if not np.isfinite(pose).all():
         raise ValueError(f"{stored.path}: the pose is not finite")
-    largest = float(np.linalg.norm(pose, axis=-1).max())
+    largest = float(np.linalg.norm(np.clip(pose, -1e100, 1e100), axis=-1).max())  # whose squares are finite
     if largest > LARGEST_ANGLE:
         raise ValueError(
             f"{stored.path}: the pose looks like degrees: a joint turns by {largest:.4g}; expected rotation vectors in "
@@ -303,9 +303,9 @@ def _indices(found: Array | None, place: str, body: BodyModel) -> NDArray[np.int
         return np.flatnonzero(values)
     if values.dtype.kind not in "iuf" or not np.isfinite(values).all() or not np.equal(values, np.round(values)).all():
         raise ValueError(f"{place}: expected indices of vertices, whole numbers")
-    vertices = np.unique(values).astype(np.int64)
+    vertices = np.unique(values)
     if vertices[0] < 0 or vertices[-1] >= count:
         raise ValueError(
-            f"{place}: expected vertices 0 to {count - 1} of {body.name}, got {vertices[0]} to {vertices[-1]}"
+            f"{place}: expected vertices 0 to {count - 1} of {body.name}, got {vertices[0]:g} to {vertices[-1]:g}"
         )
-    return vertices
+    return vertices.astype(np.int64)

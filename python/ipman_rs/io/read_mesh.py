@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import regular
+from ipman_rs.files import regular
+
 from . import gltf, obj, ply, repair, stl
 from .repair import Mesh
 

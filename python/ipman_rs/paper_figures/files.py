@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ipman_rs.files import write_whole
+from ipman_rs.files import cell, write_whole
 from ipman_rs.plain import plain
 
 if TYPE_CHECKING:
@@ -91,5 +91,7 @@ def _lines(table: Sequence[Mapping[str, Any]]) -> bytes:
     text = io.StringIO()
     lines = csv.DictWriter(text, list(table[0]), lineterminator="\n")
     lines.writeheader()
-    lines.writerows(table)
+    lines.writerows(
+        {key: cell(value) if isinstance(value, str) else value for key, value in row.items()} for row in table
+    )
     return text.getvalue().encode()

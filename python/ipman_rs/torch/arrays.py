@@ -13,8 +13,9 @@ _REAL = (torch.float16, torch.bfloat16, torch.float32, torch.float64)
 _WHOLE = (torch.uint8, torch.int8, torch.int16, torch.int32, torch.int64)
 
 
-def dense(name: str, value: Any, whole: bool = False) -> Tensor:
-    """`value`, if it is an ordinary tensor of real numbers, or, with `whole`, of whole ones.
+def dense(name: str, value: Any, whole: bool = False, meta: bool = False) -> Tensor:
+    """`value`, if it is an ordinary tensor of real numbers, or, with `whole`, of whole ones; with `meta` also one
+    without contents.
 
     Raises:
         TypeError: no tensor, another dtype, or one that is sparse, nested, quantised or without contents (meta).
@@ -26,7 +27,7 @@ def dense(name: str, value: Any, whole: bool = False) -> Tensor:
     special = "nested" if value.is_nested else "quantised" if value.is_quantized else None
     if special is None and value.layout != torch.strided:
         special = str(value.layout).removeprefix("torch.")
-    if special is None and value.device.type == "meta":
+    if special is None and value.device.type == "meta" and not meta:
         special = "meta"
     if special is not None:
         raise TypeError(f"{name}: expected an ordinary tensor, got a {special} one; make it dense first")

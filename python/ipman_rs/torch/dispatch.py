@@ -73,7 +73,7 @@ def check(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround
         ValueError: vertices does not fit the template, the ground does not broadcast against it, or it requires grad.
     """
     body_template(template)
-    shape = dense("vertices", vertices).shape
+    shape = dense("vertices", vertices, meta=forced()).shape
     if len(shape) < 2 or shape[-1] != 3 or shape[-2] != template.num_vertices:
         raise ValueError(
             f"vertices: expected shape (..., {template.num_vertices}, 3) for this template, got {tuple(shape)}"

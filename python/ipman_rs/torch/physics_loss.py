@@ -172,7 +172,7 @@ class IntuitivePhysicsLoss(nn.Module):
 def _row(like: Tensor, numbers: list[float]) -> Tensor:
     """Numbers beside a tensor, filled in by kernels on devices: a copy from the host waits, and stops a CUDA graph."""
     if like.device.type == "cpu":
-        return like.new_tensor(numbers)
+        return torch.tensor(numbers, dtype=like.dtype)  # new_tensor fails beside negative views
     return torch.stack([like.new_full((), number) for number in numbers])
 
 

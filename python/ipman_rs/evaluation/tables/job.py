@@ -100,10 +100,10 @@ class Job:
     regressors: tuple[str, ...] = ()
     preset: str = "paper-r"
     partial: bool = False
-    piece: int = PIECE
     unit: float = 1.0
     degrees: bool = False
     force: bool = False
+    piece: int = PIECE
 
     @cached_property
     def place(self) -> Path:
@@ -183,7 +183,10 @@ class Job:
         another axis than the data set's up."""
         if self.predictions == TRUTH:
             return ()
-        return (*self.estimates.flags, *judge.admit(self.predictions, [*self._axes(), *self._masses()], self.force))
+        return (
+            *self.estimates.flags,
+            *judge.admit(self.predictions, [*self._axes(), *self._masses(), *self._betas()], self.force),
+        )
 
     def _masses(self) -> list[check.Finding]:
         """Of a few estimated bodies."""
@@ -193,6 +196,17 @@ class Job:
         masses = mass_properties(bodies.vertices, bodies.model.template).mass
         known = masses[np.isfinite(masses)]
         return judge.mass(float(np.median(known))) if len(known) else []
+
+    def _betas(self) -> list[check.Finding]:
+        """Whether the model has as many components of shape as the predictions."""
+        some = self.estimates[slice(0, 1)]
+        if some.betas is None or some.body is None or some.vertices is not None or not self.bodies.has(some.body):
+            return []
+        gender = "neutral" if some.genders is None else str(some.genders[0])
+        width, model = some.betas.shape[1], self.bodies.get(some.body, gender, some.betas.shape[1])
+        if width <= model.num_betas:
+            return []
+        return [check.Finding("odd", f"betas: the first {model.num_betas} of {width}, as many as {model.name} has")]
 
     def _axes(self) -> list[check.Finding]:
         """Whether the estimated people lie or hang along another axis than the data set's up."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import zipfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ class RowsOnDisk:
     offset: int
     dtype: np.dtype[Any]
     shape: tuple[int, ...]
+    source: Path | None = None  # the file of the user's that it was unpacked from
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -48,7 +49,7 @@ class RowsOnDisk:
         try:
             return safe_npz.checked_text(found)
         except ValueError as error:
-            raise ValueError(f"{self.path}: {error}") from None
+            raise ValueError(f"{self.source or self.path}: {error}") from None
 
     def blocks(self, size: int = BLOCK) -> Iterator[NDArray[Any]]:
         """All rows, `size` after the other."""
@@ -80,7 +81,7 @@ def of_npz(path: Path, name: str, unpacked: Path) -> RowsOnDisk:
                 unpacked.mkdir(parents=True, exist_ok=True)
                 with archive.open(member) as stream:
                     _copy(stream, place, member.file_size)
-        return _header(place, 0, member.file_size)
+        return replace(_header(place, 0, member.file_size), source=path)
     except Exception as error:  # damaged bytes can fail in any way (zlib, struct, header syntax)
         if isinstance(error, OSError) and error.errno not in (None, errno.EINVAL):
             raise  # the disk is full, say, which is no fault of the file

@@ -5,7 +5,6 @@ detections = keypoints.read("person.json")       # what format it is, its conten
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +12,8 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+
+from ipman_rs.files import read_json
 
 from ...data.judge import RELATIVE
 from ..detections import Array, Detections
@@ -77,16 +78,7 @@ def read(
 
 
 def _load(path: Path) -> Any:
-    if not path.is_file():
-        raise ValueError(f"{path}: no such file")
-    try:
-        return json.loads(path.read_bytes())
-    except UnicodeDecodeError:
-        raise ValueError(f"{path}: expected JSON, got a file that is no text") from None
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"{path}: expected JSON: {error}") from None
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
+    return read_json(path)
 
 
 def _reader(content: Any, format: str | None, source: str) -> ModuleType:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import binascii
-import json
 import struct
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,8 @@ from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ipman_rs.files import parse_json, regular
 
 from .. import text
 
@@ -137,7 +138,7 @@ class Document:
             raise ValueError(
                 f"there is no file '{text.listed([name])}' beside it, which holds its buffer; copy it there"
             )
-        return self._counted(place.read_bytes())
+        return self._counted(regular(place).read_bytes())
 
     def _counted(self, content: bytes) -> bytes:
         self.size += len(content)
@@ -166,8 +167,8 @@ def _chunks(content: bytes) -> tuple[dict[str, Any], bytes | None]:
             place += 8 + size
         words, binary = chunks.get(JSON, b""), chunks.get(BIN)
     try:
-        found = json.loads(words.removeprefix(b"\xef\xbb\xbf"))
-    except (ValueError, RecursionError) as error:
+        found = parse_json(words)
+    except ValueError as error:
         raise ValueError(f"it holds no JSON of glTF ({text.listed([error])})") from None
     if not isinstance(found, dict) or not isinstance(found.get("asset", {}), dict):
         raise ValueError("it holds no JSON of glTF")
