@@ -36,7 +36,8 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard rust-toolchain.toml) 
 	$(shell find rust -type d -o -name '*.rs' -o -name Cargo.toml)
 BINARY := python/ipman_rs/_core.abi3.so
 
-.PHONY: help demo demo-poses demo-fit test test-rust test-python test-levels fuzz lint format wheel bench lock audit clean FORCE
+.PHONY: help demo demo-poses demo-fit test test-rust test-python test-levels fuzz fuzz-rust fuzz-python lint format wheel \
+	bench lock audit deny clean FORCE
 
 help:
 	@echo 'make demo     demo-poses: the named poses of the embedded body, analysed, report in $(OUT); and'
@@ -47,9 +48,10 @@ help:
 	@echo 'make format   sources formatted'
 	@echo 'make wheel    one wheel for all Pythons >= 3.10 in dist/, tried alone in a clean environment'
 	@echo 'make bench    every peer, into docs/performance.md (QUICK=1: the most important ones, in three minutes)'
-	@echo 'make fuzz     damaged files and odd calls: FUZZ_SECONDS=25 of each, FUZZ_SEED=0; hours by hand'
+	@echo 'make fuzz     damaged files and odd calls, Rust and Python: FUZZ_SECONDS=60 of each, FUZZ_SEED=0; hours by hand'
 	@echo 'make lock     requirements.lock, the versions of all that the other targets install, written anew (needs a network)'
-	@echo 'make audit    known faults of what is installed and linked: pip-audit and cargo deny (needs a network)'
+	@echo 'make audit    known faults, licences and sources of what is installed and linked: pip-audit and cargo deny'
+	@echo '              (needs a network)'
 	@echo 'make clean    remove what was built (.venv, target, out, dist)'
 	@echo 'PYTHON=python3.12 make …   chooses the interpreter of a new .venv'
 
@@ -88,11 +90,17 @@ test-levels: $(VENV)/test-tools | test-python
 		echo "CPU level $$level"; \
 		IPMAN_SIMD=$$level OMP_NUM_THREADS=1 python -m pytest -n auto $(LEVEL_TESTS); done
 
-# A minute in all. The same FUZZ_SEED tries the same cases; a case that went wrong is repeated with --case.
-FUZZ_SECONDS ?= 25
+# FUZZ_SECONDS of each target. The same FUZZ_SEED tries the same cases; one that went wrong is repeated with --case.
+FUZZ_SECONDS ?= 60
 FUZZ_SEED ?= 0
 
-fuzz: $(VENV)/test-tools | test-python
+fuzz: fuzz-rust fuzz-python
+
+# On stable Rust, with overflow checks; rust/fuzz/src/lib.rs says how cargo-fuzz runs the same targets.
+fuzz-rust: | test-rust
+	cargo run --locked -p ipman-fuzz -- all $(FUZZ_SECONDS) $(FUZZ_SEED)
+
+fuzz-python: $(VENV)/test-tools | test-python
 	OMP_NUM_THREADS=1 python tools/fuzz_readers.py --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)
 	OMP_NUM_THREADS=1 python tools/fuzz_api.py --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)
 
@@ -122,10 +130,12 @@ lock: $(VENV)/created
 		--python-version 3.10 $(addprefix --extra ,fit c3d train render evaluate figures) \
 		$(addprefix --group ,test bench lint wheel build audit) -o $(LOCK)
 
-audit: $(VENV)/audit-tools
+audit: deny $(VENV)/audit-tools
 	pip-audit --requirement $(LOCK) --no-deps --disable-pip
+
+deny:
 	cargo deny --version >/dev/null 2>&1 || cargo install --locked cargo-deny
-	cargo deny check
+	cargo deny --locked check licenses bans sources advisories
 
 clean:
 	rm -rf $(VENV) target out dist $(BINARY)

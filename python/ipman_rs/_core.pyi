@@ -213,8 +213,8 @@ def base_of_support(
     vertices: NDArray[Any],
     normal: NDArray[np.float64],
     height: NDArray[np.float64],
-) -> tuple[list[NDArray[np.float64]], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Polygons (K, 3), areas (B,), margins (B,) and numbers of contacts (B,)."""
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """The corners (N, 3) of all polygons, and how many each has; areas, margins and numbers of contacts; (B,) each."""
 
 def bose_lp(
     template: Template,
@@ -318,8 +318,11 @@ def touching(
     vertices: NDArray[Any],
     normal: NDArray[np.float64],
     height: NDArray[np.float64],
-) -> list[NDArray[np.float64]]:
-    """For each body the points (K, 3) that can touch a plane; none for a body that is no solid, or has no hull."""
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The points (N, 3) of all bodies that can touch a plane, and how many each has (B,).
+
+    None for a body that is no solid, or has no hull.
+    """
 
 def simulate(
     template: Template,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs import _core, presets
-from ipman_rs.arrays import Bodies
+from ipman_rs.arrays import Bodies, of_each
 from ipman_rs.ground import Ground
 from ipman_rs.plain import plain
 from ipman_rs.pressure import pressure
@@ -195,9 +195,7 @@ def _analyze(
     margin = value(_MARGIN)
     num_contacts = bodies.unfold(np.where(finite, rows[:, _NUM_CONTACTS], 0).astype(np.int64))
     support = BaseOfSupport(
-        polygon=nest(
-            [corners[end - count : end] for count, end in zip(counts, np.cumsum(counts), strict=True)], bodies.shape
-        ),
+        polygon=nest(of_each(corners, counts), bodies.shape),
         area=value(_AREA),
         margin=margin,
         inside=margin >= 0.0,

@@ -43,6 +43,11 @@ def single_or_double(array: NDArray[Any]) -> NDArray[Any]:
         return np.require(array, dtype, ["C", "A"])  # what comes from packed records is not aligned
 
 
+def of_each(rows: NDArray[Any], counts: NDArray[np.int64]) -> list[NDArray[Any]]:
+    """The rows of each body, of all bodies' rows one after the other and how many each has."""
+    return [rows[end - count : end] for count, end in zip(counts, np.cumsum(counts), strict=True)]
+
+
 class Bodies:
     """A batch of posed bodies of one template: `vertices` (B, V, 3) and the free batch `shape` that B stands for."""
 

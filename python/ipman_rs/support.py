@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs import _core
-from ipman_rs.arrays import Bodies
+from ipman_rs.arrays import Bodies, of_each
 from ipman_rs.checks import choice, positive
 from ipman_rs.ground import Ground
 from ipman_rs.mass import Method
@@ -58,10 +58,10 @@ def base_of_support(
     bodies = Bodies(vertices, template)
     question = _question(contact, method, "method", threshold)
     found = _core.base_of_support(template._core, *question, *bodies.over(ground))
-    polygons, area, margin, num_contacts = found
+    corners, counts, area, margin, num_contacts = found
     dtype = bodies.vertices.dtype
     return BaseOfSupport(
-        polygon=nest([polygon.astype(dtype, copy=False) for polygon in polygons], bodies.shape),
+        polygon=nest(of_each(corners.astype(dtype, copy=False), counts), bodies.shape),
         area=bodies.unfold(area.astype(dtype, copy=False)),
         margin=bodies.unfold(margin.astype(dtype, copy=False)),
         inside=bodies.unfold(margin >= 0.0),

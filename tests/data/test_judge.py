@@ -9,7 +9,7 @@ import pytest
 
 import ipman_rs as ip
 from ipman_rs.data import judge
-from ipman_rs.data.check import Finding
+from ipman_rs.data.check import Finding, place
 
 UPRIGHT = tuple(name for name in ip.body.poses.NAMES if name != "lying")
 ON_FEET = ("standing", "t_pose", "a_pose", "walking", "one_leg", "warrior", "lunge", "chair", "squat")
@@ -144,3 +144,35 @@ def test_keypoints_of_another_image_size_name_the_option():
         judge.admit("a.json", of_keypoints(PERSON * 3))
     (said,) = judge.admit("a.json", of_keypoints(PERSON * 3), force=True)
     assert "lie outside the image" in said
+
+
+def test_a_body_in_another_world_is_refused_and_one_high_up_is_odd():
+    body = ip.load_body("anny-lite")
+    standing = ip.body.posed(body, "standing")[None]
+    up = np.array([0.0, 1.0, 0.0])
+    for away, level in (((900, 0, 0), "wrong"), ((0, 60, 0), "odd"), ((0, -60, 0), "odd"), ((60, 3, 0), "ok")):
+        found = judge.bodies(standing + away, body.template, up, up_is_said=True)
+        assert found[-1].level == level
+
+
+def test_one_body_of_another_size_among_many_is_odd():
+    body = ip.load_body("anny-lite")
+    bodies = np.repeat(ip.body.posed(body, "standing")[None], 9, axis=0)
+    bodies[4] *= 0.01
+    found = [each for each in judge.bodies(bodies, body.template, np.array([0.0, 1.0, 0.0])) if each.level != "ok"]
+    assert [each.level for each in found] == ["odd"]
+    assert "1 of 9 bodies" in found[0].what
+
+
+@pytest.mark.parametrize(("unit", "option"), [(1, None), (100, "--units cm"), (1000, "--units mm")])
+def test_places_of_people_about_the_origin(unit, option):
+    draw = np.random.default_rng(0)
+    places = unit * np.column_stack([draw.normal(0, 1, 200), np.full(200, 0.9), 2 + draw.normal(0, 1, 200)])
+    assert [each.option for each in place("trans", places)] == ([] if option is None else [option])
+
+
+@pytest.mark.parametrize(("metres", "levels"), [(0.02, []), (2.0, ["odd"])])
+def test_speed(metres, levels):
+    places = np.outer(np.arange(50), [metres, 0, 0])
+    assert [each.level for each in judge.speed("trans", places, np.arange(50) / 60)] == levels
+    assert judge.speed("trans", places, None) == []

@@ -9,7 +9,7 @@ import pytest
 from miniatures import opensim as miniature
 
 import ipman_rs.data as data
-from ipman_rs.data import opensim
+from ipman_rs.data import external_loads, opensim
 
 Z_UP = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # turns y up into z up
 
@@ -293,3 +293,89 @@ def test_quiet_standing_of_bmclab(shared):
     own = table.vectors(("COPNET_X", "COPNET_Y", "COPNET_Z"))
     np.testing.assert_allclose(found.center(), own, atol=3e-4)  # theirs is filtered after it was computed
     np.testing.assert_array_equal(found.moments[0], [[0, 1.277981, 0], [0, -0.70602, 0]])
+
+
+def test_forces_of_another_clock_and_never_loaded(folder):
+    """`check` says what `ipman validate` says before a fit."""
+
+    def wrong():
+        return [f"{each.what}; {each.advice}" for each in opensim.check(folder) if each.level == "wrong"]
+
+    path = folder / "sway_grf.mot"
+    table = opensim.storage(path)
+    labels = ["time", *table.columns]
+    rows = np.stack([table.times, *table.columns.values()], axis=1)
+    miniature.storage(path, labels, rows + np.array([50.0, *[0.0] * (len(labels) - 1)]))
+    assert wrong() == [
+        "sway_grf.mot: times do not overlap: forces t 50.00 to 50.50 s, markers t 0.00 to 0.48 s; are both of one "
+        "recording, with one clock?"
+    ]
+    miniature.storage(path, labels, rows * np.array([1000.0, *[1.0] * (len(labels) - 1)]))
+    assert wrong() == [
+        "sway_grf.mot: times look like milliseconds: forces t 0.00 to 499.00 s, markers t 0.00 to 0.48 s; expected "
+        "seconds"
+    ]
+    miniature.storage(path, labels, rows * np.array([1.0, *[1e-3] * (len(labels) - 1)]))  # kilonewtons
+    assert wrong() == [
+        "sway_grf.mot: no frame has a loaded plate: the largest load is 1 N, expected over 20 N (forces t 0.00 to "
+        "0.50 s, markers t 0.00 to 0.48 s); are these the recording's forces, in newtons?"
+    ]
+
+
+def test_forces_on_the_plates(folder):
+    """One plate's forces are written as those on it: they are turned, and its centre of pressure stays."""
+    path = folder / "sway_grf.mot"
+    right = opensim.plates(opensim.storage(path))
+    assert right.notes == ()
+    table = opensim.storage(path)
+    columns = {name: -v if name.startswith("1_ground_force_v") else v for name, v in table.columns.items()}
+    miniature.storage(path, ["time", *columns], np.stack([table.times, *columns.values()], axis=1))
+    found = opensim.plates(opensim.storage(path))
+    np.testing.assert_array_equal(found.forces, right.forces)
+    np.testing.assert_array_equal(found.points, right.points)
+    assert found.notes == ("the forces of plate 2 point down, as those on the plates do; they were turned round",)
+    odd = [each.what for each in opensim.check(folder) if each.level == "odd"]
+    assert odd == [f"sway_grf.mot: {found.notes[0]}"]
+    np.testing.assert_allclose(data.open("opensim", folder)[:].forces[5, :, 1].sum(), 700, atol=1e-3)
+
+
+def test_the_positions_of_body_kinematics(folder):
+    """Velocities and accelerations have the same columns; they come first in the alphabet."""
+    right = data.open("opensim", folder)[:].center_of_mass
+    table = opensim.storage(folder / "sway_com.sto")
+    rows = np.stack([table.times, *table.columns.values()], axis=1)
+    (folder / "sway_com.sto").unlink()
+    for kind, factor in (("acc", 0.1), ("pos", 1.0), ("vel", 0.3)):
+        scale = np.array([1.0, *[factor] * len(table.columns)])
+        miniature.storage(folder / f"sway_BodyKinematics_{kind}_global.sto", ["time", *table.columns], rows * scale)
+    np.testing.assert_array_equal(data.open("opensim", folder)[:].center_of_mass, right)
+    assert [each for each in opensim.check(folder) if each.level not in ("ok", "odd")] == []
+
+
+def test_forces_of_another_place(folder):
+    miniature.forces(folder / "sway_grf.mot")
+    table = opensim.storage(folder / "sway_grf.mot")
+    columns = {name: v + 3.0 if name.endswith("px") else v for name, v in table.columns.items()}
+    rows = np.stack([table.times, *columns.values()], axis=1)
+    miniature.storage(folder / "sway_grf.mot", ["time", *columns], rows)
+    wrong = [each.what for each in opensim.check(folder) if each.level == "wrong"]
+    assert len(wrong) == 1
+    assert "sway_grf.mot: the centre of pressure is 2.9" in wrong[0]
+
+
+def test_columns_of_external_loads(folder):
+    table = opensim.storage(folder / "sway_grf.mot")
+    right = opensim.plates(table)
+    names = {name: name.replace("1_ground_force_", "FP2").replace("ground_force_", "FP1") for name in table.columns}
+    renamed = opensim.Storage(table.times, {names[n]: v for n, v in table.columns.items()}, None, "renamed.mot")
+    loads = external_loads.ExternalLoads(
+        "renamed.mot", (external_loads.Load("FP1v", "FP1p", ""), external_loads.Load("FP2v", "FP2p", "")), "loads.xml"
+    )
+    found = opensim.plates(renamed, loads=loads)
+    np.testing.assert_array_equal(found.forces, right.forces)
+    np.testing.assert_array_equal(found.points, right.points)
+    gone = external_loads.ExternalLoads("renamed.mot", (external_loads.Load("FP3v", "FP1p", ""),), "loads.xml")
+    with pytest.raises(
+        ValueError, match="loads.xml: expected three columns that begin with 'FP3v'; renamed.mot has FP1vx"
+    ):
+        opensim.plates(renamed, loads=gone)

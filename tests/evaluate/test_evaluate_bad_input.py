@@ -93,12 +93,13 @@ def test_vertices_in_millimetres(tmp_path, guessed):
     arrays = {"names": guessed["names"][:8], "vertices": 1000 * np.random.default_rng(0).random((8, 99, 3))}
     refused(
         files.save(tmp_path / "mm.npz", arrays),
-        "vertices: looks like millimetres: a body spans .* divide by 1000",
+        "vertices: looks like millimetres: a body spans .* (divide by 1000|--units mm if so)",
         tmp_path,
     )
 
 
 def job_of(tmp_path, true, arrays, **options):
+    tmp_path.mkdir(exist_ok=True)
     guess = files.save(tmp_path / "guess.npz", arrays)
     return files.job(tmp_path / "out", guess, files.save(tmp_path / "truth.npz", true), **options)
 
@@ -113,8 +114,27 @@ def test_people_who_lie_along_another_axis(tmp_path):
     true = {"names": names, "joints": joints, "joint_names": model.joint_names}
     true["ground"] = np.array([0.0, 1.0, 0.0, joints[..., 1].min()])
     job = job_of(tmp_path, true, {"names": names, "joints": turned, "joint_names": model.joint_names})
-    with pytest.raises(ValueError, match=r"guess.npz: joints: looks like \+z up: .* but up is said to be \(0, 1, 0\)"):
+    said = r"guess.npz: joints: looks like \+z up: .* is said to be \(0, 1, 0\); turn them, or give the file a ground"
+    with pytest.raises(ValueError, match=said):
         job.begin()
+
+
+def test_other_units_and_degrees_are_mended_or_forced(tmp_path, true, guessed):
+    """The figures are those of the same predictions in metres and radians."""
+    plain = job_of(tmp_path / "plain", true, guessed)
+    other = dict(guessed, transl=1000 * guessed["transl"] + [9e5, 0, 0], pose=np.degrees(guessed["pose"]))
+    moved = dict(guessed, transl=guessed["transl"] + [900, 0, 0])
+    with pytest.raises(ValueError, match=r"pose: looks like degrees.* --degrees if so|transl: .* --units mm if so"):
+        job_of(tmp_path / "wrong", true, other).begin()
+    mended = job_of(tmp_path / "mended", true, other, unit=0.001, degrees=True, force=True)
+    np.testing.assert_allclose(mended.estimates[:5].pose, plain.estimates[:5].pose, atol=1e-6)  # float32
+    np.testing.assert_allclose(mended.estimates[:5].transl, moved["transl"][:5], atol=1e-3)  # float32, 900 m away
+    mended.begin()
+    assert mended.flags[0].startswith("transl: looks like millimetres: 9")
+    assert mended.made_of["unit"] == 0.001
+    assert plain.flags == ()
+    with pytest.raises(ValueError, match="another evaluation"):
+        job_of(tmp_path / "mended", true, other, unit=0.001, degrees=False, force=True).begin()
 
 
 def test_too_few_frames_and_foreign_names(tmp_path, true, guessed):

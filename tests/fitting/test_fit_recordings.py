@@ -46,17 +46,22 @@ def test_standing_still(shared, standing):
     assert standing.fit.converged.all()
     assert standing.unknown == ()
     assert standing.fit.problem.mass is None  # nothing tells the weight
-    assert np.nanmean(standing.errors) < 0.006
+    assert np.nanmean(standing.errors) < 0.0015
     mass = solid(standing.fit).mass.numpy()
-    np.testing.assert_allclose(mass, MASS, rtol=0.05)
+    np.testing.assert_allclose(mass, MASS, rtol=0.07)  # markers do not tell how heavy somebody is
     lines = (shared("squat_forceplates") / "static1_grf.mot").read_text().splitlines()
     columns = lines[6].split()
     forces = np.array([line.split() for line in lines[7:]], dtype=float)[:: EVERY["static1"]]
     first, second = (forces[:, columns.index(f"ground_force_{plate}_vx") :][:, :6] for plate in (1, 2))
     loads = first[:, [1]] + second[:, [1]]
     pressed = (first[:, [1]] * first[:, [3, 5]] + second[:, [1]] * second[:, [3, 5]]) / loads
-    away = np.linalg.norm(solid(standing.fit).center.numpy()[:, [0, 2]] - pressed, axis=1)
-    assert away.max() < 0.03
+    away = solid(standing.fit).center.numpy()[:, [0, 2]] - pressed
+    assert np.linalg.norm(away, axis=1).max() < 0.03
+    # Forwards, along x, on average: 16 mm where hip centres were markers of the rig's hips.
+    assert abs(away[:, 0].mean()) < 0.009
+    distances = standing.skin_distances
+    assert len(distances) == 51  # but for the four hip centres
+    assert 0.005 < np.median(list(distances.values())) < 0.015
 
 
 def test_squats(shared, squatting):

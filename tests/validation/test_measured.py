@@ -27,7 +27,7 @@ def table(tmp_path, text, name="com.csv"):
 
 def test_columns_in_any_order(tmp_path):
     path = table(tmp_path, "com_y_m,time_s,note,com_x_m,com_z_m\n0.9,0,a,0,1\n1.1,0.1,b,2,-1\n")
-    assert measured.kind_of(path) == "com"
+    assert measured.kind_of(path)[0] == "com"
     found = measured.center_of_mass(path, np.array([0.0, 0.025, 0.1, 0.14, 0.2]))
     np.testing.assert_allclose(found[:3], [[0, 0.9, 1], [0.5, 0.95, 0.5], [2, 1.1, -1]], atol=1e-15)
     assert np.isfinite(found[3]).all()  # files round their times
@@ -50,14 +50,36 @@ def test_bad_tables(tmp_path, rows, told):
 
 
 def test_tables_of_something_else(tmp_path):
-    assert measured.kind_of(table(tmp_path, "a,b\n1,2\n")) is None
-    assert measured.kind_of(table(tmp_path, "k\nendheader\ntime\tknee_angle\n0\t1\n", "ik.mot")) is None
+    assert measured.kind_of(table(tmp_path, "a,b\n1,2\n"))[0] is None
+    assert measured.kind_of(table(tmp_path, "k\nendheader\ntime\tknee_angle\n0\t1\n", "ik.mot"))[0] is None
     assert not measured.has_plates(table(tmp_path, "nonsense", "walk.c3d"))
 
 
+@pytest.mark.parametrize(
+    ("title", "name", "what"),
+    [
+        ("Position", "a_BodyKinematics_pos_global.sto", "com"),
+        ("Positions", "a_acc.sto", "com"),  # the first line goes before the name
+        ("a", "a_pos_global.sto", "com"),
+        ("a", "vela.sto", "com"),
+        ("Velocity", "a.sto", "it has velocities; the positions are compared"),
+        ("Accelerations", "a_pos.sto", "it has accelerations; the positions are compared"),
+        ("a", "a_BodyKinematics_vel_global.sto", "it has velocities; the positions are compared"),
+        ("a", "acc_a.sto", "it has accelerations; the positions are compared"),
+    ],
+)
+@pytest.mark.parametrize("degrees", ["yes", "no"])
+def test_the_positions_of_body_kinematics(tmp_path, title, name, what, degrees):
+    """Its three files have the same columns; angles that are in degrees do not matter to a centre of mass."""
+    text = f"{title}\nversion=1\nnRows=1\nnColumns=4\ninDegrees={degrees}\nendheader\n"
+    path = table(tmp_path, f"{text}time\tcenter_of_mass_X\tcenter_of_mass_Y\tcenter_of_mass_Z\n0\t1\t2\t3\n", name)
+    kind, why = measured.kind_of(path)
+    assert (kind or why) == what
+
+
 def test_kinds_of_real_files(real):
-    assert measured.kind_of(real / "squat_forceplates" / "squats1_grf.mot") == "forces"
-    assert measured.kind_of(real / "gait2354" / "g2354_bodykin.sto") == "com"
+    assert measured.kind_of(real / "squat_forceplates" / "squats1_grf.mot")[0] == "forces"
+    assert measured.kind_of(real / "gait2354" / "g2354_bodykin.sto")[0] == "com"
 
 
 def test_plates_of_a_laboratory_with_z_up(real):

@@ -70,11 +70,14 @@ def trc(path, person, shift, scale=1.0, unit="m"):
     path.write_text("\n".join(lines) + "\n")
 
 
-def mot(path, cop, upward, rate=10 * RATE, scale=1.0):
+def mot(path, cop, upward, rate=10 * RATE, scale=1.0, start=0.0, rename=False, up="y"):
     """Two plates: all load is on the first, the second's centre is garbage; ten times the markers' rate."""
-    heads = ["time", *(f"ground_force_{plate}_{kind}{axis}" for plate in (1, 2) for kind in "vpm" for axis in "xyz")]
-    times = np.arange(FRAMES * rate // RATE) / rate
-    rows = [[t, 0, upward(t), 0, *(scale * cop), 0, 0, 0, 0, 1.5, 0, 99.0, 99.0, 99.0, 0, 0, 0] for t in times]
+    kinds = ("F", "COP", "M") if rename else "vpm"
+    begin = "FP" if rename else "ground_force_"
+    heads = ["time", *(f"{begin}{plate}_{kind}{axis}" for plate in (1, 2) for kind in kinds for axis in "xyz")]
+    times = start + np.arange(FRAMES * rate // RATE) / rate
+    axis = np.eye(3)["xyz".index(up)]
+    rows = [[t, *(upward(t) * axis), *(scale * cop), 0, 0, 0, *(1.5 * axis), 99.0, 99.0, 99.0, 0, 0, 0] for t in times]
     header = ["grf", "version=1", f"nRows={len(rows)}", f"nColumns={len(heads)}", "inDegrees=yes", "endheader"]
     lines = [*header, "\t".join(heads), *("\t".join(f"{value:.6f}" for value in row) for row in rows)]
     path.write_text("\n".join(lines) + "\n")
@@ -118,9 +121,12 @@ def test_the_figures_are_those_that_were_made_up(first):
     assert still["mass"]["plates"] == pytest.approx(MASS, abs=0.2)  # the second plate's 1.5 N
     assert lift["mass"]["plates"] == pytest.approx(MASS, abs=0.3)
     assert lift["force"]["share"] < 0.01
-    np.testing.assert_allclose(still["standing"]["offset"], -OFF[[0, 2]], atol=3e-3)  # of the fit
-    np.testing.assert_allclose(lift["com"]["methods"]["exact"]["mean"], [0, -0.03, 0], atol=3e-3)
+    np.testing.assert_allclose(still["standing"]["offset"], -OFF[[2, 0]], atol=3e-3)  # forward is z, left x; of the fit
+    np.testing.assert_allclose(lift["com"]["methods"]["exact"]["mean"], [0, 0, -0.03], atol=3e-3)
     assert still["com"] is None
+    assert still["mass"]["standing"] is None
+    assert lift["mass"]["standing"] == still["mass"]["plates"]  # the same person's, standing still
+    assert still["flags"] == lift["flags"] == []
 
 
 def test_what_is_written(first):
@@ -195,6 +201,99 @@ def test_forces_in_millimetres(run, person, folder, tmp_path):
     said = run(lab, "-o", tmp_path / "out", "--rate", "10")
     assert said.code == 1
     assert "static_grf.mot: looks like millimetres" in said.err
+
+
+def written(path, person, **options):
+    """The markers of somebody who stands still."""
+    trc(path, person, moved()[1], **options)
+
+
+def test_forces_that_tell_nothing_are_named_before_the_fit(run, person, folder, tmp_path):
+    """On another clock, and never loaded: one line each, nothing is fitted for them, and the rest goes on."""
+    lab = tmp_path / "lab"
+    lab.mkdir()
+    copied(folder, lab, "static.trc", "static_grf.mot")
+    for name in ("late", "empty"):
+        written(lab / f"{name}.trc", person)
+    mot(lab / "empty_grf.mot", person.com, lambda _t: 0.0)
+    mot(lab / "late_grf.mot", person.com, lambda _t: MASS * G, start=50.0)
+    said = run(lab, "-o", tmp_path / "out", "--rate", "10")
+    assert said.code == 1
+    lines = [line for line in said.err.splitlines() if line]
+    assert len(lines) == 2
+    assert "empty_grf.mot: no frame has a loaded plate: the largest load is 2 N, expected over 20 N (" in lines[0]
+    assert "late_grf.mot: times do not overlap: forces t 50.00 to 50.80 s, markers t 0.00 to 0.78 s" in lines[1]
+    assert records(tmp_path / "out").keys() == {"static"}
+    assert not (tmp_path / "out" / "late").exists()
+    (lab / "static_grf.mot").unlink()
+    again = run(lab, "-o", tmp_path / "nothing", "--rate", "10")
+    assert again.code == 1
+    assert not (tmp_path / "nothing").exists()  # nobody needs the shape of who stands still
+
+
+def test_forces_on_the_plates_are_turned(run, person, tmp_path):
+    (tmp_path / "lab").mkdir()
+    written(tmp_path / "lab" / "markers.trc", person)
+    mot(tmp_path / "lab" / "plates.mot", (person.com + OFF) * [1, 0, 1], lambda _t: -MASS * G)
+    said = run(tmp_path / "lab", "-o", tmp_path / "out", "--rate", "10")
+    assert said.code == 0, said.err
+    found = records(tmp_path / "out")["markers"]
+    assert found["flags"] == ["the forces of plate 1 point down, as those on the plates do; they were turned round"]
+    assert found["mass"]["plates"] == pytest.approx(MASS, abs=0.3)
+    np.testing.assert_allclose(found["standing"]["offset"], -OFF[[2, 0]], atol=3e-3)
+
+
+def test_columns_that_external_loads_name(run, person, tmp_path):
+    (tmp_path / "MarkerData").mkdir()
+    (tmp_path / "ForceData").mkdir()
+    written(tmp_path / "MarkerData" / "trial1.trc", person)
+    mot(tmp_path / "ForceData" / "kistler.mot", (person.com + OFF) * [1, 0, 1], lambda _t: MASS * G, rename=True)
+    said = run(tmp_path, "-o", tmp_path / "out", "--rate", "10")
+    assert said.code == 2
+    assert "nothing to compare with" in said.err.replace("\n", " ")
+    (tmp_path / "ForceData" / "trial1_loads.xml").write_text(
+        "<OpenSimDocument><ExternalLoads><objects><ExternalForce><force_identifier>FP1_F</force_identifier>"
+        "<point_identifier>FP1_COP</point_identifier><torque_identifier>FP1_M</torque_identifier></ExternalForce>"
+        "</objects><datafile>D:\\data\\kistler.mot</datafile></ExternalLoads></OpenSimDocument>"
+    )
+    said = run(tmp_path, "-o", tmp_path / "out", "--rate", "10")
+    assert said.code == 0, said.err
+    assert records(tmp_path / "out")["trial1"]["mass"]["plates"] == pytest.approx(MASS, abs=0.3)
+
+
+def test_markers_that_cannot_be_a_persons_are_refused_before_the_fit(run, person, tmp_path):
+    """Millimetres that are said to be metres; and z up, which --up mends."""
+    lab = tmp_path / "lab"
+    lab.mkdir()
+    written(lab / "big.trc", person, scale=1000.0)
+    mot(lab / "big_grf.mot", person.com * [1, 0, 1], lambda _t: MASS * G)
+    said = run(lab, "-o", tmp_path / "out", "--rate", "10")
+    assert said.code == 1
+    assert "big.trc: markers: " in said.err
+    assert "a body spans 1" in said.err
+    assert "--units mm if so" in said.err
+    turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    up = SimpleNamespace(names=person.names, points=person.points @ turn.T)
+    trc(lab / "big.trc", up, 0 * moved()[1])
+    said = run(lab, "-o", tmp_path / "out", "--rate", "10")
+    assert "markers: looks like +z up" in said.err
+    assert "--up z if so" in said.err
+    assert not (tmp_path / "out").exists()
+    mot(lab / "big_grf.mot", turn @ ((person.com + OFF) * [1, 0, 1]), lambda _t: MASS * G, up="z")
+    said = run(lab, "-o", tmp_path / "out", "--rate", "10", "--up", "z")
+    assert said.code == 0, said.err
+    np.testing.assert_allclose(records(tmp_path / "out")["big"]["standing"]["offset"], -OFF[[2, 0]], atol=3e-3)
+
+
+def test_who_stands_still_by_the_markers_gives_the_shape(run, person, folder, tmp_path):
+    lab = tmp_path / "lab"
+    lab.mkdir()
+    copied(folder, lab, "lift.trc", "lift_grf.mot")
+    written(lab / "z01.trc", person)
+    said = run(lab, "-o", tmp_path / "out", "--rate", "10")
+    assert said.code == 0, said.err
+    assert "z01: its markers stand still; its shape and places of markers are kept for the others" in said.out
+    assert records(tmp_path / "out")["lift"]["fit"]["shape_from"] == "z01"
 
 
 def test_wrong_usage(run, folder, tmp_path):

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import pytest
 
-from ipman_rs.validation.folder import find
+from ipman_rs.validation.folder import Kinds, find
 
 
 def kind_of(path):
     """As the files' columns would say."""
-    return {"f": "forces", "c": "com", "n": None}[path.read_text()]
+    return {"f": ("forces", ""), "c": ("com", ""), "n": (None, "it has neither forces nor a centre of mass")}[
+        path.read_text()
+    ]
 
 
 @pytest.fixture
 def found(tmp_path):
     """found(name=content, ...) of a folder with these files."""
 
-    def call(plates=(), **files):
+    def call(plates=(), com=(), **files):
         for name, content in files.items():
             stem, _, ending = name.rpartition("__")
             (tmp_path / f"{stem}.{ending}").write_text(content)
-        trials, notes, unreadable = find(tmp_path, kind_of, lambda path: path.name in plates)
+        kinds = Kinds(kind_of, lambda path: path.name in plates, lambda path: path.name in com)
+        trials, notes, unreadable = find(tmp_path, kinds)
         told = [(t.name, t.forces and t.forces.name, t.com and t.com.name) for t in trials]
         assert not unreadable
         return told, notes
@@ -45,7 +48,7 @@ def test_plates_of_a_c3d_come_first(found):
     told, notes = found(plates=["walk.c3d"], walk__c3d="", walk_grf__mot="f", walk_kinematics__sto="n")
     assert told == [("walk", "walk.c3d", None)]
     assert notes == [
-        "walk_grf.mot: not used, for walk has its forces from walk.c3d",
+        "walk_grf.mot: not used, for walk.c3d has forces of its own",
         "walk_kinematics.sto: not used, for it has neither forces nor a centre of mass",
     ]
 
@@ -53,15 +56,15 @@ def test_plates_of_a_c3d_come_first(found):
 def test_a_stranger_belongs_to_the_only_recording_with_forces(found):
     told, notes = found(static__trc="", run__trc="", run_grf__mot="f", bodykin__sto="c")
     assert told == [("static", None, None), ("run", "run_grf.mot", "bodykin.sto")]
-    assert notes == ["bodykin.sto: taken as the centre of mass of run, the only recording with forces"]
+    assert notes == ["bodykin.sto: taken as the centre of mass of run.trc, the only recording with forces"]
 
 
 def test_a_stranger_of_nobody(found):
     told, notes = found(one__trc="", two__trc="", one__mot="f", two__mot="f", bodykin__sto="c", gym__mot="f")
     assert [com for *_, com in told] == [None, None]
     assert notes == [
-        "gym.mot: not used, for its name has no recording's name in it",
-        "bodykin.sto: not used, for its name does not say which recording it is of",
+        "gym.mot: not used, for its name has no recording's name in it; expected such as one_grf.mot",
+        "bodykin.sto: not used, for its name has no recording's name in it; expected such as one_com.sto",
     ]
 
 
@@ -69,16 +72,21 @@ def test_bad_folders(tmp_path, found):
     def never(_path):
         raise AssertionError
 
+    kinds = Kinds(never, never, never)
     with pytest.raises(ValueError, match="nowhere: expected a folder of recordings, not there"):
-        find(tmp_path / "nowhere", never, never)
+        find(tmp_path / "nowhere", kinds)
     with pytest.raises(ValueError, match=r"expected files of markers \(.trc, .c3d\), got an empty folder"):
-        find(tmp_path, never, never)
+        find(tmp_path, kinds)
     (tmp_path / "notes.txt").write_text("")
     with pytest.raises(ValueError, match="expected a folder of recordings, got a file"):
-        find(tmp_path / "notes.txt", never, never)
+        find(tmp_path / "notes.txt", kinds)
     with pytest.raises(ValueError, match=r"got notes.txt"):
-        find(tmp_path, never, never)
+        find(tmp_path, kinds)
     with pytest.raises(ValueError, match=r"markers of hop, but nothing to compare with; .*such as hop_grf.mot"):
         found(hop__trc="")
-    with pytest.raises(ValueError, match="two files of markers have the name 'hop'"):
-        found(hop__c3d="")
+
+
+def test_a_c3d_goes_before_the_trc_that_was_made_of_it(found):
+    told, notes = found(plates=["hop.c3d"], com=["hop.c3d"], hop__c3d="", hop__trc="")
+    assert told == [("hop", "hop.c3d", "hop.c3d")]
+    assert notes == ["hop.trc: not used, for hop.c3d has the same name; take away one of them"]

@@ -166,7 +166,8 @@ def _number(value: float, factor: float, digits: int) -> str:
 
 
 def print_validation(records: Sequence[Mapping[str, Any]]) -> None:
-    """A line for each phase of each recording: weight, centre of mass and centre of pressure against the measured."""
+    """A line for each phase of each recording: weight, centre of mass and centre of pressure against the measured; and
+    what is odd. A weight by plates that is not to be trusted has a mark."""
     table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
     table.add_column("recording", overflow="fold", min_width=10)
     table.add_column("", no_wrap=True)
@@ -180,18 +181,23 @@ def print_validation(records: Sequence[Mapping[str, Any]]) -> None:
             (one["mass"]["plates"], 1),
             (compared, 1e3),
         ]
-        first = [one["name"], one["kind"], *(_known(value, factor) for value, factor in told)]
+        cells = [_known(value, factor) for value, factor in told]
+        cells[2] += " !" if any(flag.startswith("weight by the plates") for flag in one["flags"]) else ""
+        first = [one["name"], one["kind"], *cells]
         phases = one["cop"] or {"all": {"distance": {}}}
         for phase, found in phases.items():
             lead = first if phase == next(iter(phases)) else [""] * len(first)
             if phase != "all":
-                lead[1] = phase
+                lead[1] = f"{one['kind']}, {phase}"
             away = [found["distance"].get(name) for name in ("at rest: g(CoM)", "moving: ZMP of the parts", "γ = 10")]
             table.add_row(*(Text(one_line(cell)) for cell in [*lead, *(_known(value, 1e3) for value in away)]))
     console = Console(highlight=False)
     if not console.is_terminal:
         console.width = 160
     console.print(table)
+    for one in records:
+        for flag in one["flags"]:
+            say(one_line(f"look: {one['name']}: {flag}"))
 
 
 def _known(value: float | None, factor: float) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import PRESETS, Setting
+from .options import PRESETS, Setting, degrees, force, units
 
 if TYPE_CHECKING:
     from ..evaluation.tables.job import Job, Shard
@@ -55,6 +55,9 @@ class ShardOf(click.ParamType):
     "--preset", type=click.Choice(PRESETS), default="paper-r", show_default=True, help="Constants of the pressure."
 )
 @click.option("--partial", is_flag=True, help="Leave out frames without prediction (otherwise an error).")
+@units
+@degrees
+@force
 @click.option("--shard", type=ShardOf(), help="Do this part only, such as 2/7; the last one writes the report.")
 @click.option("--ray", is_flag=True, help="Do the shards on Ray (RAY_ADDRESS: a cluster; else this machine).")
 def evaluate(
@@ -65,8 +68,9 @@ def evaluate(
     PRED is an .npz or .parquet file: names (F,) of the frames as the data set calls them, in any order, and pose
     (F, J, 3) with betas, transl and body (smpl, smplh, smplx, anny, anny-lite), or vertices (F, V, 3), or joints
     (F, K, 3) with joint_names. Metres, in the axes of the data set, or with a ground (4,) of its own: normal and
-    height. With several files each is compared with the first, frame by frame. The data set own is a file in the same
-    form: your truth. The word truth instead of a file: the data set's own bodies, held against what was measured.
+    height. --units, --degrees and --force are about these files. With several files each is compared with the first,
+    frame by frame. The data set own is a file in the same form: your truth. The word truth instead of a file: the data
+    set's own bodies, held against what was measured.
 
     OUTPUT gets evaluation.md, .json, .csv, .svg and .png, sequences.csv, frames.parquet with all figures of each frame
     (needs the extra evaluate), and the pieces it is made of: interrupted, the same command goes on where it was.
@@ -118,6 +122,9 @@ def _jobs(predictions: tuple[Path, ...], output: Path, given: dict[str, Any]) ->
         "regressors": tuple(str(path) for path in given["regressors"]),
         "preset": given["preset"],
         "partial": given["partial"],
+        "unit": given["units"],
+        "degrees": given["degrees"],
+        "force": given["force"],
         "folder": str(output),
     }
     names = methods(predictions)
@@ -132,6 +139,8 @@ def _evaluate(jobs: list[Job], table: Table | None, output: Path, shard: tuple[i
         job.begin()
         for number in job.damaged():
             console.warn(f"{job.file(number)}: is not whole, or of another evaluation; it is measured again")
+        for flag in job.flags:
+            console.warn(f"{job.predictions}: {flag}")
     _measure(jobs, Shard(*shard) if shard else Shard(), ray)
     missing = sum(len(job.missing()) for job in jobs)
     if missing:
@@ -175,7 +184,8 @@ def _report(jobs: list[Job], table: Table | None, output: Path) -> None:
     parts = [source.name, *([source.split] if source.split else []), *(f"{k}={v}" for k, v in source.options)]
     where = f"Data: {', '.join(parts)}, {len(jobs[0].data):,} frames ({source.path})."
     definitions = {job.name: job.definition for job in jobs}
-    made = report.Report(title, where, found, differences, table, definitions)
+    flags = {job.name: job.flags for job in jobs}
+    made = report.Report(title, where, found, differences, table, definitions, flags)
     with console.progress("writing", frames) as step:
         written = report.write(made, output, jobs, _counter(step))
     console.print_rows(*report.rows(made))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import FileError
-from .options import FLOOR, SIZE, UP, Setting, of_unknown_camera
+from .options import FLOOR, METRES, SIZE, UNIT, UP, Setting, force, of_unknown_camera, rate
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -70,6 +70,25 @@ if TYPE_CHECKING:
     "--person", type=int, metavar="N",
     help="Which person of an image, from 0, or which track of a file that follows people. Default: the most visible.",
 )  # fmt: skip
+@click.option(
+    "--up", type=UP, metavar="AXIS",
+    help="What points up in a marker file: x, y, z, -x, -y, -z, or a normal; the bodies are y up. Default: y for .trc, "
+    "what it says for .c3d.",
+)  # fmt: skip
+@click.option(
+    "--units", type=UNIT, metavar="UNIT",
+    help=f"Unit of the lengths in a marker file: {', '.join(METRES)}, or a number of metres. Default: what it says.",
+)  # fmt: skip
+@rate
+@click.option(
+    "--markers", type=click.Path(path_type=Path), metavar="FILE",
+    help="Places of markers with other names: a JSON or YAML object, or a CSV file, of names and places.",
+)  # fmt: skip
+@click.option(
+    "--marker-places", is_flag=True, is_eager=True, expose_value=False, callback=lambda *given: _list_places(*given),
+    help="List the places that --markers can name, and end.",
+)  # fmt: skip
+@force
 @click.option("--subject", metavar="NAME", help="Whose markers (NAME:LASI), where a marker file has several people's.")
 @click.option("--obj", is_flag=True, help="Write meshes as .obj, too, not only as .glb.")
 @click.option(
@@ -79,9 +98,6 @@ if TYPE_CHECKING:
 @click.option("--fps", type=float, default=30.0, show_default=True, help="Frames a second of a --sequence.")
 @click.option(
     "--every", type=click.IntRange(1), default=1, show_default=True, help="Fit each n-th frame of recordings."
-)
-@click.option(
-    "--force", is_flag=True, help="Take what cannot be a person, too; what is odd about it is said all the same."
 )
 @click.option("--resume", is_flag=True, help="Skip items that were finished with the same input and options.")
 @click.option(
@@ -143,6 +159,7 @@ def fit(
     ipman fit yoga.json -o out --preset ipman-o --pose shown.npz --height 1.7 --mass 62
     ipman fit frames/ -o out --sequence --fps 25    one person over time, with one shape
     ipman fit squats.trc -o out --every 5           optical markers, by the preset markers
+    ipman fit lab.trc -o out --up z --units mm --markers names.json           that does not say what it is
     ipman fit --data moyo --path MOYO/ --models models/ -o out/ipman-o        Table 2: then ipman evaluate --table moyo
     ipman fit --data rich --path RICH/ --models models/ -o out/ipman-o-star   and --table rich-o-star
 
@@ -161,8 +178,11 @@ def fit(
         where = {"name": data, "path": str(path), "split": split, "options": settings}
         sys.exit(fit_data(where, output, models, keypoints, image_folder, every, options))
     options["preset"], options["model"] = options["preset"] or "fast", options["model"] or "anny-lite"
-    reading = Reading(options.pop("person"), options.pop("image_size"), image, sequence, options.pop("force"))
+    reading = Reading(options.pop("person"), options.pop("image_size"), image, sequence, options["force"])
     items, tracks, failures = _items(inputs, reading)
+    said = next((name for name in ("up", "units", "rate", "markers") if options[name] is not None), None)
+    if said and not tracks and not failures:
+        raise click.UsageError(f"--{said} belongs to marker files (.trc, .c3d), of which there are none")
     chosen = _settings(options)
     if fps <= 0:
         raise click.UsageError(f"--fps: expected more than 0, got {fps}")
@@ -187,6 +207,18 @@ def fit(
             console.print_table(recorded)
         console.say(f"report: {page}")
     sys.exit(1 if failures else 0)
+
+
+def _list_places(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if not wanted or context.resilient_parsing:
+        return
+    needs("torch", "roma", "yaml")
+    import ipman_rs as ip
+
+    from ..fitting.markers import places
+
+    click.echo("\n".join(places(ip.load_body("anny-lite"))))
+    context.exit()
 
 
 def needs(*modules: str) -> None:
@@ -245,12 +277,17 @@ def _recordings(
 
 
 def _settings(options: dict[str, Any]) -> Settings:
+    import ipman_rs as ip
+
     from ..fitting import camera_file, config
+    from ..fitting.markers import own
     from .fit_run import Settings
 
     try:
         options["camera"] = None if options["camera"] is None else camera_file.read(options["camera"])
         chosen, most = config.load(options.pop("preset")), options.pop("iterations")
+        if options["markers"] is not None:
+            own.read(options["markers"], ip.load_body(options["model"]))  # before anything is fitted
         return Settings(config=chosen if most is None else config.capped(chosen, most), **options)
     except ValueError as error:
         raise click.UsageError(str(error)) from error

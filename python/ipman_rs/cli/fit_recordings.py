@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..body import safe_npz
+from ..data import judge
 from ..files import read_json
 from . import console
 from .errors import FileError
@@ -19,7 +20,8 @@ from .fit_outputs import RECORD, complete, write_files
 
 if TYPE_CHECKING:
     from ..fitting.fit import Fit
-    from ..fitting.recorded import Person
+    from ..fitting.markers import Point
+    from ..fitting.recorded import Person, Recorded
     from ..view import Study
     from .fit_inputs import Item
     from .fit_run import Settings
@@ -47,7 +49,10 @@ def fitted(recording: Recording, settings: Settings, pace: Pace, output: Path, r
     """Fit a recording, write its folder and measure it. Raises FileError."""
     record = kept(recording, settings, pace, output, resume)
     study = _measured(recording, output / recording.name, settings)
-    return replace(study, notes=(*study.notes, *record.get("notes", ())))
+    flags = (*record.get("flags", ()), *study.flags)
+    for flag in flags:
+        console.warn(f"{recording.source}: {flag}")
+    return replace(study, notes=(*study.notes, *record.get("notes", ())), flags=flags)
 
 
 def kept(
@@ -70,8 +75,8 @@ def kept(
                 else _fit_frames(recording, settings, pace)
             )
         except ValueError as error:
-            raise FileError(recording.paths[0], str(error)) from error
-        record = {"name": recording.name, "source": recording.source, **told, **_stages(found)}
+            raise FileError(recording.paths[0], str(error).removeprefix(f"{recording.paths[0]}: ")) from error
+        record = {"name": recording.name, "source": recording.source, **_stages(found), **told}
         record |= {"preset": _preset(recording, settings), "shape_from": person or "itself", "identity": identity}
         record = write_files(folder, {f"{recording.name}.npz": {**_arrays(found, rate), **arrays}}, record)
     return record
@@ -81,15 +86,23 @@ def person_of(folder: Path) -> Person:
     """Whose marker recording is kept in a folder."""
     import torch
 
-    from ..fitting.markers import Site
     from ..fitting.recorded import Person
 
     record = _record(folder)
-    sites = {
-        name: site if isinstance(site, str) else Site(site["vertex"], tuple(site["shift"]))
-        for name, site in record["sites"].items()
-    }
+    sites = {name: _point(site) for name, site in record["sites"].items()}
     return Person(torch.from_numpy(safe_npz.read(folder / f"{record['name']}.npz", "betas").copy()), sites)
+
+
+def _point(site: Any) -> Point:
+    """A marker's place, as a record has it."""
+    from ..fitting.markers import Inner, Site
+
+    if isinstance(site, str):
+        return site
+    if "joint" in site:
+        by_betas = tuple(tuple(each) for each in site["by_betas"])
+        return Inner(site["joint"], tuple(site["place"]), by_betas, site["spread"])
+    return Site(site["vertex"], tuple(site["shift"]), site["spread"])
 
 
 def _record(folder: Path) -> dict[str, Any]:
@@ -108,23 +121,53 @@ def _fit_markers(recording: Recording, settings: Settings, pace: Pace, person: P
     import ipman_rs.torch as ipt
 
     from ..fitting import config, markers, recorded
+    from ..fitting.markers import own
+    from ..fitting.markers.judged import of_skin
 
-    preset = _preset(recording, settings)
+    preset, path = _preset(recording, settings), recording.paths[0]
     chosen = config.load(preset) if preset == "markers" else settings.config
-    tracks = markers.read(recording.paths[0], subject=settings.subject)
-    body, count = ipt.BodyModel(settings.model), len(range(0, len(tracks), pace.every))
+    body = ipt.BodyModel(settings.model)
+    names = None if settings.markers is None else own.read(settings.markers, body.body)
+    tracks = markers.read(path, settings.up, settings.subject, settings.units, settings.rate)
+    flags = judge.admit(path, recorded.judged_tracks(tracks, names, settings.up is not None), settings.force)
+    count = len(range(0, len(tracks), pace.every))
     with console.progress(f"fitting {recording.name}", count) as step:
-        told = {"every": pace.every, "ground": settings.ground or 0.0, "person": person}
+        told = {"every": pace.every, "ground": settings.ground or 0.0, "person": person, "own": names}
         found = recorded.fit_tracks(
             body, tracks, chosen, **told, progress=lambda _stage, done: step.to(min(done, count))
         )
+    findings, distances = recorded.judged_fit(found), found.skin_distances
+    flags = (*flags, *judge.admit(path, [*findings, *of_skin(distances)], settings.force))
     errors = found.errors
-    each = {name: _number(np.nanmean(column)) for name, column in zip(found.tracks.names, errors.T, strict=True)}
+    each = {name: _mean(column) for name, column in zip(found.tracks.names, errors.T, strict=True)}
     sites = {name: site if isinstance(site, str) else asdict(site) for name, site in found.sites.items()}
-    record = {"mean_marker_error_m": _number(np.nanmean(errors)), "marker_errors_m": each, "unknown": [*found.unknown]}
-    times = found.tracks.times
-    rate = found.tracks.rate or 1.0
-    return found.fit, {"times": times}, {**record, "notes": [*tracks.notes], "sites": sites}, rate
+    record = {"mean_marker_error_m": _mean(errors), "marker_errors_m": each, "skin_distances_m": distances}
+    record |= {"unknown": [*found.unknown], "unseen": [*found.unseen], "flags": [*flags]}
+    record |= {"notes": [*tracks.notes, *_marker_notes(found, settings)], "sites": sites}
+    if any(finding.level == "wrong" for finding in findings):
+        record["converged"] = False
+    return found.fit, {"times": found.tracks.times}, record, found.tracks.rate or 1.0
+
+
+def _marker_notes(found: Recorded, settings: Settings) -> list[str]:
+    """What was done with the markers that is not odd."""
+    notes = []
+    if settings.up is not None:
+        axis = ", ".join(f"{number:g}" for number in settings.up)
+        notes.append(f"up: ({axis}) of the file's axes, turned to y: the bodies are y up")
+    if found.unseen:
+        notes.append(f"{len(found.unseen)} markers of the file were never seen: {', '.join(found.unseen)}")
+    usual = [away for name, away in found.skin_distances.items()]
+    if usual:
+        middle = 1e3 * float(np.median(usual))
+        notes.append(f"markers: {middle:.0f} mm from the skin in the median, 7 to 15 is usual (all in fit.json)")
+    return notes
+
+
+def _mean(errors: np.ndarray) -> float | None:
+    """The mean of what is known."""
+    known = errors[np.isfinite(errors)]
+    return float(known.mean()) if len(known) else None
 
 
 def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
@@ -192,11 +235,14 @@ def _arrays(found: Fit, rate: float) -> dict[str, np.ndarray]:
 
 
 def _measured(recording: Recording, folder: Path, settings: Settings) -> Study:
-    from .measure import Request, measure
+    from .measure import Request, analysed
 
     path = folder / f"{recording.name}.npz"
     height = float(safe_npz.read(path, "ground_height")[0]) if "ground_height" in safe_npz.names(path) else None
-    return measure(path, Request(model=settings.model, ground=height))
+    study = analysed(path, Request(model=settings.model, ground=height))
+    slow = judge.rate(float(safe_npz.read(path, "mocap_frame_rate")))  # some of the recording's frames are left out
+    known = {finding.what for finding in slow}
+    return replace(study, flags=tuple(flag for flag in study.flags if flag.partition(";")[0] not in known))
 
 
 def _identity(recording: Recording, settings: Settings, pace: Pace, person: str | None) -> str:

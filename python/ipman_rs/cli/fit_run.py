@@ -46,10 +46,15 @@ class Settings:
     pose_up: tuple[float, float, float] | None = None
     contact: Path | None = None
     subject: str | None = None
+    up: tuple[float, float, float] | None = None  # of a marker file, in its own axes
+    units: float | None = None  # metres in one of a marker file's lengths
+    rate: float | None = None  # Hz, of a marker file
+    markers: Path | None = None  # a file of marker names and their places
+    force: bool = False  # markers that cannot be a person's are fitted, too
     obj: bool = False
 
     def identity(self) -> str:
-        files = [path for path in (self.pose, self.contact) if path is not None and Path(path).is_file()]
+        files = [path for path in (self.pose, self.contact, self.markers) if path is not None and Path(path).is_file()]
         content = [hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in files]
         return json.dumps([ip.__version__, asdict(self), content], default=str, sort_keys=True)
 

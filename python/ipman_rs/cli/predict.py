@@ -114,6 +114,9 @@ def predict(
 
         page = write(studies, output, failures, own_folders=True)
         console.print_table(studies)
+        for study in studies:
+            for flag in study.flags:
+                console.warn(f"{study.source}: {flag}")
         console.say(f"report: {page}")
     sys.exit(1 if failures or not paths else 0)
 
@@ -193,9 +196,25 @@ def _predicted(
     fit_outputs.write_files(output / path.stem, files, {"name": path.stem, "source": str(path)})
     ground = ip.Ground.y_up(vertices[:, 1].min())
     note = "predicted in one look; the floor lies under the lowest vertex"
-    study = view.study(path.stem, vertices, body.template, ground, source=str(path), notes=[note])
+    flags = _flags(path, vertices, body.template, ground.normal)
+    study = view.study(path.stem, vertices, body.template, ground, source=str(path), notes=[note], flags=flags)
     fitted = view.Fitted(
         camera=camera_of(*camera.values()), size=(width, height), seen=np.zeros((0, 3)), projected=np.zeros((0, 2)),
         photo=pixels if pictured else None, pictured=pictured, record={"box": [float(side) for side in box]},
     )  # fmt: skip
     return replace(study, fitted=fitted)
+
+
+def _flags(path: Path, vertices: Any, template: Any, normal: Any) -> tuple[str, ...]:
+    """What is odd about a predicted body, in words; options mend files, not predictions."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    import ipman_rs as ip
+
+    from ..data import judge
+
+    mass = float(ip.mass_properties(vertices, template).mass)
+    found = [*judge.bodies(np.asarray(vertices)[None], template, normal), *judge.mass(mass)]
+    return judge.admit(path, [replace(each, option="", advice="") for each in found], force=True)

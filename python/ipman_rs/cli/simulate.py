@@ -176,6 +176,9 @@ def simulate(
             for flag in one.flags:
                 console.say(one_line(f"! {one.path}: {flag}"))
             assumed = [note for note in one.notes if note.startswith(("up: ", "ground: "))]
+            for note in one.notes:
+                if note not in assumed and not note.startswith("parts: "):
+                    console.say(one_line(f"{one.path}: {note}"))
             if assumed:
                 console.say(one_line(f"{one.path}: {'; '.join(assumed)}"))
         for note in dict.fromkeys(one.without_verdict for one in falls if one.without_verdict):

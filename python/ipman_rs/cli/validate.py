@@ -5,11 +5,13 @@ from __future__ import annotations
 import sys
 import warnings
 from pathlib import Path
+from typing import Any
 
 import click
 
 from .errors import FileError
 from .fit import needs
+from .options import METRES, RATE, UNIT, UP, force
 
 
 @click.command()
@@ -22,21 +24,54 @@ from .fit import needs
 @click.option(
     "--person", default="auto", show_default=True, metavar="auto|none|NAME",
     help="The recording of standing still whose shape and places of markers are kept for all others; auto: the one "
-    "whose name says so (static, stand, neutral, calib), if there is one; none: every recording finds its own.",
+    "whose name says so (static, stand, neutral, calib), or whose markers do, if there is one; none: every recording "
+    "finds its own.",
 )  # fmt: skip
 @click.option(
     "--rate", type=click.FloatRange(min=0, min_open=True), default=50.0, show_default=True, metavar="HZ",
     help="Fit about so many frames a second. Accelerations, and with them the ZMP, need 24 or more.",
 )  # fmt: skip
+@click.option(
+    "--up", type=UP, metavar="AXIS",
+    help="What points up in markers, forces and centres of mass. Default: what a .c3d says, y in .trc, .mot and .sto.",
+)  # fmt: skip
+@click.option(
+    "--units", type=UNIT, metavar="UNIT",
+    help=f"Unit of the lengths in marker files: {', '.join(METRES)}, or a number of metres. Default: what they say.",
+)  # fmt: skip
+@click.option(
+    "--force-units", "force_unit", type=click.Choice(["m", "cm", "mm"]), default="m", show_default=True,
+    help="Unit of the centres of pressure in .mot and .sto, which do not say it.",
+)  # fmt: skip
+@click.option(
+    "--recorded-rate", type=RATE, metavar="HZ", help="Frames a second of the markers, where their files are wrong."
+)
+@click.option(
+    "--markers", type=click.Path(path_type=Path), metavar="FILE",
+    help="Places of markers with other names, as `ipman fit --markers` has them.",
+)  # fmt: skip
+@click.option("--subject", metavar="NAME", help="Whose markers (NAME:LASI), where a marker file has several people's.")
+@force
 @click.option("--fresh", is_flag=True, help="Fit again what was fitted before with the same files and options.")
-def validate(folder: Path, output: Path, model: str, person: str, rate: float, fresh: bool) -> None:
+def validate(
+    folder: Path,
+    output: Path,
+    model: str,
+    person: str,
+    rate: float,
+    fresh: bool,
+    recorded_rate: float | None,
+    **said: Any,
+) -> None:
     """Compare the engine's centre of mass, centre of pressure and pressure with measurements.
 
-    FOLDER holds recordings of one person: markers (.trc, or .c3d), force plates (.mot, or those of
-    the .c3d) and centres of mass by others, such as OpenSim's (.sto, or .csv with columns time_s, com_x_m, com_y_m,
-    com_z_m; y up). A file belongs to the recording whose name is in its own: squats.trc, squats_grf.mot,
-    squats_com.sto. Bodies are fitted to the markers alone, as by `ipman fit`, and are kept: run it again and it goes on
-    where it was.
+    FOLDER holds recordings of one person: markers (.trc, .c3d), force plates (.mot, .sto, or
+    those of the .c3d) and centres of mass by others, such as OpenSim's (.sto, or .csv with columns time_s, com_x_m,
+    com_y_m, com_z_m; y up) or Plug-in Gait's CentreOfMass in the .c3d. Names and folders say which belong together:
+    squats.trc, squats_grf.mot and squats_com.sto; markers_walk.trc and grf_walk.mot; MarkerData/walk.trc and
+    ID/walk_grf.mot; walk/markers.trc and walk/grf.mot; or the only two. OpenSim's ExternalLoads (.xml) say in which
+    columns forces are. Bodies are fitted to the markers alone, as by `ipman fit`, and are kept: run it again and it
+    goes on where it was.
 
     OUTPUT gets validation.md and validation.json with all tables, and a folder for every recording: series.csv and
     series.npz over time, the fit, and pictures of the pressure on the floor, of what happens over time, of the bodies.
@@ -53,7 +88,8 @@ def validate(folder: Path, output: Path, model: str, person: str, rate: float, f
     from . import console, validate_run
 
     try:
-        plan = validate_run.plan(folder, output, model, person, rate, not fresh)
+        said["rate"] = recorded_rate
+        plan = validate_run.plan(folder, output, model, person, rate, not fresh, **said)
     except (ValueError, ImportError) as error:
         raise click.UsageError(str(error)) from error
     try:

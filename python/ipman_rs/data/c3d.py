@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files import regular
+from ipman_rs.files import read_bytes
 
 from . import c3d_format
 from .c3d_format import Parameters, several
@@ -20,6 +20,7 @@ from .units import metres
 
 Array = NDArray[np.float64]
 
+MAX_BYTES = 1 << 32  # an hour of ten plates and of two hundred markers is smaller
 AGAIN = "write it again with Mokka or the program that recorded it"
 GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS", "SYMBOLIC")  # of POINT
 OUTPUTS = re.compile(r".*(?:Angles?|Moment|Force|Power|GRF|Progress\w*)(?:Harrington)?|Cent(?:re|er)OfMass\w*")
@@ -122,11 +123,9 @@ class Recording:
 
 def read(path: str | os.PathLike[str]) -> Recording:
     """The content of a C3D file. ValueError, naming the file, if it is missing, damaged or shorter than it says."""
-    path = regular(path)
+    data = read_bytes(path, MAX_BYTES)
     try:
-        content = c3d_format.content(path.read_bytes())
-    except OSError as error:
-        raise ValueError(f"{path}: {error.strerror}") from None
+        content = c3d_format.content(data)
     except ValueError as error:
         said = str(error)
         raise ValueError(f"{path}: {said}" if said.endswith("?") else f"{path}: {said}; {AGAIN}") from None
@@ -148,7 +147,13 @@ def read(path: str | os.PathLike[str]) -> Recording:
     )
 
 
-def markers(path: str | os.PathLike[str], up: str | None = None, subject: str | None = None) -> Tracks:
+def markers(
+    path: str | os.PathLike[str],
+    up: str | None = None,
+    subject: str | None = None,
+    unit: float | None = None,
+    rate: float | None = None,
+) -> Tracks:
     """The markers of a C3D file; which axis is up says its Y_SCREEN, z if it does not.
 
     `subject`: of whom, where the file has several people. ValueError, naming the file, if it is missing, damaged, has
@@ -163,8 +168,9 @@ def markers(path: str | os.PathLike[str], up: str | None = None, subject: str | 
     if computed:
         notes.append(f"{len(computed)} outputs of a model are no markers: {_some(list(found.outputs))}")
     names = [found.names[column] for column in rest]
-    up = up or found.up
-    return tracks(names, found.points[:, rest], found.times, found.unit, up, found.source, subject=subject, notes=notes)
+    said, up = found.unit if unit is None else unit, up or found.up
+    times = found.times if rate is None else np.arange(len(found.points)) / rate
+    return tracks(names, found.points[:, rest], times, said, up, found.source, subject=subject, notes=notes)
 
 
 def _faced(parameters: Parameters) -> str:

@@ -241,7 +241,7 @@ def _frames(available: int, layout: _Layout, header: list[int], parameters: Para
         raise ValueError("expected points or analogue samples, it has none")
     said, held = _said_frames(header, parameters), available // layout.size
     if max(said, default=0) > held:
-        raise ValueError(f"expected {max(said)} frames as it says, got {held}: is the download complete?")
+        raise ValueError(f"expected {max(said)} frames as it says, {held} at most fit in: is the download complete?")
     if not said:
         raise ValueError("expected a C3D file: it does not say how many frames it has")
     if LARGEST_COUNT - header[3] < max(said) <= LARGEST_COUNT == header[4] and not _more_frames(parameters):

@@ -22,6 +22,7 @@ from .frames import Cameras, DataSet, Frames
 SAMPLE = 256  # frames that are looked at
 BODY = (0.25, 3.5)  # m: extent of a body's joints or markers, rolled up or with raised arms
 WORLD = 100.0  # m: no body or camera is farther from the origin of its world
+NEAR_IN_CENTIMETRES = 500.0  # so far from the origin in millimetres would be within arm's reach
 AXES = ("+x", "+y", "+z", "-x", "-y", "-z")
 HEADS = ("head_top", "head", "nose", "neck")  # the first of these that a data set has
 FEET = ("ankle", "foot", "heel", "toe")  # words in the names of what is low on a person who stands
@@ -162,8 +163,12 @@ def place(what: str, positions: NDArray[Any]) -> list[Finding]:
     distance = distance[np.isfinite(distance)]
     if not len(distance) or np.median(distance) <= WORLD:
         return []
-    said = f"{what}: looks like millimetres: {np.median(distance):.4g} from the origin, expected up to {WORLD:g} metres"
-    return [Finding("wrong", said, "divide by 1000", "--units mm")]
+    middle = float(np.median(distance))
+    unit, advice, option = ("millimetres", "divide by 1000", "--units mm")
+    if middle < NEAR_IN_CENTIMETRES:
+        unit, advice, option = ("centimetres", "divide by 100", "--units cm")
+    said = f"{what}: looks like {unit}: {middle:.4g} from the origin, expected up to {WORLD:g} metres"
+    return [Finding("wrong", said, advice, option)]
 
 
 def radians(what: str, pose: NDArray[Any]) -> list[Finding]:

@@ -69,7 +69,7 @@ class ForcePlates:
     up: Array  # (3,) unit vector
     source: str
     corners: Array | None = None  # (P, 4, 3) m
-    notes: tuple[str, ...] = ()  # which plates were left out, and why
+    notes: tuple[str, ...] = ()  # what of the file was left out or turned, a sentence each
 
     def __len__(self) -> int:
         return len(self.times)
@@ -241,7 +241,8 @@ class _Plate:
         loads = force @ up
         loads = loads[np.isfinite(loads)]
         sign = -1.0 if loads.size and -loads.min() > max(loads.max(), LOADED) else 1.0
-        return sign * force, np.where(np.isfinite(points), points, np.nan), sign * np.nan_to_num(moment)
+        force, points = (np.where(np.isfinite(part), part, np.nan) for part in (force, points))
+        return sign * force, points, sign * np.nan_to_num(moment)
 
     @cached_property
     def axes(self) -> Array:
@@ -427,11 +428,13 @@ def standing(what: str, markers: Array, seen: NDArray[np.bool_], up: str) -> lis
         return []
     low, high = np.nanmin(points, axis=1), np.nanmax(points, axis=1)
     extent, lowest = np.median(high - low, axis=0), np.median(low, axis=0)
-    axis = int(extent.argmax())
-    if "xyz"[axis] == up or extent["xyz".index(up)] > 0.8 or extent[axis] < 1.2 or not -0.3 < lowest[axis] < 0.5:
+    longest = int(extent.argmax())
+    axis = "xyz"[longest]
+    if axis == up or extent["xyz".index(up)] > 0.8 or extent[longest] < 1.2 or not -0.3 < lowest[longest] < 0.5:
         return []
-    said = f"{what}: looks like {'xyz'[axis]} up: markers reach from {lowest[axis]:.2f} m along {'xyz'[axis]} over "
-    return [Finding("wrong", f"{said}{extent[axis]:.2f} m, but up is said to be {up}", "or does this person lie?")]
+    reach = f"from {lowest[longest]:.2f} m along {axis} over {extent[longest]:.2f} m"
+    said = f"{what}: looks like {axis} up: markers reach {reach}, but up is said to be {up}"
+    return [Finding("wrong", said, "or does this person lie?", f"--up {axis}")]
 
 
 def _loads(file: Path) -> list[Finding]:

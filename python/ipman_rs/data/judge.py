@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 
-from .check import AXES, BODY, SAMPLE, Finding, place, size_of_body, upright
+from .check import AXES, BODY, SAMPLE, WORLD, Finding, size_of_body, upright
 
 MASS = (1.0, 650.0)  # kg: the heaviest person known weighed 635
 USUAL_MASS = (2.5, 250.0)  # kg
@@ -73,7 +73,7 @@ def bodies(vertices: Array, template: BodyTemplate, normal: Array, *, up_is_said
     if found[0].level == "wrong":
         return found
     found += _sizes(vertices)
-    away = place("vertices", vertices.mean(axis=1)) or _height(vertices, normal)
+    away = _far(vertices) or _height(vertices, normal)
     if up_is_said:
         return found + away
     return found + away + (_stance(vertices, template, normal) or _shape(vertices, template, normal))
@@ -93,6 +93,15 @@ def _sizes(vertices: Array) -> list[Finding]:
 def evenly(count: int, most: int = SAMPLE) -> NDArray[np.int64]:
     """Up to `most` numbers from 0 to count − 1, evenly spaced: the bodies that are looked at."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
+
+
+def _far(vertices: Array) -> list[Finding]:
+    """Of bodies of a person's size whose places cannot be metres of the same world."""
+    away = float(np.median(np.linalg.norm(vertices.mean(axis=1), axis=-1)))
+    if away <= WORLD:
+        return []
+    said = f"vertices: bodies of a person's size, {away:.4g} m from the origin of their world, expected up to {WORLD:g}"
+    return [Finding("wrong", said, "are their places in another unit, or those of a map? Put the origin near them")]
 
 
 def _height(vertices: Array, normal: Array) -> list[Finding]:

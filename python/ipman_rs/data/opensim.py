@@ -1,8 +1,10 @@
 """OpenSim's recordings: markers in `.trc`, force plates and centres of mass in `.mot` and `.sto`.
 
-Expected: a `.trc` file, or a folder of them, and beside it storages whose names have the marker file's name in them:
-`walk.trc`, `walk_grf.mot` (ground forces), `walk_com.sto` (BodyKinematics: center_of_mass_X, Y, Z); a centre of mass
-under another name belongs to the only recording with forces. OpenSim's world is
+Expected: a `.trc` file, or a folder of them, and in the same folder or one of its own storages of the same name:
+`walk.trc`, `walk_grf.mot` (ground forces), `walk_com.sto` (BodyKinematics' positions: center_of_mass_X, Y, Z); so also
+`markers_walk.trc` and `grf_walk.mot`, `MarkerData/walk.trc` and `ID/walk_grf.mot`, `walk/markers.trc` and
+`walk/grf.mot`, or the only two of a folder. An ExternalLoads file (.xml) that names the forces says in which columns
+they are. Forces that point down are those on the plates, and are turned. OpenSim's world is
 y up, right-handed, in metres; the floor is y = 0. A `.trc` says its unit; a storage does not, and its forces and points
 must be N and m (`plates` takes other units). Frames have the markers' rate (often 60 or 100 Hz; force plates have
 their own, and are read at the markers' times). No cameras. Such files come with OpenSim's models, SimTK projects,
@@ -14,7 +16,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +24,9 @@ from numpy.typing import NDArray
 
 from ipman_rs.ground import Ground
 
-from . import sequences, text_file, trc
+from . import external_loads, pairing, sequences, text_file, trc
 from .check import Finding, demand, demanded, size_of_body
+from .external_loads import ExternalLoads, Load
 from .force_plates import LOADED, UP, ForcePlates, between, standing
 from .frames import DataSet, Frames
 from .joined import Joined
@@ -35,6 +38,7 @@ Array = NDArray[np.float64]
 
 COM = "center_of_mass"  # begins the columns of the whole body's centre of mass
 FAR = 20.0  # m: no plate or person is farther from the origin of a laboratory
+LONGER = 100  # times as long as the markers, without as many more samples: forces whose times are in another unit
 BESIDE = 0.5  # m: a centre of mass farther than that outside the markers is in other units or axes
 # ground_force_vx beside ground_torque_x; ground_force_1_vx beside ground_force_1_mx; f1_1 beside p1_1 and m1_1.
 OPENSIM_FORCE = re.compile(r"(.*)vx$")
@@ -146,30 +150,88 @@ def has_plates(table: Storage) -> bool:
 
 
 def has_center_of_mass(table: Storage) -> bool:
-    """Whether there is a centre of mass of the whole body in it."""
-    return f"{COM}_X" in table.columns
+    """Whether there is a centre of mass of the whole body in it, not its velocity or acceleration."""
+    return f"{COM}_X" in table.columns and derivative(Path(table.source)) is None
 
 
-def plates(table: Storage, unit: str = "m", up: str = "y") -> ForcePlates:
+def derivative(path: Path) -> str | None:
+    """ "velocities" or "accelerations", of which BodyKinematics writes a file each with the columns of the positions;
+    None for positions. The first line says it, or else the name."""
+    try:
+        with path.open(encoding="utf-8", errors="replace") as lines:
+            title = lines.readline().strip().lower()
+    except OSError:
+        title = ""
+    if title.startswith("position"):
+        return None
+    words = re.split(r"[^a-z]+", path.stem.lower())
+    for word, what in (("velocit", "velocities"), ("accelerat", "accelerations")):
+        if title.startswith(word) or any(part == word[:3] or part.startswith(word) for part in words):
+            return what
+    return None
+
+
+def kind(table: Storage) -> str | None:
+    """ "forces", "com", or None for a storage of something else."""
+    return "forces" if has_plates(table) else "com" if has_center_of_mass(table) else None
+
+
+def plates(table: Storage, unit: str = "m", up: str = "y", loads: ExternalLoads | None = None) -> ForcePlates:
     """The force plates of a storage, in metres and newtons.
 
-    `unit`: of its points, and its moments are N times that; `up`: which of its axes is up. ValueError, naming the file,
-    without plates, for a missing column, and where units or axes cannot be: no plate is tens of metres away, and
-    people weigh down.
+    `unit`: of its points, and its moments are N times that; `up`: which of its axes is up; `loads`: in which columns
+    the forces are, where an ExternalLoads file says so. Forces on the plates are turned into those on the body.
+    ValueError, naming the file, without plates, for a missing column, and where units or axes cannot be: no plate is
+    tens of metres away, and people weigh down.
     """
     if unit not in METRES or up not in UP:
         raise ValueError(f"unit, up: expected one of {', '.join(METRES)} and of x, y, z, got {unit!r} and {up!r}")
-    wrenches = [_wrench(table, name) for name in table.columns]
-    forces, points, moments = (
-        np.stack(part, axis=1) if part else np.empty((len(table), 0, 3))
-        for part in ([each[k] for each in wrenches if each is not None] for k in range(3))
+    wrenches = (
+        [_loaded(table, load, loads.source) for load in loads.loads]
+        if loads is not None and loads.loads
+        else [found for name in table.columns if (found := _wrench(table, name)) is not None]
     )
-    if not forces.shape[1]:
+    if not wrenches:
         raise ValueError(f"{table.source}: expected ground forces, such as ground_force_vx, it has {_some(table)}")
+    forces, points, moments = (np.stack(part, axis=1) for part in zip(*wrenches, strict=True))
     scale = METRES[unit]
-    found = ForcePlates(table.times, forces, points * scale, moments * scale, UP[up], table.source)
+    forces, points, moments = (  # beside NaN, infinity: a centre of pressure without a load
+        np.where(np.isfinite(part), part, np.nan) for part in (forces, points * scale, moments * scale)
+    )
+    found = ForcePlates(table.times, forces, points, moments, UP[up], table.source, notes=table.notes)
     _plausible(found, up)
-    return found
+    return on_the_body(found)
+
+
+def on_the_body(found: ForcePlates) -> ForcePlates:
+    """With forces that act on the body, also of plates of which the file has the opposite: nobody pulls at a plate."""
+    with np.errstate(invalid="ignore"):
+        loads = np.nansum(np.where(np.abs(found.loads) > LOADED, found.loads, 0.0), axis=0)
+    if (loads >= 0).all():
+        return found
+    sign = np.where(loads < 0, -1.0, 1.0)[:, None]
+    which = "" if (loads < 0).all() else f" of plate {', '.join(str(plate + 1) for plate in np.flatnonzero(loads < 0))}"
+    note = f"the forces{which} point down, as those on the plates do; they were turned round"
+    return replace(found, forces=sign * found.forces, moments=sign * found.moments, notes=(*found.notes, note))
+
+
+def loaded(found: ForcePlates, times: Array) -> list[Finding]:
+    """Whether the plates tell anything of a recording with these times (T,): that both were at the same time, and that
+    some plate carried a load then."""
+    begin, end = float(found.times[0]), float(found.times[-1])
+    first, last = float(times[0]), float(times[-1])
+    said = f"forces t {begin:.2f} to {end:.2f} s, markers t {first:.2f} to {last:.2f} s"
+    if end < first or begin > last:
+        return [Finding("wrong", f"times do not overlap: {said}", "are both of one recording, with one clock?")]
+    if end - begin > LONGER * (last - first) and len(found) < LONGER * len(times):
+        return [Finding("wrong", f"times look like milliseconds: {said}", "expected seconds")]
+    during = (found.times >= first) & (found.times <= last)
+    loads = found.loads[during]
+    most = float(np.nanmax(loads)) if np.isfinite(loads).any() else 0.0
+    if not most > LOADED:
+        what = f"no frame has a loaded plate: the largest load is {most:.0f} N, expected over {LOADED:.0f} N ({said})"
+        return [Finding("wrong", what, "are these the recording's forces, in newtons?")]
+    return []
 
 
 def _wrench(table: Storage, name: str) -> tuple[Array, Array, Array] | None:
@@ -195,6 +257,26 @@ def _wrench(table: Storage, name: str) -> tuple[Array, Array, Array] | None:
     return table.vectors((f[0], f[1], f[2])), table.vectors((p[0], p[1], p[2])), moment
 
 
+def _loaded(table: Storage, load: Load, source: str) -> tuple[Array, Array, Array]:
+    """Force, point and moment of an ExternalForce, whose columns begin with its identifiers."""
+    force, point = (_three(table, name) for name in (load.force, load.point))
+    if force is None or point is None:
+        missing = load.force if force is None else load.point
+        has = f"{table.source} has {_some(table)}"
+        raise ValueError(f"{source}: expected three columns that begin with {missing!r}; {has}")
+    torque = _three(table, load.torque) if load.torque else None
+    return force, point, np.zeros_like(force) if torque is None else torque
+
+
+def _three(table: Storage, begin: str) -> Array | None:
+    """The columns (T, 3) whose names begin so: with x, y, z behind it, or the only three."""
+    for ends in ("xyz", "XYZ", "123"):
+        if all(f"{begin}{end}" in table.columns for end in ends):
+            return table.vectors((f"{begin}{ends[0]}", f"{begin}{ends[1]}", f"{begin}{ends[2]}"))
+    names = [name for name in table.columns if name.startswith(begin)]
+    return table.vectors((names[0], names[1], names[2])) if len(names) == 3 else None
+
+
 def _plausible(found: ForcePlates, up: str) -> None:
     with np.errstate(invalid="ignore"):
         heavy = np.linalg.norm(found.forces, axis=-1) > 10 * LOADED
@@ -204,14 +286,14 @@ def _plausible(found: ForcePlates, up: str) -> None:
     if away > FAR:
         raise ValueError(
             f"{found.source}: looks like millimetres: centres of pressure {away:.4g} from the origin, expected metres, "
-            f"up to {FAR:g}; say unit='mm' if so"
+            f"up to {FAR:g}; say unit='mm' if so (--force-units mm)"
         )
     push = np.median(found.forces[heavy], axis=0)
     axis = "xyz"[int(np.abs(push).argmax())]
     if axis != up:
         raise ValueError(
             f"{found.source}: looks like {axis} up: loaded plates push along {axis} ({push[0]:.0f}, {push[1]:.0f}, "
-            f"{push[2]:.0f} N), expected along {up}; say up={axis!r} if so"
+            f"{push[2]:.0f} N), expected along {up}; say up={axis!r} if so (--up {axis})"
         )
 
 
@@ -236,19 +318,24 @@ def open(path: str | os.PathLike[str], split: str | None = None) -> DataSet:
     files = sequences.recordings(path, ".trc")
     tracks = [trc.read(file) for file in files]
     markers = list(dict.fromkeys(name for found in tracks for name in found.names))
+    beside = _beside(Path(path), files)
+    for other, file in beside.pairs.rivals.items():
+        raise ValueError(f"{other}: expected one of its kind for {file.name}, got another beside it; take one away")
     parts = [
-        _frames(file.stem, found, markers, *beside)
-        for file, found, beside in zip(files, tracks, _beside(files), strict=True)
+        _frames(name, found, markers, *beside.of(file))
+        for name, file, found in zip(beside.names, files, tracks, strict=True)
     ]
     return demanded(Path(path), Joined(sequences.measured_alike(parts)))
 
 
-def _frames(name: str, tracks: Tracks, markers: list[str], forces: Path | None, com: Path | None) -> Frames:
+def _frames(
+    name: str, tracks: Tracks, markers: list[str], forces: Path | None, loads: ExternalLoads | None, com: Path | None
+) -> Frames:
     joints = np.full((len(tracks), len(markers), 3), np.nan)
     seen = np.where(tracks.confidence[..., None] > 0, tracks.points, np.nan)
     joints[:, [markers.index(marker) for marker in tracks.names]] = seen
     demand(tracks.source, size_of_body("joints", joints))
-    at = None if forces is None else plates(storage(forces)).at(tracks.times)
+    at = None if forces is None else plates(storage(forces), loads=loads).at(tracks.times)
     lasted = float(tracks.times[-1] - tracks.times[0])  # the times of single samples are often rounded to milliseconds
     return Frames(
         names=sequences.numbered(name, len(tracks)),
@@ -265,33 +352,41 @@ def _frames(name: str, tracks: Tracks, markers: list[str], forces: Path | None, 
 
 def _com_at(table: Storage, tracks: Tracks) -> Array:
     """(T, 3) m at the markers' times; NaN outside the storage's. ValueError if it is nowhere near the markers."""
-    points = center_of_mass(table)
-    found = between(table.times, points, tracks.times)
+    found = between(table.times, center_of_mass(table), tracks.times)
+    for each in among(found, tracks, "centre of mass"):
+        raise ValueError(f"{table.source}: {each.what}; {each.advice}")
+    return found
+
+
+def among(points: Array, tracks: Tracks, what: str) -> list[Finding]:
+    """Whether a centre of mass or of pressure (T, 3) m, NaN where there is none, is where the markers are."""
     seen = tracks.confidence.any(axis=1)
     shown = tracks.confidence[seen][..., None] > 0
     low = np.where(shown, tracks.points[seen], np.inf).min(axis=1)
     high = np.where(shown, tracks.points[seen], -np.inf).max(axis=1)
-    away = np.linalg.norm(np.maximum(0, np.maximum(low - found[seen], found[seen] - high)), axis=1)
-    if np.isfinite(away).any() and np.nanmedian(away) > BESIDE:
-        raise ValueError(
-            f"{table.source}: the centre of mass is {np.nanmedian(away):.2f} m outside the markers of {tracks.source}; "
-            "expected it among them: are both in metres, y up, and of one recording?"
-        )
-    return found
+    away = np.linalg.norm(np.maximum(0, np.maximum(low - points[seen], points[seen] - high)), axis=1)
+    away = away[np.isfinite(away)]
+    if not len(away) or np.median(away) <= BESIDE:
+        return []
+    said = f"the {what} is {np.median(away):.2f} m outside the markers of {tracks.source}"
+    return [Finding("wrong", said, "expected it among them: are both in metres, y up, and of one recording?")]
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
-    """Which recordings there are, what belongs to each, and whether units and axes can be right."""
+    """Which recordings there are, what belongs to each, and whether units, axes and times can be right."""
     try:
         files = sequences.recordings(path, ".trc")
     except ValueError as error:
         return [Finding("missing", str(error), "expected a .trc file or a folder of them")]
     found = [Finding("ok", f"{len(files)} .trc {'file' if len(files) == 1 else 'files'}")]
-    try:
-        beside = _beside(files)
-    except ValueError as error:
-        return [*found, Finding("wrong", str(error))]
-    for file, (forces, com) in zip(files, beside, strict=True):
+    beside = _beside(Path(path), files)
+    found += [Finding("wrong", what) for what in beside.unreadable]
+    found += [Finding("odd", note) for note in beside.pairs.notes]
+    for other, why in beside.pairs.left.items():
+        level = "wrong" if other in beside.pairs.rivals else "odd"
+        found.append(Finding(level, f"{other.name}: not used, for {why}"))
+    for name, file in zip(beside.names, files, strict=True):
+        forces, loads, com = beside.of(file)
         for what, other, ending in (("forces", forces, "_grf.mot"), ("centre of mass", com, "_com.sto")):
             if other is None:
                 found.append(Finding("missing", f"{file.name}: no {what}", f"expected such as {file.stem}{ending}"))
@@ -300,35 +395,58 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         try:
             tracks = trc.read(file)
             found += standing(file.name, tracks.points, tracks.confidence > 0, "y")
-            found += sequences.told(file.name, _frames(file.stem, tracks, list(tracks.names), forces, com))
+            found += sequences.told(file.name, _frames(name, tracks, list(tracks.names), forces, loads, com))
+            if forces is not None:
+                found += _of_forces(plates(storage(forces), loads=loads), tracks, forces.name)
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
     return found
 
 
-def _beside(files: list[Path]) -> list[tuple[Path | None, Path | None]]:
-    """Forces and centre of mass of each recording."""
-    found: dict[Path, list[Path | None]] = {file: [None, None] for file in files}
-    for folder in dict.fromkeys(file.parent for file in files):
-        here = [file for file in files if file.parent == folder]
-        others = [other for other in sorted(folder.iterdir()) if other.suffix.lower() in (".mot", ".sto")]
-        for place, has in enumerate((has_plates, has_center_of_mass)):  # forces first: they tell whose the rest are
-            for other in others:
-                owner = _owner(other, here, [file for file in here if found[file][0] is not None])
-                if owner is None or not has(storage(other)):
-                    continue
-                if found[owner][place] is not None:
-                    raise ValueError(f"{other}: expected one of its kind for {owner.name}, got another beside it")
-                found[owner][place] = other
-    return [(pair[0], pair[1]) for pair in found.values()]
+def _of_forces(found: ForcePlates, tracks: Tracks, name: str) -> list[Finding]:
+    judged = loaded(found, tracks.times) or among(found.at(tracks.times).center(), tracks, "centre of pressure")
+    said = [Finding("odd", f"{name}: {note}") for note in found.notes]
+    return said + [Finding(each.level, f"{name}: {each.what}", each.advice) for each in judged]
 
 
-def _owner(other: Path, files: list[Path], with_forces: list[Path]) -> Path | None:
-    """The recording with the longest name that the other file's has in it; else the only one with forces, if any."""
-    named = [file for file in files if file.stem.lower() in other.stem.lower()]
-    if named:
-        return max(named, key=lambda file: len(file.stem))
-    return with_forces[0] if len(with_forces) == 1 else None
+@dataclass(frozen=True)
+class Beside:
+    """What lies beside the markers' files: `pairs` of them, in which columns the forces of a file are, the recordings'
+    `names`, and what is wrong with files that cannot be read."""
+
+    pairs: pairing.Pairs
+    loads: Mapping[Path, ExternalLoads]
+    names: list[str]
+    unreadable: list[str]
+
+    def of(self, file: Path) -> tuple[Path | None, ExternalLoads | None, Path | None]:
+        """Forces, their columns, and centre of mass of a recording."""
+        forces = self.pairs.forces.get(file)
+        return forces, None if forces is None else self.loads.get(forces), self.pairs.com.get(file)
+
+
+def _beside(path: Path, files: list[Path]) -> Beside:
+    """Forces and centre of mass of each recording, anywhere below a folder or in the folder of the only file."""
+    root = path if path.is_dir() else path.parent
+    below = sorted(each for each in (root.rglob("*") if path.is_dir() else root.iterdir()) if each.is_file())
+    kinds: dict[Path, str] = {}
+    unreadable: dict[Path, str] = {}
+    for other in below:
+        if other.suffix.lower() not in (".mot", ".sto"):
+            continue
+        try:
+            what = kind(storage(other))
+        except ValueError as error:
+            what, unreadable[other] = "forces", str(error)  # it is told again, where it belongs to a recording
+        if what is not None:
+            kinds[other] = what
+    loads, aliases, wrong = external_loads.beside(below)
+    kinds |= dict.fromkeys(loads, "forces")
+    pairs = pairing.pair(files, kinds, root, aliases=aliases)
+    used = {*pairs.forces.values(), *pairs.com.values()}
+    told = [what for other, what in unreadable.items() if other not in used]
+    pairs.notes += wrong
+    return Beside(pairs, loads, pairing.names(files, root), told)
 
 
 def _some(table: Storage) -> str:

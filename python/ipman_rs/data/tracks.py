@@ -39,6 +39,8 @@ class Tracks:
     times: Array  # (T,) s
     source: str
     notes: tuple[str, ...] = ()  # what of the file was left out or mended, a sentence each
+    up: str = "y"  # the file's own axis that points up
+    unit: float = 1.0  # metres in one of the file's lengths
 
     def __len__(self) -> int:
         return len(self.times)
@@ -67,7 +69,7 @@ def tracks(
     names: Sequence[str],
     points: Array,
     times: Array,
-    unit: str,
+    unit: str | float,
     up: str,
     source: str,
     *,
@@ -76,8 +78,8 @@ def tracks(
 ) -> Tracks:
     """From a file's own numbers: NaN, exactly the origin, or a number that stands for it is a marker that was not seen.
 
-    `unit` "" is guessed. Names as `named` has them. ValueError for an unknown unit, axis or subject, for no marker or
-    sample, for two people, if nothing was seen, and for infinite coordinates.
+    `unit`: its name, or metres in one; "" is guessed. Names as `named` has them. ValueError for an unknown unit, axis
+    or subject, for no marker or sample, for two people, if nothing was seen, and for infinite coordinates.
     """
     if up not in TO_Y_UP:
         raise ValueError(f"{source}: up: expected x, y or z, got {up!r}")
@@ -94,7 +96,18 @@ def tracks(
     scale = _scale(unit, points[seen], source)
     turned = np.where(seen[..., None], points, 0.0) * scale @ TO_Y_UP[up].T
     told = (*notes, *said, *chosen.notes)
-    return Tracks(chosen.names, turned, seen.astype(float), np.asarray(times, float), source, told)
+    return Tracks(chosen.names, turned, seen.astype(float), np.asarray(times, float), source, told, up, scale)
+
+
+def turned(tracks: Tracks, normal: Sequence[float]) -> Tracks:
+    """The tracks with this direction of theirs, (3,), turned to +y by the shortest way."""
+    up = np.asarray(normal, float) / np.linalg.norm(normal)
+    if up[1] < -1 + 1e-12:
+        rotation = np.diag([1.0, -1.0, -1.0])
+    else:
+        skew = np.cross(np.eye(3), np.cross(up, [0.0, 1.0, 0.0]))
+        rotation = np.eye(3) + skew + skew @ skew / (1 + up[1])
+    return replace(tracks, points=tracks.points @ rotation.T)
 
 
 def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], list[str]]:
@@ -110,7 +123,7 @@ def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], lis
     stands &= there
     if not stands.any():
         return there, []
-    which = [names[column] or "one without a name" for column in np.flatnonzero(stands.any(axis=0))]
+    which = [names[column] or "one without a name" for column in np.flatnonzero(stands.any(axis=0)).tolist()]
     first = points[stands][0]
     value = first[int(np.abs(first).argmax())]
     return there & ~stands, [f"{value:.7g} is taken as not seen ({_some(which)})"]
@@ -182,8 +195,10 @@ def _person(
     raise ValueError(f"{source}: two people in it, {of}: say which one (subject={rivals[0]!r}, --subject {rivals[0]})")
 
 
-def _scale(unit: str, seen: Array, source: str) -> float:
+def _scale(unit: str | float, seen: Array, source: str) -> float:
     """Metres a unit."""
+    if isinstance(unit, float):
+        return unit
     if unit:
         scale = metres(unit)
         if scale is None:

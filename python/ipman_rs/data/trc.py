@@ -20,7 +20,13 @@ LEAST = 4  # columns of a row: frame, time and something of a marker
 UNLIKE = 0.01  # of the rate: that far the header's may be from the times'
 
 
-def read(path: str | Path, up: str | None = None, subject: str | None = None) -> Tracks:
+def read(
+    path: str | Path,
+    up: str | None = None,
+    subject: str | None = None,
+    unit: float | None = None,
+    rate: float | None = None,
+) -> Tracks:
     """The markers of a TRC file, of `subject` where its names have one before a colon ("S01:LASI").
 
     ValueError, naming the file and line, for whatever is not right in it.
@@ -44,11 +50,11 @@ def read(path: str | Path, up: str | None = None, subject: str | None = None) ->
         notes.append(f"{table.short} rows end before the last marker; what they lack is taken as not seen")
     numbers = text_file.table(table.rows, [f"{source}: line {number}" for number in table.lines])
     numbers = numbers.reshape(len(table.rows), 1 + 3 * table.markers)
-    times = _times(numbers[:, 0], table.lines, source, notes)
+    times = _times(numbers[:, 0], table.lines, source, notes) if rate is None else np.arange(len(numbers)) / rate
     points = numbers[:, 1 : 1 + 3 * len(names)].reshape(len(times), len(names), 3)
     _compare(header, times, notes)
-    unit = header.get("units", "")
-    return tracks(names, points, times, unit, up or "y", source, subject=subject, notes=notes)
+    said = header.get("units", "") if unit is None else unit
+    return tracks(names, points, times, said, up or "y", source, subject=subject, notes=notes)
 
 
 def _header(lines: Sequence[str]) -> dict[str, str]:

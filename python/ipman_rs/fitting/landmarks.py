@@ -30,10 +30,28 @@ HAND_POINTS = frozenset(
 
 @dataclasses.dataclass(frozen=True)
 class Site:
-    """A point at a vertex of the skin, moved by `shift`, m in the frame of the resting mesh (`body.v_template`)."""
+    """A point at a vertex of the skin, moved by `shift`, m in the frame of the resting mesh (`body.v_template`).
+
+    `spread`: m, how well its place is known, the standard deviation over people.
+    """
 
     vertex: int
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    spread: float = 0.01
+
+
+@dataclasses.dataclass(frozen=True)
+class Inner:
+    """A point inside the body that moves with one joint: `place` (3,) m in the frame of the resting mesh, of the mean
+    shape, and what each of the body's betas adds to it, `by_betas` (b, 3) m; `spread` as of a `Site`."""
+
+    joint: str
+    place: tuple[float, float, float]
+    by_betas: tuple[tuple[float, float, float], ...]
+    spread: float = 0.01
+
+
+Point = Site | Inner | str  # a str: the name of a joint, or of a point of the skin
 
 
 class Landmarks:
@@ -46,12 +64,14 @@ class Landmarks:
         self,
         body: ipt.BodyModel,
         names: Iterable[str] | None = None,
-        sites: Mapping[str, Site | str] | None = None,
+        sites: Mapping[str, Point] | None = None,
     ):
         full, sites = body.body, sites or {}
         self.names = known(full, sites) if names is None else tuple(names)
-        skin = {name: Site(vertex) for name, vertex in skin_points(full).items() if name not in full.joint_names}
-        skin |= {name: site for name, site in sites.items() if isinstance(site, Site)}
+        skin: dict[str, Site | Inner] = {
+            name: Site(vertex) for name, vertex in skin_points(full).items() if name not in full.joint_names
+        }
+        skin |= {name: site for name, site in sites.items() if not isinstance(site, str)}
         ends = [_ends(name, sites) for name in self.names]
         used = list(dict.fromkeys(name for pair in ends for name in pair if name in skin))
         rows = {name: row for row, name in enumerate(used)}
@@ -106,25 +126,38 @@ def known(body: BodyModel, sites: Iterable[str] = ()) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*body.joint_names, *MIDPOINTS, *skin_points(body), *sites]))
 
 
-def _ends(name: str, sites: Mapping[str, Site | str]) -> tuple[str, str]:
+def _ends(name: str, sites: Mapping[str, Point]) -> tuple[str, str]:
     """The two points whose midpoint a landmark is, twice the same for most."""
     site = sites.get(name)
     name = site if isinstance(site, str) else name
-    return (name, name) if isinstance(site, Site) else MIDPOINTS.get(name, (name, name))
+    return (name, name) if isinstance(site, Site | Inner) else MIDPOINTS.get(name, (name, name))
 
 
-def _cut(body: BodyModel, sites: list[Site]) -> BodyModel:
+def _cut(body: BodyModel, points: list[Site | Inner]) -> BodyModel:
     """The body with these points for vertices, and no faces; its expressions are further betas."""
-    rows = np.array([site.vertex for site in sites])
+    rows = np.array([point.vertex if isinstance(point, Site) else 0 for point in points])
+    template, shapedirs, weights = body.v_template[rows], body.shapedirs[rows], body.weights[rows]
+    expressiondirs = body.expressiondirs[rows]
+    posedirs = None if body.posedirs is None else body.posedirs[rows]
+    for row, point in enumerate(points):
+        if isinstance(point, Site):
+            template[row] += point.shift
+            continue
+        template[row] = point.place
+        shapedirs[row] = np.transpose(point.by_betas)
+        expressiondirs[row] = 0
+        weights[row] = np.array(body.joint_names) == point.joint
+        if posedirs is not None:
+            posedirs[row] = 0
     return dataclasses.replace(
         body,
         name=f"{body.name}, {len(rows)} points",
-        v_template=body.v_template[rows] + np.array([site.shift for site in sites]),
-        shapedirs=np.concatenate([body.shapedirs[rows], body.expressiondirs[rows]], axis=-1),
-        expressiondirs=body.expressiondirs[rows][..., :0],
-        posedirs=None if body.posedirs is None else body.posedirs[rows],
+        v_template=template,
+        shapedirs=np.concatenate([shapedirs, expressiondirs], axis=-1),
+        expressiondirs=expressiondirs[..., :0],
+        posedirs=posedirs,
         J_shapedirs=np.concatenate([body.J_shapedirs, body.J_expressiondirs], axis=-1),
         J_expressiondirs=body.J_expressiondirs[..., :0],
-        weights=body.weights[rows],
+        weights=weights,
         faces=np.zeros((0, 3), np.int64),
     )

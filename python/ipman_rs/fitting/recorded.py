@@ -16,18 +16,24 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 import ipman_rs.torch as ipt
+from ipman_rs.data import judge
+from ipman_rs.data.check import Finding
 
 from . import markers
 from .camera import Camera
 from .config import Config, load
 from .fit import Fit
 from .landmarks import Landmarks
-from .markers.calibration import calibrated
+from .markers import judged
+from .markers.calibration import calibrated, certainty
+from .markers.sets import Meaning
+from .markers.skin_distance import mean_distances
 from .problem import Problem
 from .sequence import fit_sequence
 from .start import at_points
 
 FEWEST = 6  # known markers, without which a body is a guess
+WEIGHED = 8  # bodies
 POSES = 24  # of the recording, spread over it, that say where the markers are
 
 
@@ -36,18 +42,21 @@ class Person:
     """What stays of somebody from one recording to the next: the shape (1, b), and where the markers are."""
 
     betas: Tensor
-    sites: Mapping[str, markers.Site | str]
+    sites: Mapping[str, markers.Point]
 
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
     """The fit of T frames. `tracks` are their known markers (M), at these `sites` of the body; `unknown` are those that
-    nobody knows the place of."""
+    nobody knows the place of, `unseen` those that are in the file and were never seen. `meanings`: of the tracks'
+    names."""
 
     fit: Fit
     tracks: markers.Tracks
-    sites: Mapping[str, markers.Site | str]
+    sites: Mapping[str, markers.Point]
     unknown: tuple[str, ...]
+    unseen: tuple[str, ...]
+    meanings: Mapping[str, Meaning]
 
     @property
     def person(self) -> Person:
@@ -61,6 +70,18 @@ class Recorded:
             away = np.linalg.norm(self.fit.candidate.landmarks.numpy() - self.tracks.points, axis=-1)
         return np.where(self.tracks.confidence > 0, away, np.nan)
 
+    @property
+    def skin_distances(self) -> dict[str, float]:
+        """The mean distance of each marker from the skin of the fitted bodies, m, outwards; without those whose places
+        are inside the body, and without plates and wands, which stand off it."""
+        names = [name for name in self.tracks.names if judged.on_skin(self.meanings[name])]
+        some = self.tracks.select(names)
+        with torch.no_grad():
+            vertices = self.fit.candidate.vertices.numpy()
+        faces = self.fit.problem.body.body.faces
+        away = mean_distances(vertices, faces, some.points, some.confidence)
+        return {name: float(mean) for name, mean in zip(names, away, strict=True) if np.isfinite(mean)}
+
 
 def fit_tracks(
     body: ipt.BodyModel,
@@ -72,25 +93,28 @@ def fit_tracks(
     smoothness: float = 0.01,
     ground: float = 0.0,
     person: Person | None = None,
+    own: Mapping[str, Meaning | None] | None = None,
     progress: Callable[[str, int], None] | None = None,
 ) -> Recorded:
     """Fit every `every`-th frame, by the preset `markers` unless another is given, on the laboratory's floor at y =
     `ground` m.
 
     `calibrate`: how often the markers are moved on the body to where fits of some frames see them. `person`: of another
-    recording of the same day, usually of standing still; shape and places of markers are kept.
+    recording of the same day, usually of standing still; shape and places of markers are kept. `own`: names of markers
+    and what they mean, beside the known ones (`markers.own`). Markers that were never seen are left out.
     `smoothness` as in `fit_sequence`. ValueError if too few of the markers are known.
     """
     if every < 1:
         raise ValueError(f"every: expected 1 or more, got {every}")
     config = load("markers") if config is None else config
-    sites = markers.sites(body.body, tracks.names)
+    seen, unseen = seen_names(tracks)
+    sites = markers.sites(body.body, seen, own=own)
     if len(sites) < FEWEST:
         raise ValueError(
             f"{tracks.source}: expected at least {FEWEST} markers with known places, got {len(sites)} of "
-            f"{', '.join(tracks.names)}"
+            f"{', '.join(seen)}"
         )
-    unknown = tuple(name for name in tracks.names if name not in sites)
+    unknown = tuple(name for name in seen if name not in sites)
     tracks = tracks.select(list(sites))
     if person is not None:
         betas = person.betas
@@ -106,7 +130,37 @@ def fit_tracks(
         start["betas"] = betas.expand(len(tracks), -1).clone()
     rate = tracks.rate or 1.0
     found = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
-    return Recorded(found, tracks, sites, unknown)
+    return Recorded(found, tracks, sites, unknown, unseen, markers.meanings(tracks.names, own))
+
+
+def judged_tracks(
+    tracks: markers.Tracks, own: Mapping[str, Meaning | None] | None = None, up_is_said: bool = False
+) -> list[Finding]:
+    """What the judge of all doors says of a recording before its fit: names, coverage, size, place, stance, rate."""
+    seen, _ = seen_names(tracks)
+    meant = markers.meanings(seen, own)
+    unknown = [name for name in seen if name not in meant]
+    found = judge.known_markers([*meant], unknown, FEWEST) + judged.of_rate(tracks)
+    if not meant:
+        return found
+    return found + judged.coverage([*meant], meant) + judged.of_points(tracks, meant, up_is_said)
+
+
+def judged_fit(recorded: Recorded) -> list[Finding]:
+    """What it says of the fit: the markers' mean distance from their places, and the person's mass."""
+    with torch.no_grad():
+        vertices = recorded.fit.candidate.vertices[:: max(1, len(recorded.tracks) // WEIGHED)]
+        mass = ipt.mass_properties(vertices, recorded.fit.problem.body.template).mass.numpy()
+    errors = recorded.errors
+    known = errors[np.isfinite(errors)]
+    found = judge.marker_error(float(known.mean())) if len(known) else []
+    return found + judge.mass(float(np.median(mass)))
+
+
+def seen_names(tracks: markers.Tracks) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The markers that were ever seen, and those that are only in the file."""
+    seen = tracks.confidence.any(axis=0)
+    return tuple(np.array(tracks.names)[seen].tolist()), tuple(np.array(tracks.names)[~seen].tolist())
 
 
 def _shape_kept(config: Config) -> Config:
@@ -117,12 +171,12 @@ def _shape_kept(config: Config) -> Config:
 def _calibrated(
     body: ipt.BodyModel,
     tracks: markers.Tracks,
-    sites: dict[str, markers.Site | str],
+    sites: dict[str, markers.Point],
     ground: float,
     config: Config,
     times: int,
     progress: Callable[[str, int], None] | None,
-) -> tuple[Tensor | None, dict[str, markers.Site | str]]:
+) -> tuple[Tensor | None, dict[str, markers.Point]]:
     """The shape (1, b) and the places of the markers after that many fits of these frames; none of a shape after 0."""
     variables: dict[str, Tensor] | None = None
     for _ in range(times):
@@ -137,14 +191,18 @@ def _calibrated(
 
 
 def problem_of(
-    body: ipt.BodyModel, tracks: markers.Tracks, sites: dict[str, markers.Site | str], ground: float = 0.0
+    body: ipt.BodyModel, tracks: markers.Tracks, sites: dict[str, markers.Point], ground: float = 0.0
 ) -> Problem:
-    """The frames of `tracks`, whose markers are at `sites`, on a floor at y = `ground`; the camera is a placeholder."""
+    """The frames of `tracks`, whose markers are at `sites`, on a floor at y = `ground`; the camera is a placeholder.
+
+    A marker weighs the less the less its place is known.
+    """
     count = len(tracks)
 
     def each(*numbers: float) -> Tensor:
         return torch.tensor(numbers, dtype=torch.float64).expand(count, -1).clone()
 
+    certain = np.array([certainty(site) for site in sites.values()])
     camera = Camera(each(1, 1), each(0, 0), torch.eye(3, dtype=torch.float64).repeat(count, 1, 1), each(0, 0, 0))
     return Problem(
         body,
@@ -152,7 +210,7 @@ def problem_of(
         camera,
         ipt.Ground(each(0, 1, 0), each(ground)[:, 0]),
         points_3d=torch.from_numpy(tracks.points),
-        confidence_3d=torch.from_numpy(tracks.confidence),
+        confidence_3d=torch.from_numpy(tracks.confidence * certain),
     )
 
 

@@ -52,6 +52,8 @@ def _parsed(path: Path) -> Mesh:
         raise
     except ValueError as error:
         raise _unreadable(path, str(error)) from error
+    except KeyError as error:
+        raise _unreadable(path, f"it lacks {error}") from error
     except Exception as error:  # damaged bytes fail in any way
         raise _unreadable(path, f"{type(error).__name__}: {str(error)[:160]}") from error
 

@@ -95,9 +95,9 @@ def welded(mesh: Mesh) -> Mesh:
     """Vertices at equal places merged where faces do not share them (STL, texture seams); closed meshes stay.
 
     Where that leaves open edges, vertices of those edges that lie within WELD of the mesh's size are merged, too.
-    ValueError where faces share no edges even then.
+    ValueError where faces share no edges even then, or where none is left.
     """
-    if not len(_open_edges(mesh.faces)):
+    if len(mesh.faces) and not len(_open_edges(mesh.faces)):
         return mesh
     first, number = _distinct(mesh.vertices + 0.0)
     if len(first) < len(mesh.vertices):
@@ -105,8 +105,8 @@ def welded(mesh: Mesh) -> Mesh:
         mesh = without_repeated(_merged(mesh, first[number]))
         mesh = mesh.noting(f"{text.counted(merged, 'vertex', 'vertices')} that lie on each other were merged")
     border = np.unique(_open_edges(mesh.faces))
-    tolerance = WELD * float(np.ptp(mesh.vertices[np.isfinite(mesh.vertices).all(axis=1)], axis=0).max(initial=0.0))
-    if len(border) and np.isfinite(mesh.vertices[border]).all() and 0.0 < tolerance < np.inf:
+    tolerance = WELD * _size(mesh.vertices[np.unique(mesh.faces)])
+    if len(border) and 0.0 < tolerance < np.inf:
         target = np.arange(len(mesh.vertices))
         target[border] = border[_nearby(mesh.vertices[border], tolerance)]
         merged = int((target != np.arange(len(target))).sum())
@@ -114,18 +114,26 @@ def welded(mesh: Mesh) -> Mesh:
             mesh = without_repeated(_merged(mesh, target)).noting(
                 f"{text.counted(merged, 'vertex', 'vertices')} within {tolerance:.1g} of another were merged"
             )
-    share = len(_open_edges(mesh.faces)) / max(3 * len(mesh.faces), 1)
-    if share > SOUP and len(mesh.faces) > 2:
+    if not len(mesh.faces):
+        raise ValueError("none of its faces has an area")
+    share = len(_open_edges(mesh.faces)) / (3 * len(mesh.faces))
+    if share > SOUP:
         what = f"its faces share no vertices ({share:.0%} of their edges have no neighbour), so there is no surface"
         raise ValueError(f"{what}; merge its vertices by distance first (MeshLab, Blender)")
     return mesh
 
 
+def _size(points: Array) -> float:
+    """The longest side of the box around the points, m; NaN where one is not finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float((points.max(axis=0) - points.min(axis=0)).max()) if len(points) else 0.0
+
+
 def _open_edges(faces: Indices) -> Indices:
     """(E, 2) the edges that have a face on one side only, lower vertex first."""
     if not len(faces):
-        return np.empty((0, 2), faces.dtype)
-    width = faces.max(initial=0) + 1
+        return np.empty((0, 2), np.int64)
+    width = faces.max() + 1
     low, high = np.minimum(faces, np.roll(faces, -1, axis=1)), np.maximum(faces, np.roll(faces, -1, axis=1))
     key = np.sort((low * width + high).reshape(-1))
     differs = np.concatenate([[True], key[1:] != key[:-1], [True]])

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs import _core
-from ipman_rs.arrays import Bodies
+from ipman_rs.arrays import Bodies, of_each
 from ipman_rs.checks import choice, not_negative, number, positive, whole
 from ipman_rs.ground import Ground
 from ipman_rs.status import Status
@@ -184,7 +184,7 @@ def _cross_check(
     solids = Solids.of_rows(
         _core.solids(template._core, options.densities, options.contact, vertices, normal, height)
     )  # fmt: skip
-    touching = _core.touching(template._core, options.shape, options.resolution, vertices, normal, height)
+    touching = of_each(*_core.touching(template._core, options.shape, options.resolution, vertices, normal, height))
     starts = solids.is_solid & ~(options.snap & ((solids.status & Status.NO_CONTACT) != 0))
     status = solids.status | np.where(starts & [len(points) == 0 for points in touching], Status.NOT_SIMULATED, 0)
     places = np.full((len(status), 1 + len(options.looks), 12), np.nan)

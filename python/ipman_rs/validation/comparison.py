@@ -14,13 +14,14 @@ from ipman_rs.ground import Ground
 from ..data.force_plates import ForcePlates
 from .acceleration import CUTOFF, accelerations
 from .computed import Computed, carried
+from .movement import LOW, SLOW, Movement, smoothed
 from .zero_moment_point import GRAVITY, along_force, zero_moment_point, zero_moment_point_of_parts
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-STILL = 0.015  # m: rms of the centre of mass about its mean, of somebody who stands
-LOW, SLOW = 0.03, 0.5  # m, m/s: what is on the floor is lower and slower
+NEAR = 0.08  # m: a loaded plate's centre that is as near to a sole, or nearer, is under that foot
+SHARED = 0.1  # of the frames with both feet down: in more, a plate that carries both has its centre between them
 ANYWHERE = 0.5  # m: a reference farther from the body is in other units or axes
 
 
@@ -28,8 +29,9 @@ ANYWHERE = 0.5  # m: a reference farther from the body is in other units or axes
 class Comparison:
     """T frames at `times`; `plates`, y up, and `reference`, a centre of mass (T, 3) m, at these times.
 
-    NaN where nothing was measured. `seen` (T,): where enough markers were seen to say where the body is. ValueError
-    where what was measured is nowhere near the body: in other units or axes.
+    NaN where nothing was measured. `seen` (T,): where enough markers were seen to say where the body is. `judge`: whose
+    reference it is. `standing`: the person's mass, kg, by plates on which they stood still; NaN where nobody knows.
+    ValueError where what was measured is nowhere near the body: in other units or axes.
     """
 
     name: str
@@ -38,6 +40,8 @@ class Comparison:
     plates: ForcePlates | None = None
     reference: Array | None = None
     seen: Mask | None = None
+    judge: str = "reference"
+    standing: float = np.nan
 
     def __post_init__(self) -> None:
         for what, points in (("centre of mass", self.reference), ("centre of pressure", self.measured)):
@@ -104,24 +108,43 @@ class Comparison:
         return zero_moment_point_of_parts(masses, centers, self._accelerations(centers), self.floor)
 
     @cached_property
+    def forward(self) -> Array:
+        """(T, 3): the level unit vectors along which the pelvis faces, on average over a second."""
+        return smoothed(self.computed.forward, round(self.rate))
+
+    def of_person(self, vectors: Array) -> Array:
+        """Vectors (T, 3) by their components forward, left and up, as the person faces."""
+        left = np.cross([0.0, 1.0, 0.0], self.forward)
+        return np.stack([(vectors * self.forward).sum(axis=1), (vectors * left).sum(axis=1), vectors[:, 1]], axis=1)
+
+    @cached_property
+    def beside(self) -> Mask:
+        """(T,): something is loaded, and a foot is on the floor beside the plates: by their outlines, or, where those
+        are not known, by their centres of pressure."""
+        if self.plates is None or self.measured is None:
+            return np.zeros(len(self.times), bool)
+        loaded = np.isfinite(self.measured[:, 0])
+        if self.plates.corners is not None:
+            return loaded & beside_plates(self.computed.soles, self.rate, self.floor, self.plates.corners)
+        return loaded & beside_centers(self.computed, self.rate, self.floor, self.plates)
+
+    @cached_property
     def complete(self) -> Mask:
-        """(T,): the body was seen, something is loaded, and no foot is on the floor beside the plates, as far as their
-        outlines are known."""
+        """(T,): the body was seen, something is loaded, and no foot is on the floor beside the plates."""
         if self.plates is None or self.measured is None:
             return np.zeros(len(self.times), bool)
         loaded = np.isfinite(self.measured[:, 0])
         loaded = loaded if self.seen is None else loaded & self.seen
-        return loaded & ~beside_plates(self.computed.soles, self.rate, self.floor, self.plates.corners)
+        return loaded & ~self.beside
 
     @cached_property
     def kind(self) -> str:
-        """ "walking", where plates carry all the load by turns; "quiet standing", or "movement in place"."""
-        if self.plates is not None:
-            loaded = carried(self.plates)[self.complete] > 0
-            if loaded[loaded.sum(axis=1) == 1].any(axis=0).sum() > 1:
-                return "walking"
-        com = self.com if self.seen is None else self.com[self.seen]
-        return "quiet standing" if np.sqrt(np.nanvar(com, axis=0).sum()) < STILL else "movement in place"
+        """What the person does, as `Movement.kind` says."""
+        seen = np.ones(len(self.times), bool) if self.seen is None or not self.seen.any() else self.seen
+        paths = (self.com, self.acceleration, self.computed.soles, self.forward)
+        com, acceleration, soles, forward = (path[seen] for path in paths)
+        floor = float(self.floor.height)
+        return Movement(com, acceleration, soles, self.computed.left, forward, floor, self.rate or 1.0).kind
 
     @cached_property
     def phases(self) -> Mapping[str, Mask]:
@@ -149,6 +172,11 @@ class Comparison:
         upward = np.nan_to_num(self.acceleration[used, 1])
         return float(self.force[used, 1].mean() / (GRAVITY + upward.mean()))
 
+    @property
+    def mass(self) -> float:
+        """The person's, kg: by plates on which they stood still, or else on which they move; NaN without plates."""
+        return self.standing if np.isfinite(self.standing) else self.weight
+
     @cached_property
     def centers(self) -> Mapping[str, Array]:
         """Where the centre of pressure should be (T, 3) m, by name: of a body at rest, of a moving one, and by the
@@ -161,14 +189,41 @@ class Comparison:
         return {**found, **{f"γ = {gamma}": points for gamma, points in self.computed.cop.items()}}
 
 
+def beside_centers(computed: Computed, rate: float, floor: Ground, plates: ForcePlates) -> Mask:
+    """(T,): whether a foot is on the floor and no loaded plate's centre under it, though each is under the other foot.
+
+    A plate that carries both feet at other times, its centre under both or between them, says nothing of that.
+    """
+    loaded = carried(plates) > 0
+    soles = [computed.soles[:, side] for side in (computed.left, ~computed.left)]
+    if len(loaded) < 2:
+        return np.zeros(len(loaded), bool)
+    away = np.stack([_nearest(plates.points, sole) for sole in soles], axis=1)
+    under = (away < NEAR) & loaded[:, None]  # (T, foot, plate)
+    down = np.stack([_down(sole, rate, floor).any(axis=1) for sole in soles], axis=1)
+    both = np.asarray(down.all(axis=1))[:, None] & loaded  # (T, plate)
+    shared = (both & (under.all(axis=1) | ~under.any(axis=1))).sum(axis=0) > SHARED * both.sum(axis=0)
+    known = loaded.any(axis=1) & ~(loaded & (shared | ~under.any(axis=1))).any(axis=1)
+    return np.asarray(known & (down & ~under.any(axis=2)).any(axis=1))
+
+
+def _nearest(points: Array, sole: Array) -> Array:
+    """How far from the points (T, P, 3) the nearest of a sole (T, n, 3) is on the floor, (T, P) m."""
+    return np.linalg.norm((sole[:, :, None] - points[:, None])[..., [0, 2]], axis=-1).min(axis=1)
+
+
+def _down(soles: Array, rate: float, floor: Ground) -> Mask:
+    """Which points of soles (T, n, 3) are on the floor, (T, n)."""
+    speed = np.linalg.norm(np.gradient(soles, 1 / rate, axis=0), axis=-1)
+    return np.asarray((floor.signed_height(soles) < LOW) & (speed < SLOW))
+
+
 def beside_plates(soles: Array, rate: float, floor: Ground, outlines: Array | None) -> Mask:
     """(T,): whether any point of the soles (T, n, 3) m is on the floor and within no plate's outline (P, 4, 3) m."""
     if outlines is None or len(soles) < 2:
         return np.zeros(len(soles), bool)
-    speed = np.linalg.norm(np.gradient(soles, 1 / rate, axis=0), axis=-1)
-    down = (floor.signed_height(soles) < LOW) & (speed < SLOW)
     on_plate = np.stack([_within(soles[..., [0, 2]], outline[:, [0, 2]]) for outline in outlines]).any(axis=0)
-    return (down & ~on_plate).any(axis=1)
+    return np.asarray((_down(soles, rate, floor) & ~on_plate).any(axis=1))
 
 
 def _within(points: Array, outline: Array) -> Mask:

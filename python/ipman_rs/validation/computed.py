@@ -26,7 +26,8 @@ SOLE = 0.03  # m
 class Computed:
     """Of T bodies: volume × 985 kg/m³, centres of mass by method and centres of pressure by γ.
 
-    `soles`: the vertices of both soles. `shares`: how much of the pressure, at γ = 10, is on the first plate's side
+    `soles`: the vertices of both soles, which are of the left one where `left`. `forward`: level unit vectors, the way
+    that the pelvis faces. `shares`: how much of the pressure, at γ = 10, is on the first plate's side
     where two carry a load; NaN elsewhere.
     """
 
@@ -37,6 +38,8 @@ class Computed:
     com: Mapping[str, Array]  # (T, 3) m
     cop: Mapping[int, Array]  # (T, 3) m
     soles: Array  # (T, n, 3) m
+    left: NDArray[np.bool_]  # (n,)
+    forward: Array  # (T, 3)
     shares: Array  # (T,)
 
 
@@ -68,6 +71,8 @@ def computed(
         {method: np.concatenate([row.com[method] for row in rows]) for method in METHODS},
         {gamma: np.concatenate([row.cop[gamma] for row in rows]) for gamma in GAMMAS},
         np.concatenate([row.soles for row in rows]),
+        rows[0].left,
+        np.concatenate([row.forward for row in rows]),
         np.concatenate([row.shares for row in rows]),
     )
 
@@ -85,8 +90,36 @@ def _piece(vertices: NDArray[np.floating], template: ip.BodyTemplate, plates: tu
     if plates is not None:
         rho = np.asarray(ip.pressure(vertices, template, ground, ALPHA, GAMMA), float)
         shares = first_shares(np.asarray(ip.sample_surface(vertices, template), float), rho, *plates)
-    soles = np.asarray(vertices[:, sole_vertices(template)], float)
-    return Computed(mass, masses, centers, ground.height, com, cop, soles, shares)
+    sole = sole_vertices(template)
+    left = np.isin(sole, _of_part(template, "left_lower_leg"))
+    soles, forward = np.asarray(vertices[:, sole], float), facing(vertices, template)
+    return Computed(mass, masses, centers, ground.height, com, cop, soles, left, forward, shares)
+
+
+def facing(vertices: NDArray[np.floating], template: ip.BodyTemplate) -> Array:
+    """The level unit vectors (T, 3) along which the pelvis of bodies (T, V, 3), y up, faces.
+
+    The pelvis is the lower half of the trunk, turned as a whole from the resting pose, which faces z. Square to its
+    left, which stays level in people who bend or lie on their back; of those who lie on a side, where its front points.
+    """
+    trunk = _of_part(template, "torso")
+    rest = np.asarray(template.vertices, float)[trunk]
+    low = rest[:, 1] <= np.median(rest[:, 1])
+    rest, now = rest[low], np.asarray(vertices[:, trunk[low]], float)
+    spread = np.einsum("tni,nj->tij", now - now.mean(axis=1, keepdims=True), rest - rest.mean(axis=0))
+    first, _, last = np.linalg.svd(np.nan_to_num(spread))
+    first[:, :, 2] *= np.sign(np.linalg.det(first @ last))[:, None]
+    turned = first @ last
+    left, front = (turned[:, :, axis] * [1.0, 0.0, 1.0] for axis in (0, 2))
+    level = np.linalg.norm(left, axis=1, keepdims=True)
+    way = np.where(level > 0.5, np.cross(left, [0.0, 1.0, 0.0]), front)
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    return np.where(length > 0, way / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0]).astype(np.float64)
+
+
+def _of_part(template: ip.BodyTemplate, name: str) -> NDArray[np.int64]:
+    """The vertices of a part."""
+    return np.unique(template.faces[template.face_parts == template.part_names.index(name)])
 
 
 def sole_vertices(template: ip.BodyTemplate) -> NDArray[np.int64]:

@@ -17,6 +17,11 @@ from .zero_moment_point import GRAVITY, along_force
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+SPREAD = 0.05  # of the weight: more says that not all of it is on the plates
+QUICK = ("jump", "running")
+APART = 0.03  # of the weight: more is not the same
+AXES = ("forward", "left", "up")
+
 
 def figures(one: Comparison) -> dict[str, Any]:
     """All that `report` prints of a recording."""
@@ -28,12 +33,14 @@ def figures(one: Comparison) -> dict[str, Any]:
             "frames": len(one.times),
             "rate_hz": one.rate,
             "complete_frames": int(one.complete.sum()),
+            "frames_beside_plates": int(one.beside.sum()),
             "mass": {
                 "volume_mean": mass.mean(),
                 "volume_least": mass.min(),
                 "volume_most": mass.max(),
                 "plates": one.weight,
                 "plates_std": _std(one.weights),
+                "standing": one.standing,
             },
             "unloaded_force": one.unloaded,
             "force": _force(one),
@@ -41,8 +48,36 @@ def figures(one: Comparison) -> dict[str, Any]:
             "standing": _standing(one),
             "cop": {phase: _centers(one, mask) for phase, mask in one.phases.items()} if one.plates else {},
             "shares": _shares(one),
+            "flags": flags(one),
         }
     )
+
+
+def flags(one: Comparison) -> list[str]:
+    """What is odd about the plates: a weight that changes, or is not that of standing still, a foot beside them, and a
+    force that the movement does not explain."""
+    said = []
+    spread, loaded = _std(one.weights), int(one.beside.sum() + one.complete.sum())
+    if one.beside.any():
+        which = f"{one.beside.sum()} of {loaded} loaded frames"
+        said.append(f"a foot is on the floor beside the plates in {which}: they are left out")
+    if spread is not None and spread > SPREAD * one.weight:
+        why = "landings are quicker than the low pass" if one.kind in QUICK else "is a foot beside the plates?"
+        said.append(
+            f"weight by the plates: {one.weight:.1f} ± {spread:.1f} kg, a spread of {spread / one.weight:.0%}, "
+            f"expected up to {SPREAD:.0%}: {why}"
+        )
+    if np.isfinite(one.standing) and np.isfinite(one.weight) and abs(one.weight / one.standing - 1) > APART:
+        said.append(
+            f"weight by the plates: {one.weight:.1f} kg, but {one.standing:.1f} kg standing still, which is taken"
+        )
+    force = _force(one)
+    if force is not None and one.kind != "quiet standing" and force["share"] > force["at_rest"]:
+        said.append(
+            f"upward force: {force['share']:.1%} off with the acceleration of the fitted body, {force['at_rest']:.1%} "
+            "without: the plates measure not all of it, or not this movement"
+        )
+    return said
 
 
 def _std(values: Array) -> float | None:
@@ -57,8 +92,8 @@ def _force(one: Comparison) -> dict[str, Any] | None:
     used = one.complete & np.isfinite(one.acceleration[:, 1])
     if not used.any():
         return None
-    weight, upward = one.weight * GRAVITY, one.force[used, 1]
-    off = one.weight * (GRAVITY + one.acceleration[used, 1]) - upward
+    weight, upward = one.mass * GRAVITY, one.force[used, 1]
+    off = one.mass * (GRAVITY + one.acceleration[used, 1]) - upward
     return {
         "rms": _rms(off),
         "share": _rms(off) / weight,
@@ -68,7 +103,7 @@ def _force(one: Comparison) -> dict[str, Any] | None:
 
 
 def _against_reference(one: Comparison) -> dict[str, Any] | None:
-    """Of each formulation: mean and rms difference along x, y (up), z, and the mean distance, m."""
+    """Of each formulation: mean and rms difference forward, left and up of the person, and the mean distance, m."""
     if one.reference is None:
         return None
     used = np.isfinite(one.reference).all(axis=1)
@@ -77,22 +112,23 @@ def _against_reference(one: Comparison) -> dict[str, Any] | None:
         return None
     found = {}
     for method in METHODS:
-        off = (one.computed.com[method] - one.reference)[used]
+        off = one.of_person(one.computed.com[method] - one.reference)[used]
         found[method] = {
             "mean": off.mean(axis=0),
             "rms": np.sqrt((off**2).mean(axis=0)),
             "worst": np.abs(off).max(axis=0),
             "distance": np.linalg.norm(off, axis=1).mean(),
         }
-    return {"frames": int(used.sum()), "seconds": [one.times[used][0], one.times[used][-1]], "methods": found}
+    seconds = [one.times[used][0], one.times[used][-1]]
+    return {"judge": one.judge, "frames": int(used.sum()), "seconds": seconds, "axes": AXES, "methods": found}
 
 
 def _standing(one: Comparison) -> dict[str, Any] | None:
-    """Quiet standing: the mean of CoM − CoP along x and z, its length, their distance over time, and sways, rms."""
-    if one.kind != "quiet standing" or one.measured is None:
+    """Quiet standing: the mean of CoM − CoP forward and left, its length, their distance over time, and sways, rms."""
+    if one.kind != "quiet standing" or one.measured is None or not one.complete.any():
         return None
     com, cop = (points[one.complete][:, [0, 2]] for points in (one.com, one.measured))
-    mean = (com - cop).mean(axis=0)
+    mean = one.of_person(one.com - one.measured)[one.complete, :2].mean(axis=0)
     return {
         "offset": mean,
         "offset_length": np.linalg.norm(mean),

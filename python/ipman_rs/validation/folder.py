@@ -1,109 +1,129 @@
 """What a folder of measurements holds: recordings of markers, and the forces and centres of mass that belong to them.
 
-Files belong together by name. `squats.trc` takes its forces from a `.mot` or `.sto` whose name has `squats` in it, its
-centre of mass from a `.csv` or `.sto` that has, too; the longest such name counts. What a file holds its columns say. A
-`.c3d` with force plates brings its own forces. A centre of mass whose name has none of the recordings' names in it
-belongs to the only recording with forces.
+Which belong together `data.pairing` says, by their names and folders; what a file holds its columns say. A `.c3d` with
+force plates brings its own forces, and one with Plug-in Gait's CentreOfMass its own centre of mass.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..data import external_loads, pairing
+from ..data.external_loads import ExternalLoads
+
 MARKERS = (".trc", ".c3d")
 TABLES = (".mot", ".sto", ".csv")
-STILL = ("static", "stand", "neutral", "calib", "t-pose", "tpose")
 
 
-@dataclass
+@dataclass(frozen=True)
 class Trial:
-    """A recording: the files of its markers, forces and centre of mass (None: not measured)."""
+    """A recording: the files of its markers, forces and centre of mass (None: not measured).
+
+    `owner`: the folders that say which person it is of. `loads`: in which columns the forces are, where a file says so.
+    """
 
     name: str
     markers: Path
     forces: Path | None = None
     com: Path | None = None
+    owner: tuple[str, ...] = ()
+    loads: ExternalLoads | None = None
 
     @property
     def still(self) -> bool:
         """Whether its name says that somebody stands still."""
-        return any(word in self.name.lower() for word in STILL)
+        return pairing.still(self.name)
 
 
-def find(
-    folder: Path, kind_of: Callable[[Path], str | None], has_plates: Callable[[Path], bool]
-) -> tuple[list[Trial], list[str], dict[Path, str]]:
-    """The recordings of a folder, by name, those of standing still first; what was not used, and why; and what is wrong
-    with files that could not be read.
+@dataclass(frozen=True)
+class Kinds:
+    """What files hold. `table`: "forces", "com", or None and why it is neither, ValueError if it cannot be read;
+    `plates` and `com`: whether a `.c3d` has force plates, and a centre of mass."""
 
-    `kind_of` a table: "forces", "com", or None, ValueError if it cannot be read; `has_plates` of a `.c3d` file.
-    ValueError, saying what was expected, if the folder is none, has no markers, or nothing was measured beside them.
+    table: Callable[[Path], tuple[str | None, str]]
+    plates: Callable[[Path], bool]
+    com: Callable[[Path], bool]
+
+
+def find(folder: Path, kinds: Kinds, apart: Path | None = None) -> tuple[list[Trial], list[str], dict[Path, str]]:
+    """The recordings of a folder and those below it, by name, those of standing still first; what was not used, and
+    why; and what is wrong with files that could not be read.
+
+    `apart`: a folder that is not of the measurements, such as that of outputs. ValueError, saying what was expected, if
+    the folder is none, has no markers, or nothing was measured beside them.
     """
     if not folder.is_dir():
         raise ValueError(
             f"{folder}: expected a folder of recordings, {'got a file' if folder.exists() else 'not there'}"
         )
-    files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
-    trials = [Trial(path.stem, path) for path in files if path.suffix.lower() in MARKERS]
-    if not trials:
-        raise ValueError(f"{folder}: expected files of markers ({', '.join(MARKERS)}), got {_listed(files)}")
-    twice = [trial.name for index, trial in enumerate(trials) if trial.name in [other.name for other in trials[:index]]]
-    if twice:
-        raise ValueError(f"{folder}: two files of markers have the name {twice[0]!r}; rename one of them")
-    for trial in trials:
-        if trial.markers.suffix.lower() == ".c3d" and has_plates(trial.markers):
-            trial.forces = trial.markers
-    kinds, unreadable = {}, {}
+    files = _files(folder, apart)
+    markers, notes = _one_of_a_name([path for path in files if path.suffix.lower() in MARKERS], folder)
+    if not markers:
+        raise ValueError(f"{folder}: expected files of markers ({', '.join(MARKERS)}), got {_listed(files, folder)}")
+    own = [path for path in markers if path.suffix.lower() == ".c3d"]
+    tables: dict[Path, str] = {}
+    others: dict[str, list[str]] = {}
+    unreadable: dict[Path, str] = {}
+    loads, aliases, wrong = external_loads.beside(files)
     for path in files:
-        if path.suffix.lower() in TABLES:
-            try:
-                kinds[path] = kind_of(path)
-            except ValueError as error:
-                unreadable[path] = str(error)
-    notes = _tables(kinds, trials)
+        if path.suffix.lower() not in TABLES:
+            continue
+        try:
+            kind, why = kinds.table(path)
+        except ValueError as error:
+            unreadable[path] = str(error)
+            continue
+        kind = "forces" if path in loads else kind
+        if kind is None:
+            others.setdefault(why, []).append(path.relative_to(folder).as_posix())
+        else:
+            tables[path] = kind
+    paired = pairing.pair(markers, tables, folder, [path for path in own if kinds.plates(path)], aliases)
+    notes += [*wrong, *paired.notes]
+    notes += [f"{path.relative_to(folder).as_posix()}: not used, for {why}" for path, why in paired.left.items()]
+    notes += [f"{', '.join(names)}: not used, for {why}" for why, names in others.items()]
+    trials = []
+    for name, path in zip(pairing.names(markers, folder), markers, strict=True):
+        forces, com = paired.forces.get(path), paired.com.get(path)
+        if com is None and path in own and kinds.com(path):
+            com = path
+        owner = pairing.Place.of(path, folder).owner
+        trials.append(Trial(name, path, forces, com, owner, None if forces is None else loads.get(forces)))
     if not any(trial.forces or trial.com for trial in trials):
         raise ValueError(
             f"{folder}: markers of {', '.join(trial.name for trial in trials)}, but nothing to compare with; expected "
             f"forces (such as {trials[0].name}_grf.mot, or plates in a .c3d) or centres of mass (such as "
             f"{trials[0].name}_com.sto, with columns center_of_mass_X, Y, Z)"
-            + "".join(f"; {what}" for what in unreadable.values())
+            + "".join(f"; {what}" for what in [*notes, *unreadable.values()])
         )
-    return sorted(trials, key=lambda trial: (not trial.still, trial.name)), notes, unreadable
+    return sorted(trials, key=lambda trial: (trial.owner, not trial.still, trial.name)), notes, unreadable
 
 
-def _tables(kinds: Mapping[Path, str | None], trials: Sequence[Trial]) -> list[str]:
-    """Gives each table to its recording; says which are left."""
-    notes, strangers = [], []
-    for path, kind in kinds.items():
-        trial = _named(path, trials)
-        if kind is None:
-            notes.append(f"{path.name}: not used, for it has neither forces nor a centre of mass")
-        elif trial is None and kind == "com":
-            strangers.append(path)
-        elif trial is None:
-            notes.append(f"{path.name}: not used, for its name has no recording's name in it")
-        elif getattr(trial, kind) is None:
-            setattr(trial, kind, path)
-        else:
-            notes.append(f"{path.name}: not used, for {trial.name} has its {kind} from {getattr(trial, kind).name}")
-    for path in strangers:
-        able = [trial for trial in trials if trial.forces is not None and trial.com is None]
-        if len(able) == 1 and len(strangers) == 1:
-            able[0].com = path
-            notes.append(f"{path.name}: taken as the centre of mass of {able[0].name}, the only recording with forces")
-        else:
-            notes.append(f"{path.name}: not used, for its name does not say which recording it is of")
-    return notes
+def _files(folder: Path, apart: Path | None) -> list[Path]:
+    """All but hidden ones."""
+    away = None if apart is None else apart.resolve()
+    found = []
+    for path in sorted(folder.rglob("*")):
+        hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
+        if hidden or not path.is_file() or (away is not None and path.resolve().is_relative_to(away)):
+            continue
+        found.append(path)
+    return found
 
 
-def _named(path: Path, trials: Sequence[Trial]) -> Trial | None:
-    """The recording whose name is in the file's."""
-    inside = [trial for trial in trials if trial.name.lower() in path.stem.lower()]
-    return max(inside, key=lambda trial: len(trial.name), default=None)
+def _one_of_a_name(markers: Sequence[Path], root: Path) -> tuple[list[Path], list[str]]:
+    """Without the `.trc` that lies beside a `.c3d` of the same name: it was made of it; and which those are."""
+    whole = {path.with_suffix("") for path in markers if path.suffix.lower() == ".c3d"}
+    twice = [path for path in markers if path.suffix.lower() != ".c3d" and path.with_suffix("") in whole]
+    notes = [
+        f"{path.relative_to(root).as_posix()}: not used, for {path.stem}.c3d has the same name; take away one of them"
+        for path in twice
+    ]
+    return [path for path in markers if path not in twice], notes
 
 
-def _listed(files: Sequence[Path]) -> str:
-    names = [path.name for path in files[:5]]
+def _listed(files: Sequence[Path], folder: Path) -> str:
+    names = [path.relative_to(folder).as_posix() for path in files[:5]]
     return ", ".join(names) + (" and more" if len(files) > 5 else "") if names else "an empty folder"

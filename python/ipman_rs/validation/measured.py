@@ -9,50 +9,97 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data import c3d, force_plates, opensim
+from ..data.external_loads import ExternalLoads
 from ..data.force_plates import ForcePlates, between
 from ..data.tracks import TO_Y_UP
 from ..files import regular
 
 Array = NDArray[np.float64]
+Up = tuple[float, float, float] | None  # a direction in a file's own axes; None: as it says
 
+NEITHER = "it has neither forces nor a centre of mass"
 CSV_COLUMNS = ("time_s", "com_x_m", "com_y_m", "com_z_m")
 
 
-def kind_of(path: Path) -> str | None:
-    """What a table holds: "forces", "com", or nothing of use. ValueError, naming the file, if it cannot be read."""
+def kind_of(path: Path) -> tuple[str | None, str]:
+    """What a table holds: "forces", "com", or None, and then why it is of no use. ValueError, naming the file, if it
+    cannot be read."""
     if path.suffix.lower() == ".csv":
         if not set(CSV_COLUMNS) <= set(_heads(path)):
-            return None
+            return None, NEITHER
         _csv(path)
-        return "com"
+        return "com", ""
     table = opensim.storage(path)
-    return "forces" if opensim.has_plates(table) else "com" if opensim.has_center_of_mass(table) else None
+    moves = opensim.derivative(path)
+    if moves is not None and f"{opensim.COM}_X" in table.columns:
+        return None, f"it has {moves}; the positions are compared"
+    return opensim.kind(table), NEITHER
 
 
 def has_plates(path: Path) -> bool:
     """Whether a `.c3d` file has force plates; what else is wrong with it comes up when it is read."""
     try:
-        return any(c3d.read(path).values("FORCE_PLATFORM", "USED")[:1])
-    except (ValueError, ImportError):
+        return c3d.read(path).has_plates
+    except ValueError:
         return False
 
 
-def plates(path: Path) -> ForcePlates:
-    """The force plates of a `.c3d`, `.mot` or `.sto` file. ValueError, naming the file, for what is not right in it."""
+def has_center_of_mass(path: Path) -> bool:
+    """Whether a `.c3d` file has a centre of mass that a model such as Plug-in Gait computed."""
+    try:
+        return c3d.read(path).center_of_mass() is not None
+    except ValueError:
+        return False
+
+
+def plates(path: Path, up: Up = None, unit: str = "m", loads: ExternalLoads | None = None) -> ForcePlates:
+    """The force plates of a `.c3d`, `.mot` or `.sto` file, y up. ValueError, naming the file, for what is not right.
+
+    `up`: what points up in the file, if that is not what it says, or y; `unit`: of the points of a `.mot` or `.sto`;
+    `loads`: in which of its columns the forces are.
+    """
     if path.suffix.lower() == ".c3d":
         found = c3d.read(path)
-        return force_plates.of_recording(found).turned(TO_Y_UP[found.up])
-    return opensim.plates(opensim.storage(path))
+        axis = _axis(up, found.up, path)
+        return force_plates.of_recording(found, axis).turned(TO_Y_UP[axis])
+    axis = _axis(up, "y", path)
+    return opensim.plates(opensim.storage(path), unit, axis, loads).turned(TO_Y_UP[axis])
 
 
-def center_of_mass(path: Path, times: Array) -> Array:
-    """A measured centre of mass (n, 3) m at these times, NaN outside the file's. ValueError, naming the file."""
+def center_of_mass(path: Path, times: Array, up: Up = None, subject: str | None = None) -> Array:
+    """A measured centre of mass (n, 3) m at these times, y up, NaN outside the file's. ValueError, naming the file.
+
+    `up` as in `plates`; `subject`: whose, where a `.c3d` has several people.
+    """
+    if path.suffix.lower() == ".c3d":
+        found = c3d.read(path)
+        points = found.center_of_mass(subject)
+        if points is None:
+            raise ValueError(f"{path}: expected a centre of mass by a model such as Plug-in Gait, it has none")
+        return between(found.times, points @ TO_Y_UP[_axis(up, found.up, path)].T, times)
     if path.suffix.lower() == ".csv":
         own, points = _csv(path)
     else:
         table = opensim.storage(path)
         own, points = table.times, opensim.center_of_mass(table)
-    return between(own, points, times)
+    return between(own, points @ TO_Y_UP[_axis(up, "y", path)].T, times)
+
+
+def _axis(up: Up, usual: str, path: Path) -> str:
+    """The axis that points up, of which `turned` knows the way to y. ValueError for another direction."""
+    if up is None:
+        return usual
+    named = [axis for axis, one in zip("xyz", np.eye(3), strict=True) if np.array_equal(up, one)]
+    if not named:
+        raise ValueError(f"{path}: up: expected x, y or z for forces and centres of mass, got {tuple(up)}")
+    return named[0]
+
+
+def judge(path: Path) -> str:
+    """Whose a centre of mass is."""
+    if path.suffix.lower() == ".c3d":
+        return "Plug-in Gait"
+    return path.stem if path.suffix.lower() == ".csv" and "opensim" not in path.stem.lower() else "OpenSim"
 
 
 def _heads(path: Path) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,16 +44,19 @@ def moments(one: Comparison) -> dict[str, int]:
 
 
 def pressure_map(one: Comparison, bodies: Bodies, template: ip.BodyTemplate) -> bytes:
-    """A PNG of the engine's pressure on the floor, seen from above, with the plates and all centres."""
+    """A PNG of the engine's pressure on the floor, seen from above with the person's front at the top, with the plates
+    and all centres."""
     chosen = moments(one)
-    limits = [_limits(one, np.asarray(bodies[frame], float), template, frame) for frame in chosen.values()]
+    posed = {frame: np.asarray(bodies[frame], float) for frame in chosen.values()}
+    floors = [Floor.under(one, vertices, template, frame) for frame, vertices in posed.items()]
+    limits = [_limits(one, posed[f], template, f, floor) for f, floor in zip(chosen.values(), floors, strict=True)]
     tallest = max((high - low)[1] / (high - low)[0] for low, high in limits)
     figure, axes = _canvas(1, len(chosen), (1 + 4.2 * len(chosen), 1.5 + 4.2 * min(tallest, 1.6)))
-    for axis, (phase, frame), box in zip(axes[0], chosen.items(), limits, strict=True):
-        _draw_map(axis, one, np.asarray(bodies[frame], float), template, frame, box)
+    for axis, (phase, frame), floor, box in zip(axes[0], chosen.items(), floors, limits, strict=True):
+        _draw_map(axis, one, posed[frame], template, frame, floor, box)
         title = "" if phase == "all" else f"{phase}, "
         axis.set_title(f"{one.name}, {title}{one.times[frame]:.2f} s", fontsize=10)
-    axes[0][0].set_ylabel("z, m")
+    axes[0][0].set_ylabel("forward, m")
     if one.plates is not None:
         axes[0][0].plot([], [], "^", color="black", ms=6, mfc="white", label="CoP of a plate, with its load")
     told = {name: mark for axis in axes[0] for mark, name in zip(*axis.get_legend_handles_labels(), strict=True)}
@@ -60,32 +64,57 @@ def pressure_map(one: Comparison, bodies: Bodies, template: ip.BodyTemplate) -> 
     return _png(figure)
 
 
-def _limits(one: Comparison, vertices: Array, template: ip.BodyTemplate, frame: int) -> tuple[Array, Array]:
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """The floor from above as the person faces: right and forward (..., 2) m of the middle of both soles."""
+
+    middle: Array  # (3,) m
+    forward: Array  # (3,)
+
+    @classmethod
+    def under(cls, one: Comparison, vertices: Array, template: ip.BodyTemplate, frame: int) -> Floor:
+        return cls(vertices[sole_vertices(template)].mean(axis=0), one.forward[frame])
+
+    def __call__(self, points: Array) -> Array:
+        away = points - self.middle
+        return np.stack([away @ np.cross(self.forward, [0.0, 1.0, 0.0]), away @ self.forward], axis=-1)
+
+
+def _limits(
+    one: Comparison, vertices: Array, template: ip.BodyTemplate, frame: int, floor: Floor
+) -> tuple[Array, Array]:
     """Corners of the map: around the soles and all centres."""
-    centers = np.array([place[frame, [0, 2]] for _, place, _ in _places(one)])
-    around = np.concatenate([vertices[sole_vertices(template)][:, [0, 2]], centers[np.isfinite(centers).all(axis=1)]])
+    centers = floor(np.array([place[frame] for _, place, _ in _places(one)]))
+    around = np.concatenate([floor(vertices[sole_vertices(template)]), centers[np.isfinite(centers).all(axis=1)]])
     return around.min(axis=0) - MARGIN, around.max(axis=0) + MARGIN
 
 
 def _draw_map(
-    axis: Axes, one: Comparison, vertices: Array, template: ip.BodyTemplate, frame: int, limits: tuple[Array, Array]
+    axis: Axes,
+    one: Comparison,
+    vertices: Array,
+    template: ip.BodyTemplate,
+    frame: int,
+    floor: Floor,
+    limits: tuple[Array, Array],
 ) -> None:
     from scipy.ndimage import gaussian_filter
 
     low, high = limits
     rho = np.asarray(ip.pressure(vertices, template, under(vertices), ALPHA, GAMMA), float)
-    points = np.asarray(ip.sample_surface(vertices, template), float)[:, [0, 2]]
+    points = floor(np.asarray(ip.sample_surface(vertices, template), float))
     edges = [np.arange(low[k], high[k] + CELL, CELL) for k in range(2)]
     density, *_ = np.histogram2d(*points.T, bins=edges, weights=rho)
     density = gaussian_filter(density, 1.0)
-    box = (edges[0][0], edges[0][-1], edges[1][-1], edges[1][0])
-    axis.imshow(colors.heat(density.T / density.max(), 1.0), extent=box, interpolation="bilinear")
+    box = (edges[0][0], edges[0][-1], edges[1][0], edges[1][-1])
+    shades = colors.heat(density.T / max(density.max(), np.finfo(float).tiny), 1.0)
+    axis.imshow(shades, extent=box, origin="lower", interpolation="bilinear")
     if one.plates is not None:
-        _draw_plates(axis, one, frame)
+        _draw_plates(axis, one, frame, floor)
     for name, place, (mark, color, size) in _places(one):
         if np.isfinite(place[frame]).all():
-            axis.plot(*place[frame, [0, 2]], mark, color=color, ms=size, mec="white", label=name, zorder=5)
-    axis.set(xlim=(low[0], high[0]), ylim=(high[1], low[1]), xlabel="x, m", aspect="equal")
+            axis.plot(*floor(place[frame]), mark, color=color, ms=size, mec="white", label=name, zorder=5)
+    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="right, m", aspect="equal")
 
 
 def _places(one: Comparison) -> list[tuple[str, Array, tuple[str, str, float]]]:
@@ -97,36 +126,42 @@ def _places(one: Comparison) -> list[tuple[str, Array, tuple[str, str, float]]]:
         found.append(("measured CoP", one.measured, ("^", "black", 10)))
         found.append(("ZMP of the parts", one.zmp, ("D", OURS, 6)))
     if one.reference is not None:
-        found.append(("reference CoM", one.reference, ("s", REFERENCE, 6)))
+        found.append((f"CoM by {one.judge}", one.reference, ("s", REFERENCE, 6)))
     return found  # type: ignore[return-value]
 
 
-def _draw_plates(axis: Axes, one: Comparison, frame: int) -> None:
+def _draw_plates(axis: Axes, one: Comparison, frame: int, floor: Floor) -> None:
     """Each plate's outline, as far as it is known, its centre of pressure and its load."""
     plates = one.plates
     assert plates is not None
-    for outline in () if plates.corners is None else plates.corners[:, :, [0, 2]]:
-        axis.plot(*np.vstack([outline, outline[:1]]).T, color=colors.INK, lw=1, ls="--", zorder=2)
+    for outline in () if plates.corners is None else plates.corners:
+        axis.plot(*floor(np.vstack([outline, outline[:1]])).T, color=colors.INK, lw=1, ls="--", zorder=2)
     for plate in np.flatnonzero(carried(plates)[frame] > 0):
-        place, told = plates.points[frame, plate, [0, 2]], f"{plates.loads[frame, plate]:.0f} N"
+        place, told = floor(plates.points[frame, plate]), f"{plates.loads[frame, plate]:.0f} N"
         axis.plot(*place, "^", color="black", ms=6, mfc="white", zorder=4)
         box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1}
-        axis.annotate(told, (place[0], place[1]), (9, -14), textcoords="offset points", fontsize=8, bbox=box, zorder=6)
+        axis.annotate(
+            told, (place[0], place[1]), (9, -14), textcoords="offset points", fontsize=8, bbox=box, zorder=6,
+            annotation_clip=True,
+        )  # fmt: skip
 
 
 def over_time(one: Comparison) -> bytes:
-    """A PNG of the CoM's height, the centres along both axes of the floor, and the load, over time."""
+    """A PNG of the CoM's height, the centres on the floor along the way that the person faces on average and to the
+    left of it, and the load, over time."""
     rows = 4 if one.plates is not None else 3
     figure, grid = _canvas(rows, 1, (9, 2.1 * rows), sharex=True)
     axes = [row[0] for row in grid]
     axes[0].plot(one.times, one.com[:, 1], color=OURS, lw=1.3, label="fitted body, whole volume")
     if one.reference is not None:
-        axes[0].plot(one.times, one.reference[:, 1], color=REFERENCE, lw=2.5, zorder=1, label="reference")
+        axes[0].plot(one.times, one.reference[:, 1], color=REFERENCE, lw=2.5, zorder=1, label=f"by {one.judge}")
     axes[0].set_ylabel("CoM height, m")
     axes[0].legend(frameon=False, fontsize=7, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1))
-    for axis, column, name in ((axes[1], 0, "x"), (axes[2], 2, "z")):
-        _draw_centers(axis, one, column)
-        axis.set_ylabel(f"{name} on the floor, mm")
+    mean = one.forward.mean(axis=0)
+    forward = one.forward[0] if np.linalg.norm(mean) < 0.5 else mean / np.linalg.norm(mean)  # of who turns round
+    for axis, way, name in ((axes[1], forward, "forward"), (axes[2], np.cross([0.0, 1.0, 0.0], forward), "left")):
+        _draw_centers(axis, one, way)
+        axis.set_ylabel(f"{name}, mm")
     axes[1].legend(frameon=False, fontsize=7, ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1))
     if one.plates is not None:
         _draw_loads(axes[3], one)
@@ -141,7 +176,8 @@ def _span(one: Comparison) -> tuple[float, float]:
     return max(one.times[0], times[0] - 0.3), min(one.times[-1], times[-1] + 0.3)
 
 
-def _draw_centers(axis: Axes, one: Comparison, column: int) -> None:
+def _draw_centers(axis: Axes, one: Comparison, way: Array) -> None:
+    """How far along a way (3,) all centres are, from where the centre of mass is on average."""
     shown = [
         ("CoM", one.com, {"color": colors.COM, "lw": 1.2}),
         ("the paper's CoP, γ = 10", one.computed.cop[10], {"color": colors.COP, "lw": 1.2}),
@@ -151,15 +187,18 @@ def _draw_centers(axis: Axes, one: Comparison, column: int) -> None:
         shown.insert(0, ("measured CoP", measured, {"color": "black", "lw": 2}))
         shown.append(("ZMP of the parts", one.zmp, {"color": OURS, "lw": 1.2}))
     if one.reference is not None:
-        shown.append(("reference CoM", one.reference, {"color": REFERENCE, "lw": 2, "zorder": 1}))
-    for name, places, look in shown:
-        axis.plot(one.times, 1e3 * places[:, column], label=name, **look)
+        shown.append((f"CoM by {one.judge}", one.reference, {"color": REFERENCE, "lw": 2, "zorder": 1}))
+    middle = one.com.mean(axis=0)
+    along = {name: 1e3 * (places - middle) @ way for name, places, _ in shown}
+    for name, _, look in shown:
+        axis.plot(one.times, along[name], label=name, **look)
     low, high = _span(one)
     inside = (one.times >= low) & (one.times <= high)
-    known = [1e3 * places[inside, column] for name, places, _ in shown if not name.startswith("ZMP")]
-    low, high = min(np.nanmin(v) for v in known), max(np.nanmax(v) for v in known)
-    room = 0.15 * (high - low) + 5
-    axis.set_ylim(low - room, high + room)
+    known = np.concatenate([values[inside] for name, values in along.items() if not name.startswith("ZMP")])
+    known = known[np.isfinite(known)]
+    if len(known):
+        room = 0.15 * float(np.ptp(known)) + 5
+        axis.set_ylim(float(known.min()) - room, float(known.max()) + room)
 
 
 def _draw_loads(axis: Axes, one: Comparison) -> None:
@@ -170,15 +209,16 @@ def _draw_loads(axis: Axes, one: Comparison) -> None:
                 one.times, one.plates.forces[:, plate, 1], lw=1, color=f"C{1 + plate}", label=f"plate {plate + 1}"
             )
     axis.plot(one.times, one.force[:, 1], color="black", lw=1.6, label="all plates")
-    asked = one.weight * (GRAVITY + one.acceleration[:, 1])
+    asked = one.mass * (GRAVITY + one.acceleration[:, 1])
     axis.plot(one.times, asked, color=OURS, lw=1.2, label="m (g + acceleration of the fitted CoM)")
     axis.set_ylabel("upward force, N")
-    axis.set_ylim(bottom=-30)
+    most = float(np.nanmax(one.force[:, 1])) if np.isfinite(one.force[:, 1]).any() else 0.0
+    axis.set_ylim(-30, max(1.1 * most, 100))
     axis.legend(frameon=False, fontsize=7, ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1))
 
 
 def people(one: Comparison, bodies: Bodies, faces: NDArray[np.int64], markers: Array) -> bytes:
-    """A PNG of three fitted bodies with their markers (T, M, 3), seen along z and one along x."""
+    """A PNG of three fitted bodies with their markers (T, M, 3), seen from their right, and one from its front."""
     usable = np.flatnonzero(one.complete) if one.complete.any() else np.arange(len(one.times))
     spread = usable[np.linspace(0, len(usable) - 1, 5).round().astype(int)[[1, 2, 3]]]
     frames = (
@@ -187,37 +227,41 @@ def people(one: Comparison, bodies: Bodies, faces: NDArray[np.int64], markers: A
         else [usable[0], spread[1], *2 * [usable[one.com[usable, 1].argmin()]]]
     )
     figure, grid = _canvas(1, 4, (11, 4.6), sharey=True)
-    for axis, frame, across in zip(grid[0], frames, (0, 0, 0, 2), strict=True):
-        _draw_body(axis, one, np.asarray(bodies[frame], float), faces, markers[frame], int(frame), across)
+    for axis, frame, side in zip(grid[0], frames, ("right", "right", "right", "front"), strict=True):
+        _draw_body(axis, one, np.asarray(bodies[frame], float), faces, markers[frame], int(frame), side)
     grid[0][0].set_ylabel("m")
     return _png(figure)
 
 
 def _draw_body(
-    axis: Axes, one: Comparison, vertices: Array, faces: NDArray[np.int64], markers: Array, frame: int, across: int
+    axis: Axes, one: Comparison, vertices: Array, faces: NDArray[np.int64], markers: Array, frame: int, side: str
 ) -> None:
-    """A body seen along the axis that is neither up nor `across`."""
+    """A body seen from its right or its front."""
     from matplotlib.collections import PolyCollection
 
-    away = 2 - across
-    sign = 1 if away == 2 else -1
+    forward = one.forward[frame]
+    left = np.cross([0.0, 1.0, 0.0], forward)
+    across, towards = (forward, -left) if side == "right" else (left, forward)
+
+    def seen(points: Array) -> Array:
+        """(..., 2) to the right and up in the picture."""
+        return np.stack([points @ across, points[..., 1]], axis=-1)
+
     corners = vertices[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    light = (normal / np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-12))[:, away] * sign
-    order = (sign * corners[:, :, away].mean(axis=1)).argsort()
+    light = normal / np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-12) @ towards
+    order = (corners.mean(axis=1) @ towards).argsort()
     order = order[light[order] > 0]
     shade = np.repeat((0.45 + 0.45 * light[order])[:, None], 3, axis=1)
-    axis.add_collection(
-        PolyCollection(list(corners[order][:, :, [across, 1]]), facecolors=shade, edgecolors="face", linewidths=0.3)
-    )
-    axis.plot(markers[:, across], markers[:, 1], "o", ms=2.5, color="#d62728")
-    axis.plot(*one.com[frame, [across, 1]], "P", ms=9, color=colors.COM, mec="w")
+    axis.add_collection(PolyCollection(list(seen(corners[order])), facecolors=shade, edgecolors="face", linewidths=0.3))
+    axis.plot(*seen(markers).T, "o", ms=2.5, color="#d62728")
+    axis.plot(*seen(one.com[frame]), "P", ms=9, color=colors.COM, mec="w")
     if one.measured is not None and one.complete[frame]:
-        axis.plot(one.measured[frame, across], one.measured[frame, 1], "^", ms=7, color="k")
+        axis.plot(*seen(one.measured[frame]), "^", ms=7, color="k")
     axis.axhline(float(one.floor.height), color="0.5", lw=0.8)
-    middle = vertices[:, across].mean()
+    middle = seen(vertices)[:, 0].mean()
     axis.set(xlim=(middle - 0.6, middle + 0.6), xticks=[], aspect="equal")
-    axis.set_title(f"{one.times[frame]:.2f} s, {'along z' if across == 0 else 'along x'}", fontsize=9)
+    axis.set_title(f"{one.times[frame]:.2f} s, from {'their right' if side == 'right' else 'their front'}", fontsize=9)
 
 
 def _canvas(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:

@@ -1,7 +1,7 @@
 """What `ipman validate` says, as tables in Markdown and as files of numbers.
 
 Records are what `figures.figures` gives of a recording, with `body` (its model's name) and `fit` (how it was fitted:
-`markers`, mean distance from them in m, `shape_from`, `converged`).
+`markers`, mean distance from them in m, `shape_from`, `converged`), and `flags`, what is odd about it.
 """
 
 from __future__ import annotations
@@ -32,8 +32,11 @@ MODELS = ("at rest: g(CoM)", "moving: ZMP of the CoM", "moving: ZMP of the parts
 
 
 def markdown(records: Sequence[Record], source: str, notes: Sequence[str], pictures: Sequence[str]) -> str:
-    """The page: every table that has rows, what was assumed, and the pictures."""
+    """The page: what is odd, every table that has rows, what was assumed, and the pictures."""
     lines = [f"# Bodies fitted to markers, against measurements: {source}", ""]
+    odd = [f"- {one['name']}: {flag}" for one in records for flag in one["flags"]]
+    if odd:
+        lines += ["## Odd", "", *odd, ""]
     for title, said, table in TABLES:
         rows = list(table(records))
         if len(rows) > 2:
@@ -48,32 +51,42 @@ def markdown(records: Sequence[Record], source: str, notes: Sequence[str], pictu
 def recordings(records: Iterable[Record]) -> Iterator[str]:
     yield (
         "| recording | kind | body | shape from | frames | a second | markers, mm | volume × 985, kg "
-        "| by the plates, kg | off | upward force, rms |"
+        "| by the plates, kg | standing still, kg | off | upward force, rms |"
     )
-    yield "|---|---|---|---|---|---|---|---|---|---|---|"
+    yield "|---|---|---|---|---|---|---|---|---|---|---|---|"
     for one in records:
         mass, force = one["mass"], one["force"]
         spread = f"{_number(mass['volume_mean'])} ({_number(mass['volume_least'])} to {_number(mass['volume_most'])})"
         plates = off = ""
         if mass["plates"] is not None:
             plates = f"{_number(mass['plates'])} ± {_number(mass['plates_std'])}"
-            off = f"{mass['volume_mean'] / mass['plates'] - 1:+.1%}"
+            plates += " !" if any(flag.startswith("weight by the plates") for flag in one["flags"]) else ""
+        if weighed(one) is not None:
+            off = f"{mass['volume_mean'] / weighed(one) - 1:+.1%}"
+        still = "" if mass["standing"] is None else _number(mass["standing"])
         pushed = f"{force['rms']:.0f} N, {force['share']:.1%} (at rest {force['at_rest']:.1%})" if force else ""
         yield (
             f"| {one['name']} | {one['kind']} | {one['body']} | {one['fit']['shape_from']} | {one['frames']} "
-            f"| {one['rate_hz']:.0f} | {1e3 * one['fit']['markers']:.1f} | {spread} | {plates} | {off} | {pushed} |"
+            f"| {one['rate_hz']:.0f} | {1e3 * one['fit']['markers']:.1f} | {spread} | {plates} | {still} | {off} "
+            f"| {pushed} |"
         )
 
 
+def weighed(one: Record) -> float | None:
+    """The person's mass, kg: by plates on which they stood still, or else on which they move; None without plates."""
+    mass = one["mass"]
+    return mass["plates"] if mass["standing"] is None else mass["standing"]
+
+
 def centers_of_mass(records: Iterable[Record]) -> Iterator[str]:
-    yield "| recording | body | shape from | frames | x, rms (mean) | y, up | z | distance, mean |"
-    yield "|---|---|---|---|---|---|---|---|"
+    yield "| recording | against | body | shape from | frames | forward, rms (mean) | left | up | distance, mean |"
+    yield "|---|---|---|---|---|---|---|---|---|"
     for one in _with(records, "com"):
         exact = one["com"]["methods"]["exact"]
         axes = [f"{1e3 * rms:.1f} ({1e3 * mean:+.1f})" for rms, mean in zip(exact["rms"], exact["mean"], strict=True)]
         yield (
-            f"| {one['name']} | {one['body']} | {one['fit']['shape_from']} | {one['com']['frames']} "
-            f"| {' | '.join(axes)} | {1e3 * exact['distance']:.1f} |"
+            f"| {one['name']} | {one['com']['judge']} | {one['body']} | {one['fit']['shape_from']} "
+            f"| {one['com']['frames']} | {' | '.join(axes)} | {1e3 * exact['distance']:.1f} |"
         )
 
 
@@ -82,27 +95,30 @@ def formulations(records: Iterable[Record]) -> Iterator[str]:
     compared = list(_with(records, "com"))
     if not compared:
         return
-    titles = [f"{one['name']}, {one['body']}, shape from {one['fit']['shape_from']}" for one in compared]
+    titles = [
+        f"{one['name']}, {one['body']}, shape from {one['fit']['shape_from']}, against {one['com']['judge']}"
+        for one in compared
+    ]
     yield f"| formulation | {' | '.join(titles)} | the paper, on MoYo |"
     yield f"|---|{'---|' * len(titles)}---|"
     for method in reversed(METHODS):
         cells = [one["com"]["methods"][method] for one in compared]
-        told = [f"{1e3 * cell['distance']:.1f} (up {1e3 * cell['mean'][1]:+.0f})" for cell in cells]
+        told = [f"{1e3 * cell['distance']:.1f} (up {1e3 * cell['mean'][2]:+.0f})" for cell in cells]
         yield f"| {WORDS[method]} | {' | '.join(told)} | {PAPER.get(method, '')} |"
 
 
 def standing(records: Iterable[Record]) -> Iterator[str]:
     yield (
-        "| recording | body | shape from | CoM − CoP along x, z | means apart | distance, mean | sway of CoM "
+        "| recording | body | shape from | CoM − CoP forward, left | means apart | distance, mean | sway of CoM "
         "| sway of CoP |"
     )
     yield "|---|---|---|---|---|---|---|---|"
     for one in _with(records, "standing"):
         found = one["standing"]
-        x, z = (1e3 * value for value in found["offset"])
+        forward, left = (1e3 * value for value in found["offset"])
         rest = (found[name] for name in ("offset_length", "distance", "sway_com", "sway_cop"))
         yield (
-            f"| {one['name']} | {one['body']} | {one['fit']['shape_from']} | {x:+.1f}, {z:+.1f} "
+            f"| {one['name']} | {one['body']} | {one['fit']['shape_from']} | {forward:+.1f}, {left:+.1f} "
             f"| {' | '.join(f'{1e3 * value:.1f}' for value in rest)} |"
         )
 
@@ -157,18 +173,27 @@ TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...]
     (
         "Weight",
         "Volume × 985 kg/m³ is the posed mesh's, mean over the frames and range. The plates' mass is the upward force "
-        "over g + the CoM's acceleration, ± over the frames; the last column: m (g + acceleration) against the "
-        "force, and the weight m g alone (at rest).",
+        "over g + the CoM's acceleration, ± over the frames (!: not to be trusted, see above), standing still that of "
+        "the same person's quiet standing, which goes first; off: the volume's against it. The last column: m (g + "
+        "acceleration) against the force, and the weight m g alone (at rest).",
         recordings,
     ),
-    ("Centre of mass", "Of the whole volume against the reference, mm.", centers_of_mass),
+    (
+        "Centre of mass",
+        "Of the whole volume against the reference, mm: forward, to the left and upwards of the person's pelvis.",
+        centers_of_mass,
+    ),
     (
         "Formulations of the centre of mass",
         "Mean distance in space from the reference, mm; in brackets how much too high on average. The paper's figures "
         "are of another data set.",
         formulations,
     ),
-    ("Quiet standing", "Centre of mass and measured centre of pressure on the floor, mm.", standing),
+    (
+        "Quiet standing",
+        "Centre of mass and measured centre of pressure on the floor, mm, as the pelvis faces.",
+        standing,
+    ),
     (
         "Centre of pressure",
         "Mean distance on the floor from the measured centre of pressure, mm: to where it is of a body at rest; to the "
@@ -191,12 +216,13 @@ def series(one: Comparison) -> dict[str, NDArray[Any]]:
     found: dict[str, NDArray[Any]] = {"time_s": one.times, "volume_mass_kg": one.computed.mass}
     found |= {f"com_{method}_m": points for method, points in one.computed.com.items()}
     found["com_acceleration_mps2"] = one.acceleration
+    found["forward_1"] = one.forward
     found |= {f"cop_gamma_{gamma}_m": points for gamma, points in one.computed.cop.items()}
     if one.reference is not None:
         found["com_reference_m"] = one.reference
     if one.plates is not None:
         assert one.measured is not None
-        found |= {"force_N": one.force, "cop_measured_m": one.measured, "complete": one.complete}
+        found |= {"force_N": one.force, "cop_measured_m": one.measured, "complete": one.complete, "beside": one.beside}
         found |= {"loads_N": carried(one.plates), "first_share_computed": one.computed.shares}
         names = ("zmp_com_m", "zmp_parts_m", "com_along_force_m")
         found |= {name: one.centers[model] for name, model in zip(names, MODELS[1:], strict=True)}

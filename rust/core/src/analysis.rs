@@ -6,6 +6,7 @@ use crate::losses::balance::{BalanceCost, Wrap};
 use crate::losses::ground::{GroundLoss, Tanh};
 use crate::losses::stability::distance_on_ground;
 use crate::mass::{Centre, Method};
+use crate::memory;
 use crate::number::vector::{Vec3, sub};
 use crate::number::{Real, Scalar};
 use crate::pressure::{CenterOfPressure, Cop, LoadSums, PressureCurve};
@@ -89,8 +90,13 @@ impl Analysis {
         at::PART_VOLUMES + template.mesh.num_parts
     }
 
-    pub fn has_densities_for(&self, num_parts: usize) -> bool {
-        self.mass.has_densities_for(num_parts)
+    /// An error names the constant that is out of its range.
+    pub fn check(&self, template: &Template) -> Result<()> {
+        self.pressure.check(template)?;
+        self.ground.check(template)?;
+        self.contact.check()?;
+        self.balance.check(template)?;
+        self.mass.check(template)
     }
 
     /// Writes the numbers and gives the polygon of each lane.
@@ -125,7 +131,7 @@ impl Analysis {
         out[at::MARGIN] = number(&|lane| supports[lane].margin);
         let [low, high] = scene.bounds();
         out[at::STATUS] = number(&|lane| {
-            let volumes: Vec<f64> = parts.iter().map(|part| part.volume.lane(lane).value()).collect();
+            let volumes = memory::collect(parts.iter().map(|part| part.volume.lane(lane).value()));
             let corner = |corner: Vec3<R>| corner.map(|x| x.lane(lane).value());
             status::bits(&volumes, sub(corner(high), corner(low)), supports[lane].has_contact()) as f64
         });
@@ -134,7 +140,7 @@ impl Analysis {
 
     /// Pressure and ground losses.
     fn look<R: Real>(&self, scene: &Scene<R>, heights: &[R], ground: &mut [R]) -> Looked<R> {
-        let mut loads = LoadSums::new(self.pressure, heights);
+        let mut loads = LoadSums::new(self.pressure, scene.template, heights);
         let mut sums = self.ground.sums();
         let mut lowest = R::of(1e30);
         let mut row = [R::zero(); CHUNK];

@@ -8,11 +8,11 @@
 //! After closing, the body is a list of vertices (the mesh's, then the virtual ones) and closed faces, sorted by part;
 //! no later room needs to know which of them were added.
 
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::number::vector::{Vec3, add, narrow, scale, widen, zero};
 use crate::number::{Real, Room};
 use crate::rings::Rings;
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 #[derive(Clone, Debug)]
@@ -31,18 +31,18 @@ pub struct Closing {
 impl Closing {
     pub fn new(mesh: &Mesh) -> Self {
         let interface = interface_edges(mesh);
-        let (components, component_of) = connect(&interface);
-        let mut by_part = vec![Vec::new(); mesh.num_parts];
+        let (components, component_of) = connect(mesh.num_vertices, &interface);
+        let mut by_part = memory::filled(Vec::new(), mesh.num_parts);
         for (face, &part) in mesh.faces.iter().zip(&mesh.face_parts) {
-            by_part[part as usize].push(*face);
+            memory::push(&mut by_part[part as usize], *face);
         }
         for &(from, to, part) in &interface {
-            let centre = (mesh.num_vertices + component_of[&from]) as u32;
-            by_part[part as usize].push([to, from, centre]);
+            let centre = mesh.num_vertices as u32 + component_of[from as usize];
+            memory::push(&mut by_part[part as usize], [to, from, centre]);
         }
-        let mut faces = Vec::new();
-        let mut parts = Vec::new();
-        let mut rings = Vec::new();
+        let mut faces = memory::with_capacity(mesh.faces.len() + interface.len());
+        let mut parts = memory::with_capacity(mesh.num_parts);
+        let mut rings = memory::with_capacity(mesh.num_parts);
         for part in by_part {
             rings.push(Rings::new(&part));
             parts.push(faces.len()..faces.len() + part.len());
@@ -111,39 +111,41 @@ fn interface_edges(mesh: &Mesh) -> Vec<(u32, u32, u32)> {
         let part = mesh.face_parts[face];
         for ((from, to), neighbour) in Mesh::edges(*corners).into_iter().zip(neighbours) {
             if neighbour.is_none_or(|other| mesh.face_parts[other as usize] != part) {
-                edges.push((from, to, part));
+                memory::push(&mut edges, (from, to, part));
             }
         }
     }
     edges
 }
 
+/// No component.
+const NONE: u32 = u32::MAX;
+
 /// The connected components of the edges, in the order of their lowest vertex, and the component of each vertex.
-fn connect(edges: &[(u32, u32, u32)]) -> (Vec<Vec<u32>>, BTreeMap<u32, usize>) {
-    let mut linked: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for &(from, to, _) in edges {
-        linked.entry(from).or_default().push(to);
-        linked.entry(to).or_default().push(from);
-    }
-    let mut component_of = BTreeMap::new();
+fn connect(num_vertices: usize, edges: &[(u32, u32, u32)]) -> (Vec<Vec<u32>>, Vec<u32>) {
+    let mut links = memory::collect(edges.iter().flat_map(|&(from, to, _)| [(from, to), (to, from)]));
+    links.sort_unstable();
+    let mut component_of = memory::filled(NONE, num_vertices);
     let mut components = Vec::new();
-    for &start in linked.keys() {
-        if component_of.contains_key(&start) {
+    let mut open = Vec::new();
+    for &(start, _) in &links {
+        if component_of[start as usize] != NONE {
             continue;
         }
-        let mut component = Vec::new();
-        let mut open = vec![start];
-        component_of.insert(start, components.len());
+        let (own, mut component) = (components.len() as u32, Vec::new());
+        component_of[start as usize] = own;
+        memory::push(&mut open, start);
         while let Some(vertex) = open.pop() {
-            component.push(vertex);
-            for &next in &linked[&vertex] {
-                if component_of.insert(next, components.len()).is_none() {
-                    open.push(next);
+            memory::push(&mut component, vertex);
+            let first = links.partition_point(|link| link.0 < vertex);
+            for &(_, next) in links[first..].iter().take_while(|link| link.0 == vertex) {
+                if std::mem::replace(&mut component_of[next as usize], own) == NONE {
+                    memory::push(&mut open, next);
                 }
             }
         }
         component.sort_unstable();
-        components.push(component);
+        memory::push(&mut components, component);
     }
     (components, component_of)
 }

@@ -43,6 +43,8 @@ pub enum Error {
     UnknownQuantity(String),
     #[error("interrupted")]
     Interrupted,
+    #[error("out of memory: {bytes} bytes were not to be had")]
+    OutOfMemory { bytes: usize },
 }
 
 pub type Result<T> = std::result::Result<T, Error>;

@@ -5,6 +5,10 @@
 
 /// What can be wrong with a call, and with one body of a batch.
 pub mod error;
+/// Options that are finite and in their range.
+pub mod options;
+/// Memory that grows with the input: a lack of it is an error.
+pub mod memory;
 /// The numbers that rooms compute with: f32, f64, lanes of them, dual numbers; the gates to the CPU's levels.
 pub mod number;
 

@@ -1,6 +1,7 @@
 //! The centre of mass: the paper's pCoM, the alternatives of its supplement, and the exact integral.
 
 use crate::error::Result;
+use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, add_to, cross, dot, narrow, over, scale, sub, widen};
 use crate::number::{BLOCK, Real, Room};
 use crate::quantity::{Quantity, unknown_choice};
@@ -142,7 +143,7 @@ fn pcom<R: Real>(scene: &Scene<R>) -> Centre<R> {
     let (volumes, signs) = absolute(&signed.of_parts);
     let mut total = R::Wide::zero();
     let mut moment = [R::Wide::zero(); 3];
-    let mut of_parts = Vec::with_capacity(volumes.len());
+    let mut of_parts = memory::with_capacity(volumes.len());
     for ((row, volume), sign) in scene.template.samples.part_sums.iter().zip(volumes).zip(signs) {
         let sum = row.forward(scene.points);
         total = volume.mul_add(R::Wide::of(row.count as f64), total);
@@ -157,7 +158,7 @@ fn pcom<R: Real>(scene: &Scene<R>) -> Centre<R> {
 fn pcom_backward<R: Real>(scene: &Scene<R>, centre: &Centre<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
     let Some(Parts { signed, of_parts }) = &centre.parts else { unreachable!("pcom keeps its parts") };
     let d_moment = over(d_centre, centre.total);
-    let mut d_volumes = Vec::with_capacity(of_parts.len());
+    let mut d_volumes = memory::with_capacity(of_parts.len());
     for (row, &Part { volume, sign, sum }) in scene.template.samples.part_sums.iter().zip(of_parts) {
         let arm = sub(sum, scale(R::Wide::of(row.count as f64), centre.point));
         d_volumes.push(sign * dot(d_moment, arm));
@@ -268,7 +269,7 @@ fn exact<R: Real>(scene: &Scene<R>) -> Centre<R> {
 fn exact_backward<R: Real>(scene: &Scene<R>, centre: &Centre<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
     let first = over(d_centre, centre.total);
     let d_whole = Moments { volume: -dot(first, centre.point), first, ..Moments::zero() };
-    let d_parts = vec![d_whole; scene.template.mesh.num_parts];
+    let d_parts = memory::filled(d_whole, scene.template.mesh.num_parts);
     part_moments_backward(&scene.template.closing, scene.points, &d_parts, d_points);
 }
 
@@ -282,6 +283,10 @@ impl Quantity for CenterOfMass {
 
     fn len(&self, _: &Template) -> usize {
         3
+    }
+
+    fn check(&self, _: &Template) -> Result<()> {
+        Ok(())
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Centre<R> {

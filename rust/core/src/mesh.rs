@@ -3,7 +3,7 @@
 //! A mesh that passes is an oriented surface, possibly with open edges, whose faces are labelled with parts 0 … P−1.
 
 use crate::error::{Error, Result};
-use std::collections::HashMap;
+use crate::memory;
 
 #[derive(Clone, Debug)]
 pub struct Mesh {
@@ -20,12 +20,14 @@ pub struct Mesh {
 impl Mesh {
     /// Checks indices, labels and orientation. `face_parts` empty means one part.
     pub fn new(num_vertices: usize, faces: &[[i64; 3]], face_parts: &[i64]) -> Result<Self> {
-        let faces = check_indices(num_vertices, faces)?;
-        let (face_parts, num_parts) = check_parts(faces.len(), face_parts)?;
-        check_duplicates(&faces)?;
-        let neighbours = find_neighbours(&faces)?;
-        let watertight = neighbours.iter().flatten().all(Option::is_some);
-        Ok(Mesh { num_vertices, faces, face_parts, num_parts, watertight, neighbours })
+        memory::guarded(|| {
+            let faces = check_indices(num_vertices, faces)?;
+            let (face_parts, num_parts) = check_parts(faces.len(), face_parts)?;
+            check_duplicates(&faces)?;
+            let neighbours = find_neighbours(&faces)?;
+            let watertight = neighbours.iter().flatten().all(Option::is_some);
+            Ok(Mesh { num_vertices, faces, face_parts, num_parts, watertight, neighbours })
+        })
     }
 
     /// The directed edges of `face`, from corner k to corner k+1.
@@ -49,12 +51,12 @@ fn check_indices(num_vertices: usize, faces: &[[i64; 3]]) -> Result<Vec<[u32; 3]
             }
         }
     }
-    Ok(faces.iter().map(|corners| corners.map(|index| index as u32)).collect())
+    Ok(memory::collect(faces.iter().map(|corners| corners.map(|index| index as u32))))
 }
 
 fn check_parts(num_faces: usize, face_parts: &[i64]) -> Result<(Vec<u32>, usize)> {
     if face_parts.is_empty() {
-        return Ok((vec![0; num_faces], 1));
+        return Ok((memory::filled(0, num_faces), 1));
     }
     if face_parts.len() != num_faces {
         return Err(Error::PartCount { expected: num_faces, got: face_parts.len() });
@@ -64,9 +66,9 @@ fn check_parts(num_faces: usize, face_parts: &[i64]) -> Result<(Vec<u32>, usize)
             return Err(Error::PartIndex { face, part, limit: num_faces });
         }
     }
-    let labels: Vec<u32> = face_parts.iter().map(|&part| part as u32).collect();
+    let labels = memory::collect(face_parts.iter().map(|&part| part as u32));
     let num_parts = 1 + *labels.iter().max().expect("there is a face") as usize;
-    let mut seen = vec![false; num_parts];
+    let mut seen = memory::filled(false, num_parts);
     labels.iter().for_each(|&part| seen[part as usize] = true);
     match seen.iter().position(|&has_faces| !has_faces) {
         Some(part) => Err(Error::EmptyPart { part }),
@@ -74,45 +76,64 @@ fn check_parts(num_faces: usize, face_parts: &[i64]) -> Result<(Vec<u32>, usize)
     }
 }
 
+/// The first face that repeats an earlier one.
 fn check_duplicates(faces: &[[u32; 3]]) -> Result<()> {
-    let mut seen = HashMap::with_capacity(faces.len());
-    for (second, face) in faces.iter().enumerate() {
-        let mut key = *face;
-        key.sort_unstable();
-        if let Some(first) = seen.insert(key, second) {
-            return Err(Error::DuplicateFace { first, second });
-        }
+    let mut sorted = memory::collect(faces.iter().enumerate().map(|(face, corners)| {
+        let mut corners = *corners;
+        corners.sort_unstable();
+        (corners, face as u32)
+    }));
+    sorted.sort_unstable();
+    let alike = sorted.chunk_by(|a, b| a.0 == b.0).filter(|faces| faces.len() > 1);
+    match alike.min_by_key(|faces| faces[1].1) {
+        Some(faces) => Err(Error::DuplicateFace { first: faces[0].1 as usize, second: faces[1].1 as usize }),
+        None => Ok(()),
     }
-    Ok(())
 }
 
+/// A side of a face: its edge's vertices, the lower first, and which edge of which face it is.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    edge: (u32, u32),
+    face: u32,
+    k: u8,
+    ascending: bool,
+}
+
+/// The two sides of every edge. An error names the first face, and its first edge, where there are more or the two run
+/// alike.
 fn find_neighbours(faces: &[[u32; 3]]) -> Result<Vec<[Option<u32>; 3]>> {
-    let mut sides: HashMap<(u32, u32), Vec<(usize, bool)>> = HashMap::with_capacity(faces.len() * 3 / 2);
+    let mut sides = memory::with_capacity(3 * faces.len());
     for (face, corners) in faces.iter().enumerate() {
-        for (a, b) in Mesh::edges(*corners) {
-            sides.entry((a.min(b), a.max(b))).or_default().push((face, a < b));
+        for (k, (a, b)) in Mesh::edges(*corners).into_iter().enumerate() {
+            sides.push(Side { edge: (a.min(b), a.max(b)), face: face as u32, k: k as u8, ascending: a < b });
         }
     }
-    let mut neighbours = Vec::with_capacity(faces.len());
-    for (face, corners) in faces.iter().enumerate() {
-        let mut row = [None; 3];
-        for (k, (a, b)) in Mesh::edges(*corners).into_iter().enumerate() {
-            let (low, high) = (a.min(b), a.max(b));
-            match sides[&(low, high)].as_slice() {
-                [_] => {}
-                [first, second] if first.1 == second.1 => {
-                    let (a, b) = (a as usize, b as usize);
-                    return Err(Error::MixedWinding { first: first.0, second: second.0, a, b });
-                }
-                [first, second] => row[k] = Some(if first.0 == face { second.0 } else { first.0 } as u32),
-                more => {
-                    return Err(Error::NonManifoldEdge { a: low as usize, b: high as usize, count: more.len() });
-                }
+    sides.sort_unstable();
+    let mut neighbours = memory::filled([None; 3], faces.len());
+    let mut worst: Option<&[Side]> = None;
+    for sides in sides.chunk_by(|a, b| a.edge == b.edge) {
+        match sides {
+            [_] => {}
+            [first, second] if first.ascending != second.ascending => {
+                neighbours[first.face as usize][first.k as usize] = Some(second.face);
+                neighbours[second.face as usize][second.k as usize] = Some(first.face);
+            }
+            _ => {
+                let place = |sides: &[Side]| (sides[0].face, sides[0].k);
+                worst = Some(worst.filter(|earlier| place(earlier) < place(sides)).unwrap_or(sides));
             }
         }
-        neighbours.push(row);
     }
-    Ok(neighbours)
+    let Some(sides) = worst else { return Ok(neighbours) };
+    let (low, high) = (sides[0].edge.0 as usize, sides[0].edge.1 as usize);
+    Err(match sides {
+        [first, second] => {
+            let (a, b) = if first.ascending { (low, high) } else { (high, low) };
+            Error::MixedWinding { first: first.face as usize, second: second.face as usize, a, b }
+        }
+        more => Error::NonManifoldEdge { a: low, b: high, count: more.len() },
+    })
 }
 
 #[cfg(test)]

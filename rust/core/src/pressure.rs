@@ -1,7 +1,10 @@
 //! Pressure: from the height above the ground to pressure (Eq. 2) to the centre of pressure (Eq. 3).
 
+use crate::error::Result;
+use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, add_to, dot, narrow, over, scale, widen};
 use crate::number::{BLOCK, Real, Room};
+use crate::options::not_negative;
 use crate::quantity::Quantity;
 use crate::sampling::{CHUNK, Place, Points, Row, Walk, sum_row};
 use crate::scene::{self, Scene};
@@ -17,6 +20,11 @@ pub struct PressureCurve {
 }
 
 impl PressureCurve {
+    pub fn check(&self) -> Result<()> {
+        not_negative("alpha", self.alpha)?;
+        not_negative("gamma", self.gamma)
+    }
+
     /// ρ(h) (Eq. 2), divided by e^(−γ shift) where h ≥ 0: with `shift` > 0 nothing may lie below the ground.
     #[inline(always)]
     pub fn density<R: Real>(&self, height: R, shift: R) -> R {
@@ -42,6 +50,10 @@ impl Quantity for Pressure {
 
     fn len(&self, template: &Template) -> usize {
         template.samples.len()
+    }
+
+    fn check(&self, _: &Template) -> Result<()> {
+        self.curve.check()
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) {
@@ -79,7 +91,7 @@ impl<R: Real> Room<(PressureCurve, &Walk, Vec<R>, &[R])> for PressureBackward {
 
     #[inline(always)]
     fn enter((curve, walk, heights, d_out): (PressureCurve, &Walk, Vec<R>, &[R])) -> Vec<R> {
-        let mut d_heights = vec![R::zero(); heights.len()];
+        let mut d_heights = memory::filled(R::zero(), heights.len());
         let mut row = [R::zero(); CHUNK];
         for chunk in &walk.chunks {
             walk.interpolate(chunk, &heights, &mut row);
@@ -104,7 +116,9 @@ pub struct CenterOfPressure {
 /// The sums over the samples as they are looked at.
 ///
 /// Where every vertex is above the ground, ρ is divided by e^(−γ · lowest height), which leaves the ratio unchanged and
-/// keeps a hovering body's sums from underflowing. A positive epsilon forbids that, for it is an absolute amount.
+/// keeps a hovering body's sums from underflowing: the height is the lowest vertex's, or the lowest sample's of a body so
+/// large that it may lie out of reach of the vertex ([`DEEP`]). A positive epsilon forbids that, for it is an absolute
+/// amount.
 pub struct LoadSums<R: Real> {
     of: CenterOfPressure,
     shift: R,
@@ -125,13 +139,13 @@ pub struct Cop<R: Real> {
 }
 
 impl<R: Real> LoadSums<R> {
-    pub fn new(of: CenterOfPressure, heights: &[R]) -> Self {
-        let shift = if of.epsilon > 0.0 { R::zero() } else { scene::lowest(heights).at_least(R::zero()) };
+    pub fn new(of: CenterOfPressure, template: &Template, heights: &[R]) -> Self {
+        let shift = if of.epsilon > 0.0 { R::zero() } else { shift(of.curve, template, heights) };
         LoadSums {
             of,
             shift,
             total: R::Wide::zero(),
-            loads: vec![R::zero(); heights.len()],
+            loads: memory::filled(R::zero(), heights.len()),
             density: [R::zero(); CHUNK],
         }
     }
@@ -156,6 +170,29 @@ impl<R: Real> LoadSums<R> {
         let total = total + epsilon;
         Cop { point: over(moment, total), of, shift, total, loads }
     }
+}
+
+/// Exponents of e up to which single precision keeps its digits, and by how much a body's may differ.
+const DEEP: f64 = 60.0;
+
+/// The height of a hovering body's lowest vertex, or sample, in each lane; 0 in the others.
+fn shift<R: Real>(curve: PressureCurve, template: &Template, heights: &[R]) -> R {
+    let vertex = scene::lowest(heights).at_least(R::zero());
+    if (-vertex).negative() == 0 {
+        return vertex;
+    }
+    let reach = R::of(curve.gamma) * (scene::highest(heights) - vertex);
+    let deep = (R::of(DEEP) - reach).if_negative(-vertex, R::zero());
+    if deep.negative() == 0 {
+        return vertex;
+    }
+    let mut sample = R::of(1e30);
+    let mut row = [R::zero(); CHUNK];
+    for place in Points::Samples.places(template) {
+        place.read(heights, &mut row);
+        sample = sample.at_most(scene::lowest(&row[..place.len()]));
+    }
+    deep.if_negative(sample.at_least(R::zero()), vertex)
 }
 
 /// ρ of a row of heights, and their sum.
@@ -227,7 +264,7 @@ impl<R: Real> Room<(&[Vec3<R>], Vec3<R>, R)> for Arms {
 
     #[inline(always)]
     fn enter((vertices, d, lever): (&[Vec3<R>], Vec3<R>, R)) -> Vec<R> {
-        let mut arms = vec![R::zero(); vertices.len()];
+        let mut arms = memory::filled(R::zero(), vertices.len());
         for (arm, &vertex) in arms.iter_mut().zip(vertices) {
             *arm = dot(d, vertex) - lever;
         }
@@ -266,7 +303,7 @@ impl<R: Real> Room<(&[R], Vec3<R>, &[R], Vec3<R>, &mut [Vec3<R>])> for Gradient 
 
 impl CenterOfPressure {
     pub fn locate<R: Real>(&self, scene: &Scene<R>, heights: &[R]) -> Cop<R> {
-        let mut sums = LoadSums::new(*self, heights);
+        let mut sums = LoadSums::new(*self, scene.template, heights);
         let mut row = [R::zero(); CHUNK];
         for place in Points::Samples.places(scene.template) {
             place.read(heights, &mut row);
@@ -284,6 +321,11 @@ impl Quantity for CenterOfPressure {
         3
     }
 
+    fn check(&self, _: &Template) -> Result<()> {
+        self.curve.check()?;
+        not_negative("epsilon", self.epsilon)
+    }
+
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
         let heights = scene.heights();
         let cop = self.locate(scene, &heights);
@@ -293,7 +335,7 @@ impl Quantity for CenterOfPressure {
 
     fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
         let (cop, heights) = saved;
-        let d_heights = vec![R::zero(); heights.len()];
+        let d_heights = memory::filled(R::zero(), heights.len());
         cop.backward(scene, heights, widen([d_out[0], d_out[1], d_out[2]]), d_heights, d_points);
     }
 }

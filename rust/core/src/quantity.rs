@@ -23,6 +23,9 @@ pub trait Quantity: Send + Sync {
     /// How many numbers it has for one body.
     fn len(&self, template: &Template) -> usize;
 
+    /// An error names the option that is out of its range.
+    fn check(&self, template: &Template) -> Result<()>;
+
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R>;
 
     /// Adds Σ d_out · ∂out/∂points to `d_points`, the virtual vertices' included.
@@ -38,9 +41,6 @@ pub trait Quantity: Send + Sync {
 /// Calls back with the quantity of that name and these options: the place where a new one is registered.
 pub fn named<V: Visitor>(template: &Template, name: &str, options: &[f64], visitor: V) -> Result<V::Output> {
     let unknown = || Error::UnknownQuantity(format!("{name} with {} options", options.len()));
-    if let Some(bad) = options.iter().find(|x| !x.is_finite()) {
-        return Err(Error::Argument { name: "options", expected: "finite numbers".into(), got: bad.to_string() });
-    }
     let words: Vec<&str> = name.split('.').collect();
     Ok(match (words.as_slice(), options) {
         (["part_volumes"], []) => visitor.visit(PartVolumes),

@@ -5,9 +5,9 @@
 //! one walk over the rings is the part's volume and its gradient. A ring is walked from its own first neighbour, so the
 //! edges that enter are short and keep single precision.
 
+use crate::memory;
 use crate::number::vector::{Vec3, add_cross, sub};
 use crate::number::{BLOCK, Real};
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// The rings of one closed part. A point where the part touches itself has several.
@@ -30,18 +30,22 @@ pub struct Block {
 
 impl Rings {
     pub fn new(faces: &[[u32; 3]]) -> Self {
-        let mut rings = cycles(faces);
-        rings.sort_by_key(|(point, ring)| (ring.len(), *point));
-        let mut all = Rings::default();
-        for run in rings.chunk_by(|a, b| a.1.len() == b.1.len()) {
+        let (mut cycles, corners) = cycles(faces);
+        cycles.sort_unstable_by_key(|cycle| (cycle.corners.len(), cycle.point, cycle.corners.start));
+        let mut all = Rings {
+            points: memory::with_capacity(cycles.len()),
+            neighbours: memory::with_capacity(corners.len()),
+            blocks: Vec::new(),
+        };
+        for run in cycles.chunk_by(|a, b| a.corners.len() == b.corners.len()) {
             for block in run.chunks(BLOCK) {
                 let first = all.points.len();
-                let (size, start) = (block[0].1.len(), all.neighbours.len());
-                for (point, ring) in block {
-                    all.points.push(*point);
-                    all.neighbours.extend(ring);
+                let (size, start) = (block[0].corners.len(), all.neighbours.len());
+                for cycle in block {
+                    all.points.push(cycle.point);
+                    all.neighbours.extend_from_slice(&corners[cycle.corners.clone()]);
                 }
-                all.blocks.push(Block { rings: first..all.points.len(), size, start });
+                memory::push(&mut all.blocks, Block { rings: first..all.points.len(), size, start });
             }
         }
         all
@@ -102,25 +106,38 @@ fn area_vector<R: Real>(ring: &[u32], points: &[Vec3<R>]) -> Vec3<R> {
     doubled
 }
 
-/// The cycles that the edges opposite to each point form. In a closed part every point has as many edges in as out.
-fn cycles(faces: &[[u32; 3]]) -> Vec<(u32, Vec<u32>)> {
-    let mut opposite: BTreeMap<u32, Vec<(u32, u32)>> = BTreeMap::new();
-    for &[a, b, c] in faces {
+/// A ring on its way to its block.
+struct Cycle {
+    point: u32,
+    /// Where its corners are.
+    corners: Range<usize>,
+}
+
+/// The cycles that the edges opposite to each point form, and their corners. In a closed part every point has as many
+/// edges in as out.
+fn cycles(faces: &[[u32; 3]]) -> (Vec<Cycle>, Vec<u32>) {
+    let mut opposite = memory::with_capacity(3 * faces.len());
+    for (face, &[a, b, c]) in faces.iter().enumerate() {
         for (point, from, to) in [(a, b, c), (b, c, a), (c, a, b)] {
-            opposite.entry(point).or_default().push((from, to));
+            opposite.push((point, face as u32, from, to));
         }
     }
-    let mut all = Vec::new();
-    for (point, mut edges) in opposite {
+    opposite.sort_unstable();
+    let (mut all, mut corners) = (Vec::new(), memory::with_capacity(opposite.len()));
+    let mut edges = Vec::new();
+    for around in opposite.chunk_by(|a, b| a.0 == b.0) {
+        edges.clear();
+        memory::extend(&mut edges, around.iter().map(|&(_, _, from, to)| (from, to)));
         while let Some((first, mut at)) = edges.pop() {
-            let mut ring = vec![first];
+            let start = corners.len();
+            corners.push(first);
             while at != first {
-                ring.push(at);
+                corners.push(at);
                 let next = edges.iter().position(|&(from, _)| from == at).expect("the part is closed");
                 at = edges.swap_remove(next).1;
             }
-            all.push((point, ring));
+            memory::push(&mut all, Cycle { point: around[0].0, corners: start..corners.len() });
         }
     }
-    all
+    (all, corners)
 }

@@ -4,6 +4,7 @@
 //! that leave a room get the origin back.
 
 use crate::ground::{Ground, Plane};
+use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, narrow};
 use crate::number::{Real, Room, Scalar};
 use crate::sampling::SUMS;
@@ -83,7 +84,7 @@ impl<R: Real> Room<(Ground<R>, &[Vec3<R>])> for Heights {
 
     #[inline(always)]
     fn enter((ground, vertices): (Ground<R>, &[Vec3<R>])) -> Vec<R> {
-        let mut heights = vec![R::zero(); vertices.len()];
+        let mut heights = memory::filled(R::zero(), vertices.len());
         for (height, &vertex) in heights.iter_mut().zip(vertices) {
             *height = ground.signed_height(vertex);
         }
@@ -93,29 +94,34 @@ impl<R: Real> Room<(Ground<R>, &[Vec3<R>])> for Heights {
 
 /// The least of some heights.
 pub fn lowest<R: Real>(heights: &[R]) -> R {
-    R::apart::<Lowest, _>((heights,))
+    R::apart::<Lowest, _>((heights, R::of(1.0)))
 }
 
-/// [`lowest`]
+/// The largest of some heights.
+pub fn highest<R: Real>(heights: &[R]) -> R {
+    -R::apart::<Lowest, _>((heights, R::of(-1.0)))
+}
+
+/// [`lowest`] of the heights times a sign.
 struct Lowest;
 
-impl<R: Real> Room<(&[R],)> for Lowest {
+impl<R: Real> Room<(&[R], R)> for Lowest {
     type Output = R;
 
     #[inline(always)]
-    fn enter((heights,): (&[R],)) -> R {
+    fn enter((heights, sign): (&[R], R)) -> R {
         let mut lowest = [R::of(1e30); SUMS];
         let (whole, rest) = heights.as_chunks::<SUMS>();
         for heights in whole {
             for k in 0..SUMS {
-                lowest[k] = lowest[k].at_most(heights[k]);
+                lowest[k] = lowest[k].at_most(sign * heights[k]);
             }
         }
         for k in 1..SUMS {
             lowest[0] = lowest[0].at_most(lowest[k]);
         }
         for &height in rest {
-            lowest[0] = lowest[0].at_most(height);
+            lowest[0] = lowest[0].at_most(sign * height);
         }
         lowest[0]
     }

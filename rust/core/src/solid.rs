@@ -1,6 +1,7 @@
 //! A posed body as one stiff solid: its mass, its centre, its inertia, and how high it hovers over its ground.
 
 use crate::error::status;
+use crate::memory;
 use crate::number::vector::{Vec3, add, sub};
 use crate::number::{Real, Scalar};
 use crate::scene::{self, Scene};
@@ -73,7 +74,7 @@ impl Solid {
         let of_lane = |lane: usize| {
             let number = |k: usize| row[k].lane(lane).value();
             let lowest = extent.lowest.lane(lane).value();
-            let volumes: Vec<f64> = parts.iter().map(|part| part.volume.lane(lane).value()).collect();
+            let volumes = memory::collect(parts.iter().map(|part| part.volume.lane(lane).value()));
             let [low, high] = extent.bounds_of(lane);
             let sides = sub(high, low);
             let inertia = [5, 8, 11].map(|k| [number(k), number(k + 1), number(k + 2)]);

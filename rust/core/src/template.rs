@@ -2,6 +2,7 @@
 
 use crate::closing::Closing;
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::number::vector::{Vec3, sub};
 use crate::sampling::Samples;
@@ -27,15 +28,18 @@ impl Template {
         if let Some(vertex) = vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
             return Err(Error::TemplateNotFinite { vertex });
         }
-        let closing = Closing::new(&mesh);
-        check_volume(&closing, vertices)?;
-        let samples = Samples::new(&mesh, vertices, num_samples, seed)?;
-        Ok(Template { mesh, closing, samples })
+        memory::guarded(|| {
+            let closing = Closing::new(&mesh);
+            check_volume(&closing, vertices)?;
+            let samples = Samples::new(&mesh, vertices, num_samples, seed)?;
+            Ok(Template { mesh, closing, samples })
+        })
     }
 }
 
 fn check_volume(closing: &Closing, vertices: &[Vec3<f64>]) -> Result<()> {
-    let mut points: Vec<_> = vertices.iter().map(|&v| sub(v, vertices[0])).collect();
+    let mut points = memory::with_capacity(closing.num_points());
+    points.extend(vertices.iter().map(|&v| sub(v, vertices[0])));
     closing.forward(&mut points);
     let volume: f64 = SignedVolumes::forward(closing, &points).of_parts.iter().sum();
     let extent = points.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));

@@ -3,6 +3,7 @@
 //! The pool belongs to the process that made it: after a fork the child makes its own.
 
 use crate::error::{Error, Result};
+use crate::memory;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -11,27 +12,36 @@ use std::sync::{Mutex, OnceLock};
 /// Items a thread does between two questions for an interruption.
 const WAVE: usize = 4;
 
+/// What the small vectors of a wave take at most, bytes: they are not asked for one by one.
+const WAVE_BYTES: usize = 1 << 20;
+
 /// Runs `f` on every item, on the pool if `parallel`. Between waves the calling thread asks whether to give up.
 pub fn each<I: Send>(
-    mut items: Vec<I>,
+    items: Vec<I>,
     parallel: bool,
     interrupted: &(dyn Fn() -> bool + Sync),
     f: &(dyn Fn(I) + Sync),
 ) -> Result<()> {
-    let threads = if parallel && items.len() > 1 { num_threads() } else { 1 };
-    while !items.is_empty() {
-        if interrupted() {
-            return Err(Error::Interrupted);
+    let pool = if parallel && items.len() > 1 && num_threads() > 1 { pool() } else { None };
+    let length = WAVE * pool.map_or(1, ThreadPool::current_num_threads);
+    let mut items = items.into_iter();
+    memory::guarded(|| {
+        while items.len() > 0 {
+            if interrupted() {
+                return Err(Error::Interrupted);
+            }
+            memory::ask(WAVE_BYTES);
+            let wave = items.by_ref().take(length);
+            match pool {
+                None => wave.for_each(f),
+                Some(pool) => {
+                    let wave: Vec<I> = wave.collect();
+                    pool.install(|| wave.into_par_iter().with_max_len(1).for_each(f));
+                }
+            }
         }
-        let wave = items.drain(..items.len().min(WAVE * threads));
-        if threads == 1 {
-            wave.for_each(f);
-        } else {
-            let wave: Vec<I> = wave.collect();
-            pool().install(|| wave.into_par_iter().with_max_len(1).for_each(f));
-        }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// What was asked for, and what another library of this process uses; 0 where nothing is known.
@@ -64,17 +74,17 @@ pub fn follow(threads: usize) {
     FOLLOWED.store(threads.clamp(1, MOST), Relaxed);
 }
 
-/// The pool of this process with the wanted number of threads. Pools are leaked: a forked child must not even drop its
-/// parent's.
-fn pool() -> &'static ThreadPool {
+/// The pool of this process with the wanted number of threads; None where the system refuses new threads. Pools are
+/// leaked: a forked child must not even drop its parent's.
+fn pool() -> Option<&'static ThreadPool> {
     static POOLS: Mutex<Vec<(u32, usize, &'static ThreadPool)>> = Mutex::new(Vec::new());
     let (process, wanted) = (std::process::id(), num_threads());
     let mut pools = POOLS.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     if let Some((.., pool)) = pools.iter().find(|(owner, threads, _)| (*owner, *threads) == (process, wanted)) {
-        return pool;
+        return Some(pool);
     }
     let made = ThreadPoolBuilder::new().num_threads(wanted).thread_name(|i| format!("ipman-{i}")).build();
-    let made = Box::leak(Box::new(made.expect("the system refuses new threads")));
+    let made = Box::leak(Box::new(made.ok()?));
     pools.push((process, wanted, made));
-    made
+    Some(made)
 }

@@ -6,8 +6,11 @@
 //! order and hands the gradient over on the way.
 
 use crate::closing::Closing;
+use crate::error::{Error, Result};
+use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, widen, widen_in_line};
 use crate::number::{BLOCK, Real, Room};
+use crate::options::positive;
 use crate::quantity::Quantity;
 use crate::rings::Rings;
 use crate::scene::Scene;
@@ -40,8 +43,8 @@ impl<R: Real> Room<(&Closing, &[Vec3<R>])> for Forward {
 
     #[inline(always)]
     fn enter((closing, points): (&Closing, &[Vec3<R>])) -> SignedVolumes<R> {
-        let mut of_parts = Vec::with_capacity(closing.rings.len());
-        let mut all_doubled = Vec::with_capacity(closing.rings.iter().map(Rings::len).sum());
+        let mut of_parts = memory::with_capacity(closing.rings.len());
+        let mut all_doubled = memory::with_capacity(closing.rings.iter().map(Rings::len).sum());
         let mut doubled = [[R::zero(); 3]; BLOCK];
         for rings in &closing.rings {
             let mut sum = R::Wide::zero();
@@ -82,7 +85,7 @@ impl<R: Real> Room<(&SignedVolumes<R>, &Closing, &[R::Wide], &mut [Vec3<R>])> fo
 #[inline(always)]
 pub fn absolute<W: Real>(signed: &[W]) -> (Vec<W>, Vec<W>) {
     let sign = |v: &W| v.if_negative(W::of(-1.0), W::of(1.0));
-    (signed.iter().map(|v| v.abs()).collect(), signed.iter().map(sign).collect())
+    (memory::collect(signed.iter().map(|v| v.abs())), memory::collect(signed.iter().map(sign)))
 }
 
 /// The volume of each part, m³ (the paper's vol^P).
@@ -96,6 +99,10 @@ impl Quantity for PartVolumes {
         template.mesh.num_parts
     }
 
+    fn check(&self, _: &Template) -> Result<()> {
+        Ok(())
+    }
+
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
         let signed = SignedVolumes::forward(&scene.template.closing, scene.points);
         let (volumes, signs) = absolute(&signed.of_parts);
@@ -107,7 +114,7 @@ impl Quantity for PartVolumes {
 
     fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
         let (signed, signs) = saved;
-        let d_volumes: Vec<R::Wide> = d_out.iter().zip(signs).map(|(d, &sign)| d.widen() * sign).collect();
+        let d_volumes = memory::collect(d_out.iter().zip(signs).map(|(d, &sign)| d.widen() * sign));
         signed.backward(&scene.template.closing, &d_volumes, d_points);
     }
 }
@@ -215,7 +222,7 @@ impl<R: Real> Room<(&Closing, &[Vec3<R>])> for MomentsForward {
 
     #[inline(always)]
     fn enter((closing, points): (&Closing, &[Vec3<R>])) -> Vec<Moments<R::Wide>> {
-        let mut all = Vec::with_capacity(closing.parts.len());
+        let mut all = memory::with_capacity(closing.parts.len());
         for part in &closing.parts {
             let mut sum = Moments::zero();
             for &[a, b, c] in &closing.faces[part.clone()] {
@@ -250,7 +257,7 @@ impl<R: Real> Room<(&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>])> 
     #[inline(always)]
     fn enter((closing, points, d_moments, d_points): (&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>])) {
         let points = widen_all(points);
-        let mut d_wide = vec![[R::Wide::zero(); 3]; points.len()];
+        let mut d_wide = memory::filled([R::Wide::zero(); 3], points.len());
         for (part, d_part) in closing.parts.iter().zip(d_moments) {
             for &[a, b, c] in &closing.faces[part.clone()] {
                 let corners = [points[a as usize], points[b as usize], points[c as usize]];
@@ -268,7 +275,7 @@ impl<R: Real> Room<(&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>])> 
 
 #[inline(always)]
 fn widen_all<R: Real>(points: &[Vec3<R>]) -> Vec<Vec3<R::Wide>> {
-    let mut wide = Vec::with_capacity(points.len());
+    let mut wide = memory::with_capacity(points.len());
     for &point in points {
         wide.push(widen(point));
     }
@@ -285,9 +292,13 @@ pub struct MassProperties {
 impl MassProperties {
     pub const ROW: usize = 14;
 
-    /// One number, or one for each part.
-    pub fn has_densities_for(&self, num_parts: usize) -> bool {
-        self.densities.len() == 1 || self.densities.len() == num_parts
+    /// An error unless there is one positive number, or one for each part.
+    pub fn check_densities(&self, num_parts: usize) -> Result<()> {
+        if ![1, num_parts].contains(&self.densities.len()) {
+            let (expected, got) = (format!("1 or {num_parts} numbers"), self.densities.len().to_string());
+            return Err(Error::Argument { name: "density", expected, got });
+        }
+        self.densities.iter().try_for_each(|&density| positive("density", density))
     }
 
     #[inline(always)]
@@ -341,6 +352,10 @@ impl Quantity for MassProperties {
         Self::ROW * (1 + template.mesh.num_parts)
     }
 
+    fn check(&self, template: &Template) -> Result<()> {
+        self.check_densities(template.mesh.num_parts)
+    }
+
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Vec<Moments<R::Wide>> {
         let parts = part_moments(&scene.template.closing, scene.points);
         self.write(scene, &parts, out);
@@ -354,20 +369,18 @@ impl Quantity for MassProperties {
         d_out: &[R],
         d_points: &mut [Vec3<R>],
     ) {
-        let d_out: Vec<R::Wide> = d_out.iter().map(|d| d.widen()).collect();
+        let d_out = memory::collect(d_out.iter().map(|d| d.widen()));
         let (_, weighted) = self.weigh(parts);
         let d_whole = row_backward(&weighted[0], &d_out[..Self::ROW]);
-        let d_parts: Vec<_> = (0..parts.len())
-            .map(|p| {
-                let d_row = &d_out[Self::ROW * (p + 1)..Self::ROW * (p + 2)];
-                let mut d_weighted = row_backward(&weighted[p + 1], d_row);
-                d_weighted.add_scaled(R::Wide::of(1.0), &d_whole);
-                let mut d_moments = Moments::zero();
-                d_moments.add_scaled(R::Wide::of(self.density(p)), &d_weighted);
-                d_moments.volume = d_moments.volume + d_out[0] + d_row[0];
-                d_moments
-            })
-            .collect();
+        let d_parts = memory::collect((0..parts.len()).map(|p| {
+            let d_row = &d_out[Self::ROW * (p + 1)..Self::ROW * (p + 2)];
+            let mut d_weighted = row_backward(&weighted[p + 1], d_row);
+            d_weighted.add_scaled(R::Wide::of(1.0), &d_whole);
+            let mut d_moments = Moments::zero();
+            d_moments.add_scaled(R::Wide::of(self.density(p)), &d_weighted);
+            d_moments.volume = d_moments.volume + d_out[0] + d_row[0];
+            d_moments
+        }));
         part_moments_backward(&scene.template.closing, scene.points, &d_parts, d_points);
     }
 }
@@ -396,8 +409,10 @@ impl MassProperties {
     /// Volume and density-weighted moments: the whole body's first, then each part's.
     #[inline(always)]
     fn weigh<W: Real>(&self, parts: &[Moments<W>]) -> (Vec<W>, Vec<Moments<W>>) {
-        let mut volumes = vec![W::zero()];
-        let mut weighted = vec![Moments::zero()];
+        let mut volumes = memory::with_capacity(1 + parts.len());
+        let mut weighted = memory::with_capacity(1 + parts.len());
+        volumes.push(W::zero());
+        weighted.push(Moments::zero());
         for (p, part) in parts.iter().enumerate() {
             let density = W::of(self.density(p));
             let mut own = Moments::zero();

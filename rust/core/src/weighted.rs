@@ -4,6 +4,7 @@
 use crate::batch::Batch;
 use crate::error::{Error, Result};
 use crate::losses::terms::{NUM_TERMS, Terms};
+use crate::memory;
 use crate::number::Data;
 use crate::quantity::{Quantity, unknown_choice};
 use crate::threads;
@@ -59,29 +60,33 @@ impl Pool<'_> {
             let expected = format!("{size} numbers, one a term");
             return Err(Error::Argument { name: "weights", expected, got: weights.len().to_string() });
         }
+        if let Some(weight) = weights.iter().find(|&&weight| !T::of(weight).value().is_finite()) {
+            let expected = "finite numbers".into();
+            return Err(Error::Argument { name: "weights", expected, got: weight.to_string() });
+        }
         let dealt = self.share((0..bodies).filter(|&body| self.valid(body)).count());
-        let d_out: Vec<T> = (0..bodies * size)
-            .map(|i| if self.valid(i / size) { T::of(weights[i % size] * dealt) } else { T::zero() })
-            .collect();
-        let mut values = vec![T::zero(); bodies * size];
+        let part = |i: usize| if self.valid(i / size) { T::of(weights[i % size] * dealt) } else { T::zero() };
+        let room = || Ok((memory::collect((0..bodies * size).map(part)), memory::filled(T::zero(), bodies * size)));
+        let (d_out, mut values) = memory::guarded(room)?;
         batch.value_and_vjp_into(quantity, &d_out, &mut values, gradient)?;
 
         // Broken bodies are known only now, after the shares of a mean were dealt out: put that right.
-        let (pooled, share) = self.pool(&values, size);
+        let (pooled, share) = self.pool(&values, size)?;
         if share != dealt {
             let factor = T::of(share / dealt);
             gradient.iter_mut().for_each(|d| *d = *d * factor);
         }
         let total = |terms: &[f64]| -> f64 { terms.iter().zip(weights).map(|(term, weight)| term * weight).sum() };
-        Ok((pooled.terms.chunks_exact(size).map(total).collect(), pooled))
+        let totals = memory::guarded(|| Ok(memory::collect(pooled.terms.chunks_exact(size).map(total))))?;
+        Ok((totals, pooled))
     }
 
     /// The terms. Writes the Jacobian of [`Batch::value_and_jacobian_into`].
     pub fn terms<T: Data, Q: Terms>(&self, batch: &Batch<T>, quantity: &Q, jacobian: &mut [T]) -> Result<Pooled> {
         let size = quantity.len(batch.template());
-        let mut values = vec![T::zero(); batch.len() * size];
+        let mut values = memory::guarded(|| Ok(memory::filled(T::zero(), batch.len() * size)))?;
         batch.value_and_jacobian_into(quantity, &mut values, jacobian)?;
-        Ok(self.pool(&values, size).0)
+        Ok(self.pool(&values, size)?.0)
     }
 
     fn valid(&self, body: usize) -> bool {
@@ -94,20 +99,26 @@ impl Pool<'_> {
     }
 
     /// And what a body that counts does so for.
-    fn pool<T: Data>(&self, values: &[T], size: usize) -> (Pooled, f64) {
+    fn pool<T: Data>(&self, values: &[T], size: usize) -> Result<(Pooled, f64)> {
+        memory::guarded(|| Ok(self.put_together(values, size)))
+    }
+
+    fn put_together<T: Data>(&self, values: &[T], size: usize) -> (Pooled, f64) {
         let rows = || values.chunks_exact(size);
-        let counts: Vec<bool> =
-            rows().enumerate().map(|(body, row)| self.valid(body) && !row[0].value().is_nan()).collect();
+        let counts =
+            memory::collect(rows().enumerate().map(|(body, row)| self.valid(body) && !row[0].value().is_nan()));
         let share = self.share(counts.iter().filter(|&&counts| counts).count());
         let counted = |body: usize, term: T, share: f64| if counts[body] { term.value() * share } else { 0.0 };
         let terms = match self.reduction {
-            Reduction::None => values.iter().enumerate().map(|(i, &term)| counted(i / size, term, 1.0)).collect(),
+            Reduction::None => {
+                memory::collect(values.iter().enumerate().map(|(i, &term)| counted(i / size, term, 1.0)))
+            }
             // Rust's sum of nothing is −0.
             _ => (0..size)
                 .map(|k| 0.0 + rows().enumerate().map(|(body, row)| counted(body, row[k], share)).sum::<f64>())
                 .collect(),
         };
-        let shares = counts.iter().map(|&counts| if counts { share } else { 0.0 }).collect();
+        let shares = memory::collect(counts.iter().map(|&counts| if counts { share } else { 0.0 }));
         (Pooled { terms, shares }, share)
     }
 }
@@ -127,8 +138,8 @@ pub fn terms_backward<T: Data>(
     }
     let row = gradient.len() / shares.len();
     let bodies = jacobian.chunks_exact(row / 3 * 5).zip(gradient.chunks_exact_mut(row)).enumerate();
-    let bodies: Vec<_> = bodies.map(|(body, (jacobian, gradient))| (body, jacobian, gradient)).collect();
-    threads::each(bodies, true, interrupted, &|(body, jacobian, gradient)| {
+    let bodies = memory::guarded(|| Ok(memory::collect(bodies)))?;
+    threads::each(bodies, true, interrupted, &|(body, (jacobian, gradient))| {
         if shares[body].value() == 0.0 {
             return gradient.fill(T::zero());
         }

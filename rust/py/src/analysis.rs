@@ -1,17 +1,16 @@
 //! All figures of bodies at one look.
 
-use crate::array::Vertices;
+use crate::array::{Vertices, unwritten, written};
 use crate::bodies::{Grounds, on_batch};
-use crate::error::value_error;
-use crate::evaluate::unwritten;
+use crate::error::python_error;
 use crate::template::Template;
-use ipman::analysis::Analysis;
+use ipman::analysis::{Analysis, Polygon};
 use ipman::number::Data;
-use numpy::{Element, IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
-use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
+use numpy::PyUntypedArrayMethods;
+use numpy::{Element, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 
-type Figures<'py> = (Bound<'py, PyAny>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i64>>);
+type Figures<'py> = (Bound<'py, PyAny>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<i64>>);
 
 /// Rows of figures (B, K) in the vertices' precision, the corners (N, 3) of all bases of support, and how many each has.
 #[pyfunction]
@@ -26,7 +25,7 @@ pub fn analysis<'py>(
     normal: PyReadonlyArray2<'py, f64>,
     height: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Figures<'py>> {
-    let analysis = Analysis::new(method, contact_rule, &options, &densities).map_err(value_error)?;
+    let analysis = Analysis::new(method, contact_rule, &options, &densities).map_err(python_error)?;
     let grounds = Grounds::new(normal, height);
     match vertices {
         Vertices::Single(vertices) => run(py, template, &analysis, &vertices, &grounds),
@@ -41,13 +40,23 @@ fn run<'py, T: Data + Element>(
     vertices: &PyReadonlyArray3<'py, T>,
     grounds: &Grounds<'py>,
 ) -> PyResult<Figures<'py>> {
-    let rows = unwritten::<T>(py, &[vertices.shape()[0], analysis.size(&template.inner)]);
-    let mut written = rows.readwrite();
-    let out = written.as_slice_mut()?;
+    let rows = unwritten::<T>(py, &[vertices.shape()[0], analysis.size(&template.inner)])?;
+    let mut filled = rows.readwrite();
+    let out = filled.as_slice_mut()?;
     let polygons = on_batch(py, template, vertices, grounds, |batch| batch.analysis_into(analysis, out))?;
-    drop(written);
-    let counts: Vec<i64> = polygons.iter().map(|polygon| polygon.len() as i64).collect();
-    let corners: Vec<f64> = polygons.concat().into_flattened();
-    let count = corners.len() / 3;
-    Ok((rows.into_any(), corners.into_pyarray(py).reshape([count, 3])?, counts.into_pyarray(py)))
+    drop(filled);
+    let (corners, counts) = polygon_arrays(py, polygons.iter())?;
+    Ok((rows.into_any(), corners, counts))
+}
+
+type PolygonArrays<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<i64>>);
+
+/// The corners (N, 3) of all polygons one after the other, and how many each has.
+pub fn polygon_arrays<'a, 'py>(
+    py: Python<'py>,
+    polygons: impl ExactSizeIterator<Item = &'a Polygon> + Clone,
+) -> PyResult<PolygonArrays<'py>> {
+    let count = polygons.clone().map(Vec::len).sum();
+    let corners = written(py, &[count, 3], polygons.clone().flatten().flatten().copied())?;
+    Ok((corners, written(py, &[polygons.len()], polygons.map(|polygon| polygon.len() as i64))?))
 }

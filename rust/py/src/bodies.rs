@@ -3,6 +3,7 @@
 use crate::error::detached;
 use crate::template::Template;
 use ipman::Batch;
+use ipman::memory;
 use ipman::number::Data;
 use numpy::{Element, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -33,12 +34,14 @@ pub fn on_batch<T: Data + Element, O: Send>(
     let (normals, heights) = (grounds.normal.as_slice()?, grounds.height.as_slice()?);
     // One ground may stand for all bodies.
     let copies = if heights.len() == 1 && normals.len() == 3 { shape[0] } else { 1 };
-    let (normals, heights) = (normals.repeat(copies), heights.repeat(copies));
-    let (num_bodies, num_vertices) = (heights.len(), template.inner.mesh.num_vertices);
+    let (num_bodies, num_vertices) = (copies * heights.len(), template.inner.mesh.num_vertices);
     if shape != [num_bodies, num_vertices, 3] {
         let message = format!("vertices: expected ({num_bodies}, {num_vertices}, 3), got {shape:?}");
         return Err(PyValueError::new_err(message));
     }
     let (vertices, template) = (vertices.as_slice()?, &template.inner);
-    detached(py, |interrupted| work(&Batch::new(template, vertices, &normals, &heights, interrupted)?))
+    detached(py, |interrupted| {
+        let repeated = |numbers: &[f64]| memory::collect((0..copies).flat_map(|_| numbers.iter().copied()));
+        work(&Batch::new(template, vertices, &repeated(normals), &repeated(heights), interrupted)?)
+    })
 }

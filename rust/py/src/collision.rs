@@ -1,8 +1,7 @@
 //! Bodies that touch or penetrate themselves.
 
-use crate::array::{Vertices, triples};
-use crate::error::{detached, value_error};
-use crate::evaluate::unwritten;
+use crate::array::{Vertices, triples, unwritten};
+use crate::error::{detached, python_error};
 use crate::template::Template;
 use ipman::collision::{self, contact::SelfContact};
 use ipman::number::Data;
@@ -67,7 +66,7 @@ impl Collision {
         vertices: Vertices<'py>,
         options: [f64; 4],
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let contact = SelfContact::new(options).map_err(value_error)?;
+        let contact = SelfContact::new(options).map_err(python_error)?;
         match vertices {
             Vertices::Single(vertices) => self.costs(py, &vertices, &contact),
             Vertices::Double(vertices) => self.costs(py, &vertices, &contact),
@@ -96,7 +95,7 @@ impl Collision {
         into: impl Fn(&collision::Collision, &[T], &mut [T], Interrupted<'_>) -> ipman::Result<()> + Sync,
     ) -> PyResult<Bound<'py, PyAny>> {
         let numbers = self.numbers(vertices)?;
-        let out = unwritten::<T>(py, &vertices.shape()[..2]);
+        let out = unwritten::<T>(py, &vertices.shape()[..2])?;
         let mut written = out.readwrite();
         let written = written.as_slice_mut()?;
         detached(py, |interrupted| into(&self.inner, numbers, written, interrupted))?;
@@ -110,8 +109,8 @@ impl Collision {
         contact: &SelfContact,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let (numbers, shape) = (self.numbers(vertices)?, vertices.shape());
-        let out = unwritten::<T>(py, &[shape[0], 2]);
-        let jacobian = unwritten::<T>(py, &[shape[0], 2, shape[1], 3]);
+        let out = unwritten::<T>(py, &[shape[0], 2])?;
+        let jacobian = unwritten::<T>(py, &[shape[0], 2, shape[1], 3])?;
         let (mut out_written, mut jacobian_written) = (out.readwrite(), jacobian.readwrite());
         let (out_written, jacobian_written) = (out_written.as_slice_mut()?, jacobian_written.as_slice_mut()?);
         detached(py, |interrupted| {

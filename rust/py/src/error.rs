@@ -1,6 +1,7 @@
 //! Errors and panics of the core as Python exceptions, and Ctrl-C as an interruption of the core.
 
-use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
+use ipman::memory;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
@@ -19,12 +20,12 @@ pub fn detached<O: Send>(
             true
         }
     };
-    let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&interrupted))));
+    let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| memory::guarded(|| work(&interrupted)))));
     let signal = signal.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
     match result {
         Ok(Ok(output)) => Ok(output),
         Ok(Err(ipman::Error::Interrupted)) => Err(signal.unwrap_or_else(|| PyKeyboardInterrupt::new_err(()))),
-        Ok(Err(error)) => Err(value_error(error)),
+        Ok(Err(error)) => Err(python_error(error)),
         Err(panic) => {
             let text = panic.downcast_ref::<String>().cloned();
             let text = text.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()));
@@ -34,6 +35,10 @@ pub fn detached<O: Send>(
     }
 }
 
-pub fn value_error(error: ipman::Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
+/// MemoryError where memory lacks, else ValueError.
+pub fn python_error(error: ipman::Error) -> PyErr {
+    match error {
+        ipman::Error::OutOfMemory { .. } => PyMemoryError::new_err(error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
+    }
 }

@@ -1,8 +1,8 @@
 //! The five verbs that every quantity has: value, vjp, jvp, vjp_jvp, value_and_vjp.
 
-use crate::array::{Vertices, flat};
+use crate::array::{Vertices, flat, unwritten};
 use crate::bodies::{Grounds, on_batch};
-use crate::error::value_error;
+use crate::error::python_error;
 use crate::template::Template;
 use ipman::Batch;
 use ipman::number::Data;
@@ -98,7 +98,7 @@ impl<'py> Question<'_, 'py> {
         let shape = vertices.shape();
         let template = &self.template.inner;
         let (quantity, options) = (self.quantity, &self.options);
-        let size = named(template, quantity, options, Size(self.template)).map_err(value_error)?;
+        let size = named(template, quantity, options, Size(self.template)).map_err(python_error)?;
 
         let arrays = verb.takes().iter().zip(upstream).map(|(name, array)| same_dtype::<T>(array, name));
         let arrays = arrays.collect::<PyResult<Vec<_>>>()?;
@@ -109,10 +109,11 @@ impl<'py> Question<'_, 'py> {
         }
 
         let (rows, gradient) = ([shape[0], size], [shape[0], shape[1], 3]);
+        // Every verb writes all of its output.
         let outputs: Vec<Bound<'py, PyArrayDyn<T>>> = match verb {
-            Verb::Value | Verb::Jvp => vec![unwritten(self.py, &rows)],
-            Verb::Vjp | Verb::VjpJvp => vec![unwritten(self.py, &gradient)],
-            Verb::ValueAndVjp => vec![unwritten(self.py, &rows), unwritten(self.py, &gradient)],
+            Verb::Value | Verb::Jvp => vec![unwritten(self.py, &rows)?],
+            Verb::Vjp | Verb::VjpJvp => vec![unwritten(self.py, &gradient)?],
+            Verb::ValueAndVjp => vec![unwritten(self.py, &rows)?, unwritten(self.py, &gradient)?],
         };
         let mut written: Vec<_> = outputs.iter().map(|array| array.readwrite()).collect();
         let written = written.iter_mut().map(|array| array.as_slice_mut()).collect::<Result<Vec<_>, _>>()?;
@@ -124,12 +125,6 @@ impl<'py> Question<'_, 'py> {
             Err(both) => PyTuple::new(self.py, both)?.into_any(),
         })
     }
-}
-
-/// An array whose numbers are there but mean nothing yet: every verb writes all of its output.
-pub fn unwritten<'py, T: Element>(py: Python<'py>, shape: &[usize]) -> Bound<'py, PyArrayDyn<T>> {
-    // SAFETY: T is f32 or f64, for which every bit pattern is a number.
-    unsafe { PyArrayDyn::new(py, shape, false) }
 }
 
 /// Upstream arrays must have the vertices' precision.
@@ -227,5 +222,5 @@ pub fn value_and_vjp<'py>(
 /// How many numbers the quantity has for one body.
 #[pyfunction]
 pub fn output_size(template: &Template, quantity: &str, options: Vec<f64>) -> PyResult<usize> {
-    named(&template.inner, quantity, &options, Size(template)).map_err(value_error)
+    named(&template.inner, quantity, &options, Size(template)).map_err(python_error)
 }

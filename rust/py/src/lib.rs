@@ -45,7 +45,7 @@ mod _core {
 }
 
 mod threads {
-    use crate::error::value_error;
+    use crate::error::python_error;
     use ipman::number::gate::Level;
     use pyo3::exceptions::PyValueError;
     use pyo3::prelude::*;
@@ -53,7 +53,7 @@ mod threads {
     /// The CPU level that batches run on: avx512, avx2, neon or scalar. IPMAN_SIMD forces one.
     #[pyfunction]
     pub fn simd_level() -> PyResult<&'static str> {
-        Ok(Level::current().map_err(value_error)?.name())
+        Ok(Level::current().map_err(python_error)?.name())
     }
 
     /// The CPU levels that this machine has, best first.

@@ -1,14 +1,16 @@
 //! Stiff bodies: how firmly they stand, and what becomes of them when they are let go.
 
-use crate::array::Vertices;
+use crate::analysis::polygon_arrays;
+use crate::array::{Vertices, written};
 use crate::bodies::{Grounds, on_batch};
-use crate::error::value_error;
+use crate::error::python_error;
 use crate::template::Template;
+use ipman::memory;
 use ipman::simulation::contact::Shape;
 use ipman::simulation::{Place, Simulation};
 use ipman::tipping::TipTest;
 use ipman::volume::MassProperties;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -22,9 +24,11 @@ macro_rules! on_either {
     };
 }
 
-fn rows<'py, const N: usize>(py: Python<'py>, rows: Vec<[f64; N]>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let count = rows.len();
-    rows.into_flattened().into_pyarray(py).reshape([count, N])
+fn rows<'py, const N: usize>(
+    py: Python<'py>,
+    rows: impl ExactSizeIterator<Item = [f64; N]>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    written(py, &[rows.len(), N], rows.flatten())
 }
 
 /// Each body as one solid, (B, 15): status, mass, centre, inertia row by row, height of the lowest vertex.
@@ -37,11 +41,11 @@ pub fn solids<'py>(
     vertices: Vertices<'py>,
     normal: PyReadonlyArray2<'py, f64>,
     height: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let densities = MassProperties { densities };
     let solids =
         on_either!(py, template, vertices, Grounds::new(normal, height), |batch| batch.solids(&densities, contact))?;
-    rows(py, solids.iter().map(|solid| solid.row()).collect())
+    rows(py, solids.iter().map(|solid| solid.row()))
 }
 
 /// The tip test, (B, 26): the solid's 15; height, margin, barrier, push, rate; tilt, drop, nudged tilt; at rest the
@@ -55,22 +59,27 @@ pub fn tip_test<'py>(
     vertices: Vertices<'py>,
     normal: PyReadonlyArray2<'py, f64>,
     height: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let [contact, tolerance, nudge, fallen] = options;
-    let test = TipTest::new(&densities, contact, tolerance, nudge, fallen).map_err(value_error)?;
+    let test = TipTest::new(&densities, contact, tolerance, nudge, fallen).map_err(python_error)?;
     let found = on_either!(py, template, vertices, Grounds::new(normal, height), |batch| batch.tip_test(&test))?;
-    rows(py, found.iter().map(|tipping| tipping.row()).collect())
+    rows(py, found.iter().map(|tipping| tipping.row()))
+}
+
+fn faces(template: &Template) -> PyResult<Vec<[u32; 3]>> {
+    memory::guarded(|| Ok(memory::copied(&template.inner.mesh.faces))).map_err(python_error)
 }
 
 fn shape(template: &Template, name: &str, resolution: u32) -> PyResult<Shape> {
     match name {
         "hull" => Ok(Shape::Hull),
-        "vhacd" => Ok(Shape::Decomposition { resolution, faces: template.inner.mesh.faces.clone() }),
+        "vhacd" => Ok(Shape::Decomposition { resolution, faces: faces(template)? }),
         _ => Err(PyValueError::new_err(format!("shape: expected hull or vhacd, got {name:?}"))),
     }
 }
 
-/// For each body the points (K, 3) that can touch a plane; none for a body that is no solid, or has no hull.
+/// The points (N, 3) of all bodies that can touch a plane, and how many each has; none for a body that is no solid, or
+/// has no hull.
 #[pyfunction]
 pub fn touching<'py>(
     py: Python<'py>,
@@ -80,13 +89,13 @@ pub fn touching<'py>(
     vertices: Vertices<'py>,
     normal: PyReadonlyArray2<'py, f64>,
     height: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<i64>>)> {
     let shape = shape(template, shape_name, resolution)?;
     let found = on_either!(py, template, vertices, Grounds::new(normal, height), |batch| batch.touching(&shape))?;
-    found.into_iter().map(|points| rows(py, points)).collect()
+    polygon_arrays(py, found.iter())
 }
 
-type Motions<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray3<f64>>);
+type Motions<'py> = (Bound<'py, PyArrayDyn<i64>>, Bound<'py, PyArrayDyn<f64>>);
 
 /// status (B,), and places (B, 1 + T, 12) at the start and at each look: centre of mass, rotation row by row.
 ///
@@ -112,10 +121,9 @@ pub fn simulate<'py>(
     let simulation = Simulation { densities, contact, shape, snap, step, friction, looks };
     let motions =
         on_either!(py, template, vertices, Grounds::new(normal, height), |batch| batch.simulate(&simulation))?;
-    let status: Vec<i64> = motions.iter().map(|motion| i64::from(motion.status)).collect();
-    let numbers: Vec<f64> = motions.iter().flat_map(|motion| &motion.places).flat_map(numbers).collect();
-    let places = numbers.into_pyarray(py).reshape([motions.len(), count, 12])?;
-    Ok((status.into_pyarray(py), places))
+    let status = written(py, &[motions.len()], motions.iter().map(|motion| i64::from(motion.status)))?;
+    let places = motions.iter().flat_map(|motion| &motion.places).flat_map(numbers);
+    Ok((status, written(py, &[motions.len(), count, 12], places)?))
 }
 
 fn numbers(place: &Place) -> [f64; 12] {

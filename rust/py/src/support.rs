@@ -1,13 +1,14 @@
 //! What is known of a body's base of support and its state: results without a gradient.
 
-use crate::array::Vertices;
+use crate::analysis::polygon_arrays;
+use crate::array::{Vertices, written};
 use crate::bodies::{Grounds, on_batch};
-use crate::error::value_error;
+use crate::error::python_error;
 use crate::template::Template;
 use ipman::Batch;
 use ipman::mass::Method;
 use ipman::support::{Contact, ContactRule};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 /// The bodies and the rule of contact, in the words of Python.
@@ -32,17 +33,17 @@ impl Question<'_, '_> {
 }
 
 fn contact(rule: &str, threshold: f64) -> PyResult<Contact> {
-    Ok(Contact { rule: ContactRule::named(rule).map_err(value_error)?, threshold })
+    Ok(Contact { rule: ContactRule::named(rule).map_err(python_error)?, threshold })
 }
 
 fn method(name: &str) -> PyResult<Method> {
-    Method::named(name).map_err(value_error)
+    Method::named(name).map_err(python_error)
 }
 
-type Supports<'py> =
-    (Vec<Bound<'py, PyArray2<f64>>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>);
+type Numbers<'py, T> = Bound<'py, PyArrayDyn<T>>;
+type Supports<'py> = (Numbers<'py, f64>, Numbers<'py, i64>, Numbers<'py, f64>, Numbers<'py, f64>, Numbers<'py, i64>);
 
-/// Polygons (K, 3), areas (B,), margins (B,) and numbers of contacts (B,).
+/// The corners (N, 3) of all polygons, and how many each has (B,); areas, margins and numbers of contacts, (B,) each.
 #[pyfunction]
 pub fn base_of_support<'py>(
     py: Python<'py>,
@@ -61,14 +62,12 @@ pub fn base_of_support<'py>(
         |batch| batch.base_of_support(&contact, method),
         |batch| batch.base_of_support(&contact, method),
     )?;
-    let polygon =
-        |corners: &Vec<[f64; 3]>| corners.as_flattened().to_vec().into_pyarray(py).reshape([corners.len(), 3]);
-    Ok((
-        supports.iter().map(|support| polygon(&support.polygon)).collect::<PyResult<_>>()?,
-        supports.iter().map(|support| support.area).collect::<Vec<_>>().into_pyarray(py),
-        supports.iter().map(|support| support.margin).collect::<Vec<_>>().into_pyarray(py),
-        supports.iter().map(|support| support.num_contacts as i64).collect::<Vec<_>>().into_pyarray(py),
-    ))
+    let bodies = [supports.len()];
+    let areas = written(py, &bodies, supports.iter().map(|support| support.area))?;
+    let margins = written(py, &bodies, supports.iter().map(|support| support.margin))?;
+    let contacts = written(py, &bodies, supports.iter().map(|support| support.num_contacts as i64))?;
+    let (corners, counts) = polygon_arrays(py, supports.iter().map(|support| &support.polygon))?;
+    Ok((corners, counts, areas, margins, contacts))
 }
 
 /// BoSE by the paper's linear programme, (B,).
@@ -82,7 +81,7 @@ pub fn bose_lp<'py>(
     vertices: Vertices<'py>,
     normal: PyReadonlyArray2<'py, f64>,
     height: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Bound<'py, PyArray1<bool>>> {
+) -> PyResult<Numbers<'py, bool>> {
     let (contact, method) = (contact(contact_rule, threshold)?, method(method_name)?);
     let question = Question { py, template, grounds: Grounds::new(normal, height) };
     let inside = question.ask(
@@ -90,7 +89,7 @@ pub fn bose_lp<'py>(
         |batch| batch.is_supported_lp(&contact, method),
         |batch| batch.is_supported_lp(&contact, method),
     )?;
-    Ok(inside.into_pyarray(py))
+    written(py, &[inside.len()], inside)
 }
 
 /// The bits of ipman_rs.Status for each body, (B,).
@@ -103,9 +102,9 @@ pub fn status<'py>(
     vertices: Vertices<'py>,
     normal: PyReadonlyArray2<'py, f64>,
     height: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Bound<'py, PyArray1<i64>>> {
+) -> PyResult<Numbers<'py, i64>> {
     let contact = contact(contact_rule, threshold)?;
     let question = Question { py, template, grounds: Grounds::new(normal, height) };
     let bits = question.ask(vertices, |batch| batch.status(&contact), |batch| batch.status(&contact))?;
-    Ok(bits.into_iter().map(i64::from).collect::<Vec<_>>().into_pyarray(py))
+    written(py, &[bits.len()], bits.into_iter().map(i64::from))
 }

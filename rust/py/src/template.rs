@@ -1,8 +1,8 @@
 //! The template of a body's surface.
 
-use crate::array::triples;
+use crate::array::{triples, written};
 use crate::error::detached;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 /// Topology, closing and samples of one body surface, computed once.
@@ -51,20 +51,19 @@ impl Template {
 
     /// The face of each sample, (S,), ascending.
     #[getter]
-    fn sample_faces<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        self.inner.samples.faces.iter().map(|&face| face as i64).collect::<Vec<_>>().into_pyarray(py)
+    fn sample_faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
+        written(py, &[self.num_samples()], self.inner.samples.faces.iter().map(|&face| face.into()))
     }
 
     /// The part of each sample, (S,).
     #[getter]
-    fn sample_parts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        self.inner.samples.parts.iter().map(|&part| part as i64).collect::<Vec<_>>().into_pyarray(py)
+    fn sample_parts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
+        written(py, &[self.num_samples()], self.inner.samples.parts.iter().map(|&part| part.into()))
     }
 
     /// The weights of each sample on its face's vertices, (S, 3).
     #[getter]
-    fn sample_barycentric<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        PyArray2::from_vec2(py, &self.inner.samples.barycentric.iter().map(|row| row.to_vec()).collect::<Vec<_>>())
-            .expect("every row has three weights")
+    fn sample_barycentric<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        written(py, &[self.num_samples(), 3], self.inner.samples.barycentric.as_flattened().iter().copied())
     }
 }

@@ -1,19 +1,19 @@
 //! The terms of a training step, reduced: their weighted total, or each of them.
 
-use crate::array::{Vertices, flat, triples};
+use crate::array::{Vertices, flat, triples, unwritten, written};
 use crate::bodies::{Grounds, on_batch};
-use crate::error::{detached, value_error};
-use crate::evaluate::unwritten;
+use crate::error::{detached, python_error};
 use crate::template::Template;
 use ipman::Batch;
 use ipman::error::Error;
 use ipman::losses::terms::{NUM_TERMS, Terms};
+use ipman::memory;
 use ipman::number::Data;
 use ipman::quantity::{Quantity, Visitor, named};
 use ipman::weighted::{Pool, Pooled, Reduction, terms_backward as gradient_of_terms};
 use numpy::{
     Element, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn,
-    PyUntypedArrayMethods, ToPyArray,
+    PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -34,7 +34,7 @@ pub fn weighted<'py>(
     valid: Option<PyReadonlyArray1<'py, bool>>,
     reduction: &str,
 ) -> PyResult<Bound<'py, PyTuple>> {
-    let reduction = Reduction::named(reduction).map_err(value_error)?;
+    let reduction = Reduction::named(reduction).map_err(python_error)?;
     let question =
         Question { py, template, quantity, options, grounds: Grounds::new(normal, height), valid, reduction };
     match vertices {
@@ -57,7 +57,7 @@ pub fn terms<'py>(
     valid: Option<PyReadonlyArray1<'py, bool>>,
     reduction: &str,
 ) -> PyResult<Bound<'py, PyTuple>> {
-    let reduction = Reduction::named(reduction).map_err(value_error)?;
+    let reduction = Reduction::named(reduction).map_err(python_error)?;
     let question =
         Question { py, template, quantity, options, grounds: Grounds::new(normal, height), valid, reduction };
     match vertices {
@@ -89,7 +89,8 @@ fn put_together<'py, T: Data + Element>(
     normal: &PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (bodies, vertices) = (jacobian.shape()[0], jacobian.shape()[1] / 5);
-    let normals: Vec<_> = triples(normal, "normal")?.iter().map(|normal| normal.map(T::of)).collect();
+    let normals = triples(normal, "normal")?.iter().map(|normal| normal.map(T::of));
+    let normals = memory::guarded(|| Ok(memory::collect(normals))).map_err(python_error)?;
     let d_terms = flat(&d_terms, "d_terms")?;
     let one_or_all = |count| count == 1 || count == bodies;
     if shares.len() != bodies || !one_or_all(normals.len()) || ![NUM_TERMS, NUM_TERMS * bodies].contains(&d_terms.len())
@@ -97,10 +98,10 @@ fn put_together<'py, T: Data + Element>(
         let got = format!("{} shares, {} normals and {} d_terms", shares.len(), normals.len(), d_terms.len());
         return Err(PyValueError::new_err(format!("jacobian: of {bodies} bodies, but there are {got}")));
     }
-    let gradient = unwritten::<T>(py, &[bodies, vertices, 3]);
-    let mut written = gradient.readwrite();
-    let (written, jacobian, shares) = (written.as_slice_mut()?, jacobian.as_slice()?, shares.as_slice()?);
-    detached(py, |interrupted| gradient_of_terms(jacobian, shares, d_terms, &normals, written, interrupted))?;
+    let gradient = unwritten::<T>(py, &[bodies, vertices, 3])?;
+    let mut filled = gradient.readwrite();
+    let (filled, jacobian, shares) = (filled.as_slice_mut()?, jacobian.as_slice()?, shares.as_slice()?);
+    detached(py, |interrupted| gradient_of_terms(jacobian, shares, d_terms, &normals, filled, interrupted))?;
     Ok(gradient.into_any())
 }
 
@@ -129,21 +130,22 @@ impl<'py> Question<'_, 'py> {
         }
         let pool = &Pool { valid, reduction: self.reduction };
         let derivative = match weights {
-            Some(_) => unwritten::<T>(py, vertices.shape()),
-            None => unwritten::<T>(py, &[bodies, 5 * vertices.shape()[1]]),
+            Some(_) => unwritten::<T>(py, vertices.shape())?,
+            None => unwritten::<T>(py, &[bodies, 5 * vertices.shape()[1]])?,
         };
-        let mut written = derivative.readwrite();
-        let written = written.as_slice_mut()?;
+        let mut filled = derivative.readwrite();
+        let filled = filled.as_slice_mut()?;
         let (quantity, options) = (self.quantity, &self.options);
         let (totals, Pooled { terms, shares }) = on_batch(py, self.template, vertices, &self.grounds, |batch| {
-            named(&self.template.inner, quantity, options, Run { batch, pool, weights, derivative: written })?
+            named(&self.template.inner, quantity, options, Run { batch, pool, weights, derivative: filled })?
         })?;
-        let array = |numbers: Vec<f64>| numbers.into_iter().map(T::of).collect::<Vec<_>>().to_pyarray(py);
+        let array = |shape: &[usize], numbers: Vec<f64>| written(py, shape, numbers.into_iter().map(T::of));
         let batch: &[usize] = if self.reduction == Reduction::None { &[bodies] } else { &[] };
-        let terms = array(terms).reshape([batch, &[weights.map_or(NUM_TERMS, <[f64]>::len)]].concat().as_slice())?;
+        let terms = array(&[batch, &[weights.map_or(NUM_TERMS, <[f64]>::len)]].concat(), terms)?;
+        let shares = array(&[bodies], shares)?;
         match weights {
-            Some(_) => (array(totals).reshape(batch)?, terms, array(shares), derivative).into_pyobject(py),
-            None => (terms, array(shares), derivative).into_pyobject(py),
+            Some(_) => (array(batch, totals)?, terms, shares, derivative).into_pyobject(py),
+            None => (terms, shares, derivative).into_pyobject(py),
         }
     }
 }

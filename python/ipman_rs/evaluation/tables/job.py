@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 
 from ipman_rs import __version__, data
 from ipman_rs.body import safe_npz
-from ipman_rs.data import check
+from ipman_rs.data import check, judge
 from ipman_rs.data.frames import DataSet, Frames
 from ipman_rs.files import being_written, read_json, write_whole
 from ipman_rs.ground import Ground
+from ipman_rs.volume import mass_properties
 
 from . import predictions as predicted
 from .columns import Columns, columns
@@ -32,6 +33,7 @@ from .joints import Definition, Regressors, define
 from .models import Models
 
 PIECE = 4096  # frames: some seconds of work, and small in memory
+WEIGHED = 16  # bodies
 OWN = "own"  # the data set of the user's own files, in the form of predictions
 TRUTH = "truth"  # instead of a file of predictions: the data set's own bodies
 
@@ -86,7 +88,8 @@ class Job:
     All words are plain: it travels to other processes.
 
     folder: of the pieces. models: folder of model files. partial: frames without prediction are left out instead of
-    being an error.
+    being an error. unit: metres in one of the predictions' lengths. degrees: of their rotations. force: what cannot be
+    people is measured, too.
     """
 
     name: str
@@ -97,6 +100,9 @@ class Job:
     regressors: tuple[str, ...] = ()
     preset: str = "paper-r"
     partial: bool = False
+    unit: float = 1.0
+    degrees: bool = False
+    force: bool = False
     piece: int = PIECE
 
     @cached_property
@@ -113,7 +119,7 @@ class Job:
 
     @cached_property
     def estimates(self) -> predicted.Predictions:
-        return predicted.read(self.predictions, self.unpacked)
+        return predicted.read(self.predictions, self.unpacked, predicted.Reading(self.unit, self.degrees, self.force))
 
     @cached_property
     def bodies(self) -> Models:
@@ -167,22 +173,59 @@ class Job:
                 f"{self.predictions}: has {len(self.estimates):,} frames, but the data set {self.source.name} has "
                 f"{len(self.data):,}; --partial leaves out those without prediction"
             )
-        if self.predictions != TRUTH:
-            self._check_axes()
+        _ = self.flags
         _ = self.definition
         write_whole(file, json.dumps(self.made_of, indent=1) + "\n")
 
-    def _check_axes(self) -> None:
-        """ValueError where the estimated people lie or hang along another axis than the data set's up."""
+    @cached_property
+    def flags(self) -> tuple[str, ...]:
+        """What is odd about the estimated people, in words. ValueError for what cannot be people, or stands along
+        another axis than the data set's up."""
+        if self.predictions == TRUTH:
+            return ()
+        return (
+            *self.estimates.flags,
+            *judge.admit(self.predictions, [*self._axes(), *self._masses(), *self._betas()], self.force),
+        )
+
+    def _masses(self) -> list[check.Finding]:
+        """Of a few estimated bodies."""
+        bodies = self.bodies.posed(self.estimates[judge.evenly(len(self.estimates), WEIGHED)])
+        if bodies.vertices is None or bodies.model is None:
+            return []
+        masses = mass_properties(bodies.vertices, bodies.model.template).mass
+        known = masses[np.isfinite(masses)]
+        return judge.mass(float(np.median(known))) if len(known) else []
+
+    def _betas(self) -> list[check.Finding]:
+        """Whether the model has as many components of shape as the predictions."""
+        some = self.estimates[slice(0, 1)]
+        if some.betas is None or some.body is None or some.vertices is not None or not self.bodies.has(some.body):
+            return []
+        gender = "neutral" if some.genders is None else str(some.genders[0])
+        width, model = some.betas.shape[1], self.bodies.get(some.body, gender, some.betas.shape[1])
+        if width <= model.num_betas:
+            return []
+        return [check.Finding("odd", f"betas: the first {model.num_betas} of {width}, as many as {model.name} has")]
+
+    def _axes(self) -> list[check.Finding]:
+        """Whether the estimated people lie or hang along another axis than the data set's up."""
         some = check.sample(self.estimates)
         ground = some.ground or self.data[slice(0, 1)].ground
         bodies = self.bodies.posed(some)
         if ground is None or bodies.joints is None:
-            return
+            return []
         normal = ground.normal if ground.normal.ndim == 1 else ground.normal[0]
         standing = replace(some, joints=bodies.joints, joint_names=bodies.joint_names, ground=Ground(normal))
         found = [each for each in check.of_frames(standing) if each.what.startswith("joints: looks like")]
-        check.demand(self.predictions, found)
+        return [replace(each, advice=self._other_axes, option="") for each in found]
+
+    @property
+    def _other_axes(self) -> str:
+        """What mends predictions in other axes than the data set's."""
+        known = () if self.source.name == OWN else inspect.signature(data.module(self.source.name).open).parameters
+        said = "turn them, or give the file a ground (4,) of its own: normal and height"
+        return f"{said}, or --option frame=camera or frame=world" if "frame" in known else said
 
     @cached_property
     def made_of(self) -> dict[str, Any]:
@@ -207,6 +250,8 @@ class Job:
             "partial": self.partial,
             "piece": self.piece,
             "version": __version__,
+            **({"unit": self.unit} if self.unit != 1.0 else {}),
+            **({"degrees": True} if self.degrees else {}),
         }
 
     @cached_property
@@ -215,7 +260,8 @@ class Job:
 
     def _compare(self, stored: Any) -> None:
         stored = stored if isinstance(stored, dict) else {}
-        other = [name for name, value in self.made_of.items() if stored.get(name) != value]
+        names = {**stored, **self.made_of}
+        other = [name for name in names if stored.get(name) != self.made_of.get(name)]
         if other:
             raise ValueError(
                 f"{self.place}: holds figures of another evaluation ({', '.join(other)} differ); choose another folder "

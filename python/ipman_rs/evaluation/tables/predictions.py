@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.body import safe_npz
-from ipman_rs.data import check
+from ipman_rs.data import check, judge
 from ipman_rs.data.frames import Frames, Rows
 from ipman_rs.files import regular
 from ipman_rs.ground import Ground
@@ -37,12 +37,24 @@ from . import parquet
 from .rows import RowsOnDisk, of_npz
 
 TEXT = ("names", "sequences", "genders")
+LENGTHS = ("transl", "vertices", "joints", "center_of_mass", "center_of_pressure")
 LABELS = ("standing", "contact")
 NUMBERS = (
     "pose", "betas", "transl", "vertices", "joints", "ground", "center_of_mass", "center_of_pressure", *LABELS,
 )  # fmt: skip
 POINTS = ("pose", "vertices", "joints")  # (F, n, 3)
 FOR_ALL = ("body", "joint_names", "frame_rate")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a file's numbers are to be read: metres in one of its lengths, and whether its rotations are degrees.
+
+    force: what cannot be a person is let in, too."""
+
+    unit: float = 1.0
+    degrees: bool = False
+    force: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +65,7 @@ class Predictions:
     columns: dict[str, RowsOnDisk]
     common: dict[str, Any]  # what is one for all frames
     fingerprint: str  # of the file's bytes
+    reading: Reading = Reading()
 
     def __len__(self) -> int:
         return len(self.columns["names"])
@@ -65,23 +78,38 @@ class Predictions:
         for name in found.keys() & set(NUMBERS):
             kind = found[name].dtype
             found[name] = found[name].astype(bool if name in LABELS else np.promote_types(kind, "f4"))
+        if self.reading.unit != 1.0:
+            for name in found.keys() & {*LENGTHS}:
+                found[name] = found[name] * self.reading.unit
+        if self.reading.degrees and "pose" in found:
+            found["pose"] = np.radians(found["pose"])
         if "betas" in self.common:
             found["betas"] = np.repeat(self.common["betas"], len(found["names"]), axis=0)
         if "ground" in found:
             found["ground"] = _ground(found["ground"])
         found.setdefault("sequences", found["names"])
-        return Frames(**{**self.common, **found})
+        every = {**self.common, **found}
+        if self.reading.unit != 1.0 and "ground" in every:
+            every["ground"] = Ground(every["ground"].normal, every["ground"].height * self.reading.unit)
+        return Frames(**every)
+
+    @cached_property
+    def flags(self) -> tuple[str, ...]:
+        """What is odd about a sample, in words. ValueError, naming the option that mends it, for what is wrong."""
+        found = [each for each in check.of_frames(check.sample(self)) if not each.what.startswith("lowest of")]
+        return judge.admit(self.path, found, self.reading.force)
 
     @cached_property
     def index(self) -> Names:
         return Names.of(self)
 
 
-def read(path: str | Path, unpacked: Path) -> Predictions:
+def read(path: str | Path, unpacked: Path, reading: Reading | None = None) -> Predictions:
     """The frames of an .npz or .parquet file (see above).
 
     `unpacked`: folder for what cannot be read row by row where it is (compressed, or Parquet). ValueError naming the
     file where it is missing or damaged, where arrays differ in length, or where units cannot be right.
+    `reading`: as the options of a command say; errors name these.
     """
     path = Path(path)
     regular(path)
@@ -93,7 +121,10 @@ def read(path: str | Path, unpacked: Path) -> Predictions:
         columns, common = parquet.read(path, unpacked)
     else:
         columns, common = _npz(path, unpacked)
-    found = Predictions(path, *_checked(path, columns, common), content)
+    found = Predictions(path, *_checked(path, columns, common), content, reading or Reading())
+    if reading is not None:
+        _ = found.flags
+        return found
     check.demand(path, [each for each in check.of_frames(check.sample(found)) if not each.what.startswith("lowest of")])
     return found
 

@@ -37,6 +37,7 @@ class Report:
     differences: Sequence[Difference]
     table: Table | None = None
     definitions: Mapping[str, Definition | None] = field(default_factory=dict)  # of the joints, by method
+    flags: Mapping[str, Sequence[str]] = field(default_factory=dict)  # what is odd, by method
 
     @property
     def joints(self) -> list[str]:
@@ -176,6 +177,7 @@ def record(report: Report) -> dict[str, Any]:
         "methods": {
             each.name: {
                 "frames": each.frames,
+                "flags": list(report.flags.get(each.name, ())),
                 "figures": {
                     name: {
                         **{key: plain(getattr(each.summary[name], key)) for key in ("mean", "std", "least", "largest")},

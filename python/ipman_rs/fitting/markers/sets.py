@@ -1,14 +1,15 @@
 """Which anatomical site each marker of the common sets means: marker name -> site or joint, or a place of its own.
 
-Markers of clusters (thigh, shank) are stuck anywhere; theirs are where recordings with these names have them, so they
-are worth less than the anatomical ones.
+Markers of clusters (thigh, shank) are stuck anywhere; theirs are where recordings with these names have them. Where
+other laboratories use the same names, or for wands and plates, they say little until they are found on this person.
 """
 
 from __future__ import annotations
 
-from .anatomy import Place, foot, shank, thigh
+from .aliases import OTHERS
+from .anatomy import ANYWHERE, RADIUS, Place, foot, shank, thigh
 
-Meaning = str | tuple[str, Place]  # the name of a site or joint, or a side and a place on it
+Meaning = str | tuple[str, Place, float]  # the name of a site or joint; or a side, a place on it, and its spread, m
 
 
 def _both(names: dict[str, str], *, left: str, right: str) -> dict[str, Meaning]:
@@ -45,18 +46,18 @@ OPENSIM_GAIT: dict[str, Meaning] = {
         left="L.",
         right="R.",
     ),
-    "L.Thigh.Upper": ("left", thigh(0.47, 0.9, 0.2)),
-    "L.Thigh.Front": ("left", thigh(0.56, 0.2, 1)),
-    "L.Thigh.Rear": ("left", thigh(0.71, 1, 0.1)),
-    "L.Shank.Upper": ("left", shank(0.19, 1, -0.2)),
-    "L.Shank.Front": ("left", shank(0.31, 0.4, 0.8)),
-    "L.Shank.Rear": ("left", shank(0.29, 0.9, -0.4)),
-    "R.Thigh.Upper": ("right", thigh(0.52, 0.9, 0.5)),
-    "R.Thigh.Front": ("right", thigh(0.66, -0.1, 1)),
-    "R.Thigh.Rear": ("right", thigh(0.79, 0.9, 0.5)),
-    "R.Shank.Upper": ("right", shank(0.18, 0.9, -0.4)),
-    "R.Shank.Front": ("right", shank(0.26, 0.2, 1)),
-    "R.Shank.Rear": ("right", shank(0.38, 1, -0.1)),
+    "L.Thigh.Upper": ("left", thigh(0.47, 0.9, 0.2), RADIUS),
+    "L.Thigh.Front": ("left", thigh(0.56, 0.2, 1), RADIUS),
+    "L.Thigh.Rear": ("left", thigh(0.71, 1, 0.1), RADIUS),
+    "L.Shank.Upper": ("left", shank(0.19, 1, -0.2), RADIUS),
+    "L.Shank.Front": ("left", shank(0.31, 0.4, 0.8), RADIUS),
+    "L.Shank.Rear": ("left", shank(0.29, 0.9, -0.4), RADIUS),
+    "R.Thigh.Upper": ("right", thigh(0.52, 0.9, 0.5), RADIUS),
+    "R.Thigh.Front": ("right", thigh(0.66, -0.1, 1), RADIUS),
+    "R.Thigh.Rear": ("right", thigh(0.79, 0.9, 0.5), RADIUS),
+    "R.Shank.Upper": ("right", shank(0.18, 0.9, -0.4), RADIUS),
+    "R.Shank.Front": ("right", shank(0.26, 0.2, 1), RADIUS),
+    "R.Shank.Rear": ("right", shank(0.38, 1, -0.1), RADIUS),
 }
 
 # The set of OpenCap's and the LaiArnold model's validation recordings.
@@ -72,8 +73,8 @@ OPENCAP: dict[str, Meaning] = {
             "forearm": "forearm",
             "wrist_radius": "radius",
             "wrist_ulna": "ulna",
-            "HJC": "hip",
-            "HJC_reg": "hip",
+            "HJC": "hip_centre",
+            "HJC_reg": "hip_centre",
         },
         left="L_",
         right="R_",
@@ -92,22 +93,22 @@ OPENCAP: dict[str, Meaning] = {
         left="L_",
         right="r_",
     ),
-    "L_thigh1": ("left", thigh(0.34, 0.7, 0.7)),
-    "L_thigh2": ("left", thigh(0.7, 0.5, 0.9)),
-    "L_thigh3": ("left", thigh(0.37, 1, -0.2)),
-    "L_thigh4": ("left", thigh(0.71, 1, -0.2)),
-    "L_shank_antsup": ("left", shank(0.19, 0.7, 0.6)),
-    "L_sh2": ("left", shank(0.16, 0.9, -0.4)),
-    "L_sh3": ("left", shank(0.47, 0.9, -0.4)),
-    "r_thigh1": ("right", thigh(0.26, 0.7, 0.6)),
-    "r_thigh2": ("right", thigh(0.54, 0.7, 0.7)),
-    "r_thigh3": ("right", thigh(0.62, 1, 0.2)),
-    "r_thigh4": ("right", thigh(0.29, 0.9, -0.5)),
-    "r_thigh5": ("right", thigh(0.58, 0.9, -0.4)),
-    "r_shank_antsup": ("right", shank(0.2, 0.7, 0.6)),
-    "r_sh2": ("right", shank(0.49, 0.7, 0.7)),
-    "r_sh3": ("right", shank(0.21, 1, -0.2)),
-    "r_sh4": ("right", shank(0.51, 1, -0.2)),
+    "L_thigh1": ("left", thigh(0.34, 0.7, 0.7), RADIUS),
+    "L_thigh2": ("left", thigh(0.7, 0.5, 0.9), RADIUS),
+    "L_thigh3": ("left", thigh(0.37, 1, -0.2), RADIUS),
+    "L_thigh4": ("left", thigh(0.71, 1, -0.2), RADIUS),
+    "L_shank_antsup": ("left", shank(0.19, 0.7, 0.6), RADIUS),
+    "L_sh2": ("left", shank(0.16, 0.9, -0.4), RADIUS),
+    "L_sh3": ("left", shank(0.47, 0.9, -0.4), RADIUS),
+    "r_thigh1": ("right", thigh(0.26, 0.7, 0.6), RADIUS),
+    "r_thigh2": ("right", thigh(0.54, 0.7, 0.7), RADIUS),
+    "r_thigh3": ("right", thigh(0.62, 1, 0.2), RADIUS),
+    "r_thigh4": ("right", thigh(0.29, 0.9, -0.5), RADIUS),
+    "r_thigh5": ("right", thigh(0.58, 0.9, -0.4), RADIUS),
+    "r_shank_antsup": ("right", shank(0.2, 0.7, 0.6), RADIUS),
+    "r_sh2": ("right", shank(0.49, 0.7, 0.7), RADIUS),
+    "r_sh3": ("right", shank(0.21, 1, -0.2), RADIUS),
+    "r_sh4": ("right", shank(0.51, 1, -0.2), RADIUS),
 }
 
 # Vicon's Plug-in Gait and its relatives, with joint centres (HJC, KJC, AJC).
@@ -132,6 +133,8 @@ PLUG_IN_GAIT: dict[str, Meaning] = {
             "FIN": "hand_back",
             "ASI": "asis",
             "PSI": "psis",
+            "THI": "thigh",
+            "TIB": "shank",
             "KNE": "knee_lateral",
             "LFC": "knee_lateral",
             "MFC": "knee_medial",
@@ -143,29 +146,28 @@ PLUG_IN_GAIT: dict[str, Meaning] = {
             "TOE": "metatarsal_2",
             "MT1": "metatarsal_1",
             "MT5": "metatarsal_5",
-            "HJC": "hip",
+            "HJC": "hip_centre",
             "KJC": "knee",
             "AJC": "ankle",
         },
         left="L",
         right="R",
     ),
-    **{f"{side[0].upper()}THI": (side, thigh(0.6, 1, 0)) for side in ("left", "right")},
-    **{f"{side[0].upper()}TIB": (side, shank(0.5, 1, 0)) for side in ("left", "right")},
     # In the recordings seen, MT2 is on the foot's outer edge.
-    **{f"{side[0].upper()}MT2": (side, foot(0.85, 1, 0, 0)) for side in ("left", "right")},
-    "LTH1": ("left", thigh(0.21, 1, -0.2)),
-    "LTH2": ("left", thigh(0.44, 0.3, 0.9)),
-    "LTH3": ("left", thigh(0.66, 0.9, -0.3)),
-    "RTH1": ("right", thigh(0.13, 1, 0.1)),
-    "RTH2": ("right", thigh(0.36, 0, 1)),
-    "RTH3": ("right", thigh(0.57, 1, 0.1)),
-    "LTB1": ("left", shank(0.25, -0.8, 0.5)),
-    "LTB2": ("left", shank(0.48, 0.9, -0.4)),
-    "LTB3": ("left", shank(0.72, -1, 0.1)),
-    "RTB1": ("right", shank(0.23, -0.9, 0.3)),
-    "RTB2": ("right", shank(0.47, 0.9, -0.3)),
-    "RTB3": ("right", shank(0.7, -0.9, 0.3)),
+    **{f"{side[0].upper()}MT2": (side, foot(0.85, 1, 0, 0), RADIUS) for side in ("left", "right")},
+    "LTH1": ("left", thigh(0.21, 1, -0.2), ANYWHERE),
+    "LTH2": ("left", thigh(0.44, 0.3, 0.9), ANYWHERE),
+    "LTH3": ("left", thigh(0.66, 0.9, -0.3), ANYWHERE),
+    "RTH1": ("right", thigh(0.13, 1, 0.1), ANYWHERE),
+    "RTH2": ("right", thigh(0.36, 0, 1), ANYWHERE),
+    "RTH3": ("right", thigh(0.57, 1, 0.1), ANYWHERE),
+    "LTB1": ("left", shank(0.25, -0.8, 0.5), ANYWHERE),
+    "LTB2": ("left", shank(0.48, 0.9, -0.4), ANYWHERE),
+    "LTB3": ("left", shank(0.72, -1, 0.1), ANYWHERE),
+    "RTB1": ("right", shank(0.23, -0.9, 0.3), ANYWHERE),
+    "RTB2": ("right", shank(0.47, 0.9, -0.3), ANYWHERE),
+    "RTB3": ("right", shank(0.7, -0.9, 0.3), ANYWHERE),
 }
 
-MARKERS: dict[str, Meaning] = {**OPENSIM_GAIT, **OPENCAP, **PLUG_IN_GAIT}
+# What two sets call by one name is what the last of these calls so.
+MARKERS: dict[str, Meaning] = {**OTHERS, **PLUG_IN_GAIT, **OPENCAP, **OPENSIM_GAIT}

@@ -3,6 +3,7 @@
 use super::lanes::OnLanes;
 use crate::error::status;
 use crate::mass::Method;
+use crate::memory;
 use crate::number::vector::{Vec3, sub};
 use crate::number::{Data, Real, Scalar};
 use crate::scene::Scene;
@@ -91,7 +92,8 @@ impl Finding for TipTest {
 /// The bits of one lane. Whether a volume is nothing or less is decided in double precision.
 fn status_of<R: Real>(scene: &Scene<R>, lane: usize, num_contacts: usize) -> u32 {
     let vertices = &scene.points[..scene.template.mesh.num_vertices];
-    let mut points: Vec<Vec3<f64>> = vertices.iter().map(|v| v.map(|x| x.lane(lane).value())).collect();
+    let mut points: Vec<Vec3<f64>> = memory::with_capacity(scene.points.len());
+    points.extend(vertices.iter().map(|v| v.map(|x| x.lane(lane).value())));
     let [low, high] = scene.bounds().map(|corner| corner.map(|x| x.lane(lane).value()));
     scene.template.closing.forward(&mut points);
     let volumes = SignedVolumes::forward(&scene.template.closing, &points).of_parts;

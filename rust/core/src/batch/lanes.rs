@@ -3,6 +3,7 @@
 use super::{Batch, Group};
 use crate::analysis::{Analysis, Polygon};
 use crate::losses::terms::Terms;
+use crate::memory;
 use crate::number::gate::Work;
 use crate::number::vector::Vec3;
 use crate::number::{Data, Real, Scalar, all_finite};
@@ -37,7 +38,7 @@ impl<T: Data, W: OnLanes<T>> Work<T> for ReadBodies<'_, T, W> {
             grounds.push(batch.grounds[group.bodies[lane]]);
             origins.push(origin);
         }
-        let mut points: Vec<Vec3<R>> = Vec::with_capacity(template.closing.num_points());
+        let mut points: Vec<Vec3<R>> = memory::with_capacity(template.closing.num_points());
         let count = template.mesh.num_vertices;
         // SAFETY: as many points as are written, each three numbers in a row, and `read_rows` writes all that it is given.
         unsafe {
@@ -58,7 +59,7 @@ pub(super) struct Forward<'a, T, Q> {
 
 impl<T: Data, Q: Quantity> OnLanes<T> for Forward<'_, T, Q> {
     fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
-        let mut out = vec![R::zero(); self.size];
+        let mut out = memory::filled(R::zero(), self.size);
         self.quantity.forward(scene, &mut out);
         R::write_rows(&out, &mut self.out);
     }
@@ -73,7 +74,7 @@ pub(super) struct Figures<'a, T> {
 
 impl<T: Data> OnLanes<T> for Figures<'_, T> {
     fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
-        let mut out = vec![R::zero(); self.size];
+        let mut out = memory::filled(R::zero(), self.size);
         let polygons = self.analysis.forward(scene, &mut out);
         self.polygons.into_iter().zip(polygons).for_each(|(own, polygon)| *own = polygon);
         R::write_rows(&out, &mut self.out);
@@ -92,12 +93,12 @@ pub(super) struct ForwardAndBackward<'a, T, Q> {
 impl<T: Data, Q: Quantity> OnLanes<T> for ForwardAndBackward<'_, T, Q> {
     fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
         let last = self.d_out.len() - 1;
-        let mut d_out = Vec::with_capacity(self.size);
+        let mut d_out = memory::with_capacity(self.size);
         for k in 0..self.size {
             d_out.push(R::from_lanes(|lane| R::Scalar::read(self.d_out[lane.min(last)][k])));
         }
-        let mut out = vec![R::zero(); self.size];
-        let mut d_points = vec![[R::zero(); 3]; scene.points.len()];
+        let mut out = memory::filled(R::zero(), self.size);
+        let mut d_points = memory::filled([R::zero(); 3], scene.points.len());
         self.quantity.forward_and_backward(scene, &d_out, &mut out, &mut d_points);
         self.template.closing.backward(&mut d_points);
         R::write_rows(&out, &mut self.out);
@@ -120,9 +121,9 @@ pub(super) struct ForwardAndJacobian<'a, T, Q> {
 impl<T: Data, Q: Terms> OnLanes<T> for ForwardAndJacobian<'_, T, Q> {
     fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
         let count = self.template.mesh.num_vertices;
-        let mut out = vec![R::zero(); self.size];
-        let mut d_first = vec![[R::zero(); 3]; scene.points.len()];
-        let (mut d_pull, mut d_push) = (vec![R::zero(); count], vec![R::zero(); count]);
+        let mut out = memory::filled(R::zero(), self.size);
+        let mut d_first = memory::filled([R::zero(); 3], scene.points.len());
+        let (mut d_pull, mut d_push) = (memory::filled(R::zero(), count), memory::filled(R::zero(), count));
         self.quantity.forward_and_jacobian(scene, &mut out, &mut d_first, [&mut d_pull, &mut d_push]);
         self.template.closing.backward(&mut d_first);
         R::write_rows(&out, &mut self.out);

@@ -11,9 +11,11 @@ use crate::error::{Error, Result, status};
 use crate::ground::Ground;
 use crate::losses::terms::Terms;
 use crate::mass::Method;
+use crate::memory;
 use crate::number::gate::Level;
 use crate::number::vector::Vec3;
 use crate::number::{Data, Dual, Real, Scalar, all_finite};
+use crate::options::positive;
 use crate::quantity::Quantity;
 use crate::scene::{self, Scene};
 use crate::solid::Solid;
@@ -68,13 +70,19 @@ impl<'a, T: Data> Batch<'a, T> {
                 other => other,
             })
         };
-        let grounds = (0..num_bodies).map(ground).collect::<Result<Vec<_>>>()?;
+        let grounds = memory::guarded(|| {
+            let mut grounds = memory::with_capacity(num_bodies);
+            for body in 0..num_bodies {
+                grounds.push(ground(body)?);
+            }
+            Ok(grounds)
+        })?;
         Ok(Batch { template, vertices, grounds, level: Level::current()?, interrupted })
     }
 
     /// The same batch at another CPU level of this machine.
     pub fn at_level(self, level: Level) -> Self {
-        assert!(Level::available().contains(&level), "this machine has no {}", level.name());
+        level.expect_here();
         Batch { level, ..self }
     }
 
@@ -92,6 +100,7 @@ impl<'a, T: Data> Batch<'a, T> {
 
     /// The quantity of each body: B·K numbers.
     pub fn value_into<Q: Quantity>(&self, quantity: &Q, out: &mut [T]) -> Result<()> {
+        quantity.check(self.template)?;
         let size = quantity.len(self.template);
         self.each([(out, size)], |group, [out]| {
             self.on_lanes(group, Forward { quantity, size, out });
@@ -106,6 +115,7 @@ impl<'a, T: Data> Batch<'a, T> {
         out: &mut [T],
         d_vertices: &mut [T],
     ) -> Result<()> {
+        quantity.check(self.template)?;
         let (size, row) = (quantity.len(self.template), 3 * self.template.mesh.num_vertices);
         self.each([(out, size), (d_vertices, row)], |group, [out, d_vertices]| {
             let d_out = group.bodies.iter().map(|&body| &d_out[body * size..][..size]).collect();
@@ -116,13 +126,14 @@ impl<'a, T: Data> Batch<'a, T> {
 
     /// The gradient of Σ d_out · value alone.
     pub fn vjp_into<Q: Quantity>(&self, quantity: &Q, d_out: &[T], d_vertices: &mut [T]) -> Result<()> {
-        let mut out = vec![T::zero(); d_out.len()];
+        let mut out = memory::guarded(|| Ok(memory::filled(T::zero(), d_out.len())))?;
         self.value_and_vjp_into(quantity, d_out, &mut out, d_vertices)
     }
 
     /// The terms, and their Jacobian: for each body the gradient of the first term by the vertices, V·3 numbers, then
     /// those of pull and of push by the vertices' heights, V each.
     pub fn value_and_jacobian_into<Q: Terms>(&self, quantity: &Q, out: &mut [T], jacobian: &mut [T]) -> Result<()> {
+        quantity.check(self.template)?;
         let (size, row) = (quantity.len(self.template), 5 * self.template.mesh.num_vertices);
         self.each([(out, size), (jacobian, row)], |group, [out, jacobian]| {
             self.on_lanes(group, ForwardAndJacobian { template: self.template, quantity, size, out, jacobian });
@@ -131,11 +142,12 @@ impl<'a, T: Data> Batch<'a, T> {
 
     /// The derivative of the value along `d_vertices`: B·K numbers.
     pub fn jvp_into<Q: Quantity>(&self, quantity: &Q, d_vertices: &[T], out: &mut [T]) -> Result<()> {
+        quantity.check(self.template)?;
         let size = quantity.len(self.template);
         self.each_body((out, size), |body, out| {
             out.fill(T::zero());
             self.on_dual(body, d_vertices, |scene| {
-                let mut value = vec![Dual::zero(); size];
+                let mut value = memory::filled(Dual::zero(), size);
                 quantity.forward(scene, &mut value);
                 for (out, value) in out.iter_mut().zip(value) {
                     *out = finite_or_zero(T::of(value.slope));
@@ -146,13 +158,14 @@ impl<'a, T: Data> Batch<'a, T> {
 
     /// The derivative of `vjp(d_out)` along `d_vertices`, a Hessian-vector product: B·V·3 numbers.
     pub fn vjp_jvp_into<Q: Quantity>(&self, quantity: &Q, d_out: &[T], d_vertices: &[T], out: &mut [T]) -> Result<()> {
+        quantity.check(self.template)?;
         let (size, row) = (quantity.len(self.template), 3 * self.template.mesh.num_vertices);
         self.each_body((out, row), |body, out| {
             out.fill(T::zero());
             self.on_dual(body, d_vertices, |scene| {
-                let d_out: Vec<_> = d_out[body * size..][..size].iter().map(|d| Dual::of(d.value())).collect();
-                let mut d_points = vec![[Dual::zero(); 3]; scene.points.len()];
-                quantity.forward_and_backward(scene, &d_out, &mut vec![Dual::zero(); size], &mut d_points);
+                let d_out = memory::collect(d_out[body * size..][..size].iter().map(|d| Dual::of(d.value())));
+                let mut d_points = memory::filled([Dual::zero(); 3], scene.points.len());
+                quantity.forward_and_backward(scene, &d_out, &mut memory::filled(Dual::zero(), size), &mut d_points);
                 scene.template.closing.backward(&mut d_points);
                 for (out, d) in out.iter_mut().zip(d_points.as_flattened()) {
                     *out = T::of(d.slope);
@@ -164,36 +177,36 @@ impl<'a, T: Data> Batch<'a, T> {
 
     /// [`Batch::value_into`] a new vector.
     pub fn value<Q: Quantity>(&self, quantity: &Q) -> Result<Vec<T>> {
-        let mut out = self.rows(quantity.len(self.template));
+        let mut out = self.rows(quantity.len(self.template))?;
         self.value_into(quantity, &mut out).map(|()| out)
     }
 
     /// [`Batch::value_and_vjp_into`] new vectors.
     pub fn value_and_vjp<Q: Quantity>(&self, quantity: &Q, d_out: &[T]) -> Result<(Vec<T>, Vec<T>)> {
-        let (mut out, mut d_vertices) = (self.rows(quantity.len(self.template)), self.rows(self.row()));
+        let (mut out, mut d_vertices) = (self.rows(quantity.len(self.template))?, self.rows(self.row())?);
         self.value_and_vjp_into(quantity, d_out, &mut out, &mut d_vertices).map(|()| (out, d_vertices))
     }
 
     /// [`Batch::vjp_into`] a new vector.
     pub fn vjp<Q: Quantity>(&self, quantity: &Q, d_out: &[T]) -> Result<Vec<T>> {
-        let mut d_vertices = self.rows(self.row());
+        let mut d_vertices = self.rows(self.row())?;
         self.vjp_into(quantity, d_out, &mut d_vertices).map(|()| d_vertices)
     }
 
     /// [`Batch::jvp_into`] a new vector.
     pub fn jvp<Q: Quantity>(&self, quantity: &Q, d_vertices: &[T]) -> Result<Vec<T>> {
-        let mut out = self.rows(quantity.len(self.template));
+        let mut out = self.rows(quantity.len(self.template))?;
         self.jvp_into(quantity, d_vertices, &mut out).map(|()| out)
     }
 
     /// [`Batch::vjp_jvp_into`] a new vector.
     pub fn vjp_jvp<Q: Quantity>(&self, quantity: &Q, d_out: &[T], d_vertices: &[T]) -> Result<Vec<T>> {
-        let mut out = self.rows(self.row());
+        let mut out = self.rows(self.row())?;
         self.vjp_jvp_into(quantity, d_out, d_vertices, &mut out).map(|()| out)
     }
 
-    fn rows(&self, size: usize) -> Vec<T> {
-        vec![T::zero(); self.len() * size]
+    fn rows(&self, size: usize) -> Result<Vec<T>> {
+        memory::guarded(|| Ok(memory::filled(T::zero(), self.len() * size)))
     }
 
     /// Coordinates of one body.
@@ -203,6 +216,7 @@ impl<'a, T: Data> Batch<'a, T> {
 
     /// The base of support of each body.
     pub fn base_of_support(&self, contact: &Contact, method: Method) -> Result<Vec<BaseOfSupport>> {
+        contact.check()?;
         let nowhere = BaseOfSupport { polygon: Vec::new(), area: f64::NAN, margin: f64::NAN, num_contacts: 0 };
         self.find(nowhere, &Support { contact, method })
     }
@@ -210,68 +224,74 @@ impl<'a, T: Data> Batch<'a, T> {
     /// All figures of each body ([`Analysis`]): B·K numbers, and the corners of the base of support.
     pub fn analysis_into(&self, analysis: &Analysis, out: &mut [T]) -> Result<Vec<Polygon>> {
         let size = analysis.size(self.template);
-        self.check_densities(analysis.has_densities_for(self.template.mesh.num_parts))?;
-        let mut polygons = vec![Polygon::new(); self.len()];
-        let mut bodies = Vec::new();
-        for (body, (row, polygon)) in out.chunks_exact_mut(size).zip(&mut polygons).enumerate() {
-            match self.origin(body) {
-                Some(origin) => bodies.push((body, origin, (row, polygon))),
-                None => row.fill(T::of(f64::NAN)),
+        analysis.check(self.template)?;
+        memory::guarded(|| {
+            let mut polygons = memory::filled(Polygon::new(), self.len());
+            let mut bodies = memory::with_capacity(self.len());
+            for (body, (row, polygon)) in out.chunks_exact_mut(size).zip(&mut polygons).enumerate() {
+                match self.origin(body) {
+                    Some(origin) => bodies.push((body, origin, (row, polygon))),
+                    None => row.fill(T::of(f64::NAN)),
+                }
             }
-        }
-        self.each_group(bodies, |group, rows| {
-            let (out, polygons) = rows.into_iter().unzip();
-            self.on_lanes(group, Figures { analysis, size, out, polygons });
-        })?;
-        Ok(polygons)
+            self.each_group(bodies, |group, rows| {
+                let (out, polygons) = rows.into_iter().unzip();
+                self.on_lanes(group, Figures { analysis, size, out, polygons });
+            })?;
+            Ok(polygons)
+        })
     }
 
     /// BoSE by the linear programme.
     #[cfg(feature = "lp")]
     pub fn is_supported_lp(&self, contact: &Contact, method: Method) -> Result<Vec<bool>> {
+        contact.check()?;
         self.find(false, &SupportedLp { contact, method })
     }
 
     /// The bits of [`status`].
     pub fn status(&self, contact: &Contact) -> Result<Vec<u32>> {
+        contact.check()?;
         self.find(status::NON_FINITE, &Status { contact })
     }
 
     /// Each body as one solid. One with its lowest vertex higher than `contact` metres is in the air.
     pub fn solids(&self, densities: &MassProperties, contact: f64) -> Result<Vec<Solid>> {
-        self.check_densities(densities.has_densities_for(self.template.mesh.num_parts))?;
+        densities.check(self.template)?;
+        positive("contact", contact)?;
         self.find(Solid::nowhere(), &Solids { densities, contact })
     }
 
     /// The tip test of each body.
     pub fn tip_test(&self, test: &TipTest) -> Result<Vec<Tipping>> {
-        self.check_densities(test.densities.has_densities_for(self.template.mesh.num_parts))?;
-        let mut out = vec![Tipping::nowhere(); self.len()];
-        let bodies =
-            out.iter_mut().enumerate().filter_map(|(body, row)| Some((body, self.origin(body)?, row))).collect();
-        self.each_group(bodies, |group, out| {
-            let mut footings = vec![Footing::nowhere(); out.len()];
-            self.on_lanes(group, Find { finding: test, out: footings.iter_mut().collect() });
-            for ((out, footing), &body) in out.into_iter().zip(footings).zip(&group.bodies) {
-                *out = test.of_body(footing, self.vertices_of(body));
-            }
-        })?;
-        Ok(out)
-    }
-
-    fn check_densities(&self, fit: bool) -> Result<()> {
-        let expected = format!("1 or {} numbers", self.template.mesh.num_parts);
-        let wrong = Error::Argument { name: "densities", expected, got: "another number".into() };
-        if fit { Ok(()) } else { Err(wrong) }
+        test.check(self.template)?;
+        memory::guarded(|| {
+            let mut out = memory::filled(Tipping::nowhere(), self.len());
+            self.each_group(self.finite(&mut out), |group, out| {
+                let mut footings = vec![Footing::nowhere(); out.len()];
+                self.on_lanes(group, Find { finding: test, out: footings.iter_mut().collect() });
+                for ((out, footing), &body) in out.into_iter().zip(footings).zip(&group.bodies) {
+                    *out = test.of_body(footing, self.vertices_of(body));
+                }
+            })?;
+            Ok(out)
+        })
     }
 
     /// What is found of each body; `bad` for a body that is not finite.
     fn find<F: Finding>(&self, bad: F::Of, finding: &F) -> Result<Vec<F::Of>> {
-        let mut out = vec![bad; self.len()];
-        let bodies =
-            out.iter_mut().enumerate().filter_map(|(body, row)| Some((body, self.origin(body)?, row))).collect();
-        self.each_group(bodies, |group, out| self.on_lanes(group, Find { finding, out }))?;
-        Ok(out)
+        memory::guarded(|| {
+            let mut out = memory::filled(bad, self.len());
+            self.each_group(self.finite(&mut out), |group, out| self.on_lanes(group, Find { finding, out }))?;
+            Ok(out)
+        })
+    }
+
+    /// The bodies that are finite, with their local origins and their rows of `out`.
+    fn finite<'o, O>(&self, out: &'o mut [O]) -> Vec<(usize, Vec3<f64>, &'o mut O)> {
+        let mut bodies = memory::with_capacity(out.len());
+        bodies.extend(out.iter_mut().enumerate().filter_map(|(body, row)| Some((body, self.origin(body)?, row))));
+        bodies
     }
 
     /// Shows one body to `f` as dual numbers along `d_vertices`, if it is finite.
@@ -307,7 +327,7 @@ impl<'a, T: Data> Batch<'a, T> {
 
     /// The closed body in local coordinates.
     fn points<R: Real>(&self, body: usize, mut local: impl FnMut(T, f64) -> R, origin: Vec3<f64>) -> Vec<Vec3<R>> {
-        let mut points = Vec::with_capacity(self.template.closing.num_points());
+        let mut points = memory::with_capacity(self.template.closing.num_points());
         for vertex in self.vertices_of(body).chunks_exact(3) {
             points.push([local(vertex[0], origin[0]), local(vertex[1], origin[1]), local(vertex[2], origin[2])]);
         }
@@ -321,27 +341,31 @@ impl<'a, T: Data> Batch<'a, T> {
         outputs: [(&mut [T], usize); N],
         f: impl Fn(&Group, [Vec<&mut [T]>; N]) + Sync,
     ) -> Result<()> {
-        let mut rest = outputs.map(|(data, size)| data.chunks_exact_mut(size));
-        let mut bodies = Vec::new();
-        for body in 0..self.len() {
-            let mut row = rest.each_mut().map(|chunks| chunks.next().expect("one row a body"));
-            match self.origin(body) {
-                Some(origin) => bodies.push((body, origin, row)),
-                None => row.iter_mut().enumerate().for_each(|(k, row)| row.fill(T::of([f64::NAN, 0.0][k]))),
+        memory::guarded(|| {
+            let mut rest = outputs.map(|(data, size)| data.chunks_exact_mut(size));
+            let mut bodies = memory::with_capacity(self.len());
+            for body in 0..self.len() {
+                let mut row = rest.each_mut().map(|chunks| chunks.next().expect("one row a body"));
+                match self.origin(body) {
+                    Some(origin) => bodies.push((body, origin, row)),
+                    None => row.iter_mut().enumerate().for_each(|(k, row)| row.fill(T::of([f64::NAN, 0.0][k]))),
+                }
             }
-        }
-        self.each_group(bodies, |group, rows| {
-            let mut own: [Vec<&mut [T]>; N] = std::array::from_fn(|_| Vec::with_capacity(group.width));
-            for row in rows {
-                own.iter_mut().zip(row).for_each(|(own, row)| own.push(row));
-            }
-            f(group, own);
+            self.each_group(bodies, |group, rows| {
+                let mut own: [Vec<&mut [T]>; N] = std::array::from_fn(|_| Vec::with_capacity(group.width));
+                for row in rows {
+                    own.iter_mut().zip(row).for_each(|(own, row)| own.push(row));
+                }
+                f(group, own);
+            })
         })
     }
 
     /// Runs `f` on finite bodies side by side, over the threads: on each group with what belongs to its bodies.
     fn each_group<P: Send>(&self, bodies: Vec<(usize, Vec3<f64>, P)>, f: impl Fn(&Group, Vec<P>) + Sync) -> Result<()> {
         let widths = self.widths(bodies.len());
+        // Each body once more, in its group's small vectors.
+        memory::ask(bodies.len() * (size_of::<P>() + size_of::<(usize, Vec3<f64>)>()));
         let mut groups = Vec::new();
         let mut rest = bodies.into_iter();
         for &width in widths {
@@ -354,7 +378,7 @@ impl<'a, T: Data> Batch<'a, T> {
                     group.origins.push(origin);
                     own.push(belonging);
                 }
-                groups.push((group, own));
+                memory::push(&mut groups, (group, own));
             }
         }
         threads::each(groups, self.pays_threads(), self.interrupted, &|(group, own)| f(&group, own))
@@ -362,7 +386,7 @@ impl<'a, T: Data> Batch<'a, T> {
 
     /// Runs `f` on every body with its row of the output.
     fn each_body<O: Send>(&self, output: (&mut [O], usize), f: impl Fn(usize, &mut [O]) + Sync) -> Result<()> {
-        let rows: Vec<_> = output.0.chunks_exact_mut(output.1).enumerate().collect();
+        let rows = memory::guarded(|| Ok(memory::collect(output.0.chunks_exact_mut(output.1).enumerate())))?;
         threads::each(rows, self.pays_threads(), self.interrupted, &|(body, row)| f(body, row))
     }
 

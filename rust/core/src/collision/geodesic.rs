@@ -2,6 +2,7 @@
 
 use super::tree::Tree;
 use crate::error::Result;
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::number::vector::{Vec3, dot, sub};
 use crate::threads;
@@ -23,10 +24,12 @@ impl Neighbourhoods {
         radius: f64,
         interrupted: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self> {
-        let edges = edges(mesh, vertices);
+        let edges = Edges::new(mesh, vertices);
         let mut near = Bits::new(vertices.len(), vertices.len());
         let mut nodes = Bits::new(vertices.len(), tree.nodes.len());
-        let rows: Vec<_> = near.rows().zip(nodes.rows()).enumerate().collect();
+        // For the heap of every thread's walk: at most one entry an edge.
+        memory::ask(threads::num_threads() * edges.neighbours.len() * size_of::<(u64, u32)>());
+        let rows = memory::collect(near.rows().zip(nodes.rows()).enumerate());
         threads::each(rows, true, interrupted, &|(vertex, (near, nodes))| {
             spread(vertex, &edges, radius, near);
             for (index, node) in tree.nodes.iter().enumerate().rev() {
@@ -54,26 +57,34 @@ impl Neighbourhoods {
 }
 
 /// Of each vertex: its neighbours, and how far they are.
-fn edges(mesh: &Mesh, vertices: &[Vec3<f64>]) -> Vec<Vec<(u32, f64)>> {
-    let mut edges = vec![Vec::new(); vertices.len()];
-    for &face in &mesh.faces {
-        for (a, b) in Mesh::edges(face) {
+struct Edges {
+    starts: Vec<usize>,
+    neighbours: Vec<(u32, f64)>,
+}
+
+impl Edges {
+    fn new(mesh: &Mesh, vertices: &[Vec3<f64>]) -> Self {
+        let edges = mesh.faces.iter().flat_map(|&face| Mesh::edges(face));
+        let mut both = memory::with_capacity(6 * mesh.faces.len());
+        both.extend(edges.flat_map(|(a, b)| [(a, b), (b, a)]));
+        both.sort_unstable();
+        both.dedup();
+        let starts = (0..=vertices.len() as u32).map(|vertex| both.partition_point(|edge| edge.0 < vertex));
+        let length = |&(a, b): &(u32, u32)| {
             let along = sub(vertices[b as usize], vertices[a as usize]);
-            let length = dot(along, along).sqrt();
-            edges[a as usize].push((b, length));
-            edges[b as usize].push((a, length));
-        }
+            (b, dot(along, along).sqrt())
+        };
+        Edges { starts: memory::collect(starts), neighbours: memory::collect(both.iter().map(length)) }
     }
-    for row in &mut edges {
-        row.sort_unstable_by_key(|(vertex, _)| *vertex);
-        row.dedup_by_key(|(vertex, _)| *vertex);
+
+    fn of(&self, vertex: u32) -> &[(u32, f64)] {
+        &self.neighbours[self.starts[vertex as usize]..self.starts[vertex as usize + 1]]
     }
-    edges
 }
 
 /// Dijkstra's walk from a vertex, as far as the radius. Lengths are ordered as their bits are: none is negative.
-fn spread(start: usize, edges: &[Vec<(u32, f64)>], radius: f64, near: &mut [u64]) {
-    let mut lengths = vec![f64::INFINITY; edges.len()];
+fn spread(start: usize, edges: &Edges, radius: f64, near: &mut [u64]) {
+    let mut lengths = memory::filled(f64::INFINITY, edges.starts.len() - 1);
     let mut next = BinaryHeap::from([Reverse((0.0_f64.to_bits(), start as u32))]);
     lengths[start] = 0.0;
     while let Some(Reverse((bits, vertex))) = next.pop() {
@@ -82,7 +93,7 @@ fn spread(start: usize, edges: &[Vec<(u32, f64)>], radius: f64, near: &mut [u64]
             continue;
         }
         set(near, vertex as usize);
-        for &(other, step) in &edges[vertex as usize] {
+        for &(other, step) in edges.of(vertex) {
             let there = length + step;
             if there <= radius && there < lengths[other as usize] {
                 lengths[other as usize] = there;
@@ -105,7 +116,7 @@ struct Bits {
 impl Bits {
     fn new(rows: usize, columns: usize) -> Self {
         let width = columns.div_ceil(64);
-        Bits { words: vec![0; rows * width], width }
+        Bits { words: memory::filled(0, rows.saturating_mul(width)), width }
     }
 
     fn row(&self, row: usize) -> &[u64] {

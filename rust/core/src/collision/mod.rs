@@ -12,6 +12,7 @@ pub mod tree;
 pub mod winding;
 
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::number::Data;
 use crate::number::gate::Level;
@@ -69,9 +70,11 @@ impl Collision {
         if !(geodesic >= 0.0 && geodesic.is_finite()) {
             return wrong("geodesic", "zero metres or more".into(), geodesic.to_string());
         }
-        let tree = Tree::new(mesh, vertices);
-        let neighbourhoods = Neighbourhoods::new(mesh, &tree, vertices, geodesic, interrupted)?;
-        Ok(Collision { num_vertices: mesh.num_vertices, tree, neighbourhoods })
+        memory::guarded(|| {
+            let tree = Tree::new(mesh, vertices);
+            let neighbourhoods = Neighbourhoods::new(mesh, &tree, vertices, geodesic, interrupted)?;
+            Ok(Collision { num_vertices: mesh.num_vertices, tree, neighbourhoods })
+        })
     }
 
     pub fn num_vertices(&self) -> usize {
@@ -136,7 +139,8 @@ impl Collision {
     ) -> Result<()> {
         let row = 3 * self.num_vertices;
         self.each(vertices, [(out, 2), (jacobian, 2 * row)], interrupted, |body, [out, jacobian]| {
-            let mut gradients = [vec![zero::<f64>(); self.num_vertices], vec![zero::<f64>(); self.num_vertices]];
+            let mut gradients =
+                [memory::filled(zero::<f64>(), self.num_vertices), memory::filled(zero::<f64>(), self.num_vertices)];
             let costs =
                 contact.cost(&body.touches(contact.near), &self.tree.faces, gradients.each_mut().map(|g| &mut g[..]));
             out.iter_mut().zip(costs).for_each(|(out, cost)| *out = T::of(cost));
@@ -158,13 +162,15 @@ impl Collision {
         let mut rest = outputs.map(|(data, size)| data.chunks_exact_mut(size));
         let bodies = vertices.chunks_exact(3 * self.num_vertices);
         let parallel = bodies.len() * self.num_vertices >= INLINE_VERTICES;
-        let items: Vec<_> =
-            bodies.map(|body| (body, rest.each_mut().map(|rows| rows.next().expect("one row a body")))).collect();
-        threads::each(items, parallel, interrupted, &|(body, mut rows)| {
-            if body.iter().all(|x| x.value().is_finite()) {
-                return f(&Posed::new(self, body, level), rows);
-            }
-            rows.iter_mut().enumerate().for_each(|(k, row)| row.fill(T::of([f64::NAN, 0.0][k])));
+        memory::guarded(|| {
+            let rows = || rest.each_mut().map(|rows| rows.next().expect("one row a body"));
+            let items = memory::collect(bodies.zip(std::iter::repeat_with(rows)));
+            threads::each(items, parallel, interrupted, &|(body, mut rows)| {
+                if body.iter().all(|x| x.value().is_finite()) {
+                    return f(&Posed::new(self, body, level), rows);
+                }
+                rows.iter_mut().enumerate().for_each(|(k, row)| row.fill(T::of([f64::NAN, 0.0][k])));
+            })
         })
     }
 }
@@ -183,7 +189,7 @@ impl<'a> Posed<'a> {
     fn new<T: Data>(collision: &'a Collision, vertices: &[T], level: Level) -> Self {
         let origin = crate::scene::origin(std::array::from_fn(|k| vertices[k].value()));
         let local = |vertex: &[T; 3]| [0, 1, 2].map(|k| vertex[k].value() - origin[k]);
-        let points: Vec<_> = vertices.as_chunks::<3>().0.iter().map(local).collect();
+        let points = memory::collect(vertices.as_chunks::<3>().0.iter().map(local));
         let boxes = collision.tree.boxes(&points);
         let normals = normals(&collision.tree.faces, &points);
         Posed { collision, points, boxes, normals, level }
@@ -191,7 +197,7 @@ impl<'a> Posed<'a> {
 
     fn windings<T: Data>(&self) -> Vec<f64> {
         let Posed { collision, points, boxes, level, .. } = self;
-        let rounded: Vec<_> = points.iter().map(|point| point.map(T::of)).collect();
+        let rounded = memory::collect(points.iter().map(|point| point.map(T::of)));
         let work = winding::AtVertices { tree: &collision.tree, boxes, points, rounded: &rounded };
         T::enter(*level, T::widths(*level)[0], work)
     }
@@ -225,7 +231,7 @@ impl<'a> Posed<'a> {
         let Collision { tree, neighbourhoods, .. } = self.collision;
         let mut touches = Vec::new();
         let windings = self.windings::<f32>();
-        let mut vertices = tree.vertices.clone();
+        let mut vertices = memory::copied(&tree.vertices);
         vertices.sort_unstable();
         for vertex in vertices {
             let at = self.points[vertex as usize];
@@ -234,11 +240,9 @@ impl<'a> Posed<'a> {
             let inside = self.is_inside(vertex, windings[vertex as usize]);
             let reach = if inside { f64::INFINITY } else { near };
             let found = nearest(tree, &self.boxes, &self.points, at, reach, &whole, &single);
-            touches.extend(found.filter(|nearest| !inside || self.leads_out(nearest)).map(|nearest| Touch {
-                vertex,
-                inside,
-                nearest,
-            }));
+            if let Some(nearest) = found.filter(|nearest| !inside || self.leads_out(nearest)) {
+                memory::push(&mut touches, Touch { vertex, inside, nearest });
+            }
         }
         touches
     }
@@ -255,7 +259,7 @@ impl<'a> Posed<'a> {
 }
 
 fn normals(faces: &[[u32; 3]], points: &[Vec3<f64>]) -> Vec<Vec3<f64>> {
-    let mut normals = vec![zero(); points.len()];
+    let mut normals = memory::filled(zero(), points.len());
     for &face in faces {
         let [a, b, c] = face.map(|corner| points[corner as usize]);
         let area = cross(sub(b, a), sub(c, a));

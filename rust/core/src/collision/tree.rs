@@ -1,8 +1,8 @@
 //! A tree over the faces of a template, split on its rest shape. Its boxes are fitted to every pose anew.
 
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::number::vector::Vec3;
-use std::collections::HashSet;
 use std::ops::Range;
 
 /// Faces in a leaf, at most.
@@ -30,19 +30,19 @@ pub struct Node {
 
 impl Tree {
     pub fn new(mesh: &Mesh, vertices: &[Vec3<f64>]) -> Self {
-        let centers: Vec<_> = mesh.faces.iter().map(|&face| center(face, vertices)).collect();
-        let mut order: Vec<u32> = (0..mesh.faces.len() as u32).collect();
+        let centers = memory::collect(mesh.faces.iter().map(|&face| center(face, vertices)));
+        let mut order = memory::collect(0..mesh.faces.len() as u32);
         let mut nodes = Vec::new();
         split(&mut order, 0, &centers, &mut nodes);
-        let faces: Vec<_> = order.iter().map(|&face| mesh.faces[face as usize]).collect();
+        let faces = memory::collect(order.iter().map(|&face| mesh.faces[face as usize]));
         let mut closures = Vec::new();
         for node in &mut nodes {
             let start = closures.len();
-            closures.extend(closure(&faces[node.faces.clone()]));
+            memory::extend(&mut closures, closure(&faces[node.faces.clone()]));
             node.closure = start..closures.len();
         }
-        let mut seen = vec![false; mesh.num_vertices];
-        let mut in_order = Vec::with_capacity(mesh.num_vertices);
+        let mut seen = memory::filled(false, mesh.num_vertices);
+        let mut in_order = memory::with_capacity(mesh.num_vertices);
         for &vertex in faces.as_flattened() {
             if !std::mem::replace(&mut seen[vertex as usize], true) {
                 in_order.push(vertex);
@@ -53,7 +53,7 @@ impl Tree {
 
     /// The box of each node.
     pub fn boxes(&self, points: &[Vec3<f64>]) -> Vec<Aabb> {
-        let mut boxes = vec![Aabb::NOTHING; self.nodes.len()];
+        let mut boxes = memory::filled(Aabb::NOTHING, self.nodes.len());
         for (index, node) in self.nodes.iter().enumerate().rev() {
             boxes[index] = match node.children {
                 Some([left, right]) => boxes[left].with(&boxes[right]),
@@ -72,7 +72,7 @@ fn center(face: [u32; 3], vertices: &[Vec3<f64>]) -> Vec3<f64> {
 /// Adds the node of these faces, which start at `start` in the order of all, and those below it; its index.
 fn split(faces: &mut [u32], start: usize, centers: &[Vec3<f64>], nodes: &mut Vec<Node>) -> usize {
     let index = nodes.len();
-    nodes.push(Node { faces: start..start + faces.len(), children: None, closure: 0..0 });
+    memory::push(nodes, Node { faces: start..start + faces.len(), children: None, closure: 0..0 });
     if faces.len() > LEAF {
         let sides = Aabb::around(faces.iter().map(|&face| centers[face as usize])).sides();
         let axis = (1..3).fold(0, |longest, k| if sides[k] > sides[longest] { k } else { longest });
@@ -88,12 +88,14 @@ fn split(faces: &mut [u32], start: usize, centers: &[Vec3<f64>], nodes: &mut Vec
 
 /// A fan over the boundary of a patch, or the patch where that is less.
 fn closure(faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    let edges: HashSet<(u32, u32)> = faces.iter().flat_map(|&face| Mesh::edges(face)).collect();
-    let boundary: Vec<_> =
-        faces.iter().flat_map(|&face| Mesh::edges(face)).filter(|&(a, b)| !edges.contains(&(b, a))).collect();
+    let edges = || faces.iter().flat_map(|&face| Mesh::edges(face));
+    let mut sorted = memory::collect(edges());
+    sorted.sort_unstable();
+    let boundary = memory::collect(edges().filter(|&(a, b)| sorted.binary_search(&(b, a)).is_err()));
     let Some(&(apex, _)) = boundary.first() else { return Vec::new() };
-    let fan: Vec<_> = boundary.iter().filter(|&&(a, b)| a != apex && b != apex).map(|&(a, b)| [apex, a, b]).collect();
-    if fan.len() < faces.len() { fan } else { faces.to_vec() }
+    let far = boundary.iter().filter(|&&(a, b)| a != apex && b != apex);
+    let fan = memory::collect(far.map(|&(a, b)| [apex, a, b]));
+    if fan.len() < faces.len() { fan } else { memory::copied(faces) }
 }
 
 /// An axis-aligned box.

@@ -6,6 +6,7 @@
 //! it, between 0 and 1, and 1 more for every other part of the body that it is inside of.
 
 use super::tree::{Aabb, Tree};
+use crate::memory;
 use crate::number::gate::{Level, Work};
 use crate::number::vector::{Vec3, cross, dot, sub};
 use crate::number::{Data, Real, Room, Scalar};
@@ -25,7 +26,7 @@ impl<T: Data> Work<T> for AtVertices<'_, T> {
 
     /// Lanes are vertices that lie beside each other: they look at the same triangles.
     fn run<R: Real<Data = T>>(self) -> Vec<f64> {
-        let mut windings = vec![0.0; self.points.len()];
+        let mut windings = memory::filled(0.0, self.points.len());
         let mut triangles = Vec::new();
         for group in self.tree.vertices.chunks(R::LANES) {
             let own = Aabb::around(group.iter().map(|&vertex| self.points[vertex as usize]));
@@ -62,13 +63,13 @@ impl<T: Data> Work<T> for OfTriangles<'_> {
 
     fn run<R: Real<Data = T>>(self) -> f64 {
         let share = self.triangles.len().div_ceil(R::LANES);
-        let mut numbers = vec![T::zero(); 9 * share * R::LANES];
+        let mut numbers = memory::filled(T::zero(), 9 * share * R::LANES);
         for (corner, numbers) in self.triangles.as_flattened().iter().zip(numbers.as_chunks_mut::<3>().0) {
             *numbers = sub(self.points[*corner as usize], self.at).map(T::of);
         }
         let lane = |lane: usize| &numbers[9 * share * lane..][..9 * share];
         let rows: Vec<_> = (0..R::LANES).map(lane).collect();
-        let mut corners = vec![R::zero(); 9 * share];
+        let mut corners = memory::filled(R::zero(), 9 * share);
         for (k, corner) in corners.iter_mut().enumerate() {
             *corner = R::from_lanes(|lane| R::Scalar::read(rows[lane][k]));
         }
@@ -94,7 +95,10 @@ pub fn of_some(
         match node.children {
             _ if whole(index) => gather(tree, boxes, &own, index, &mut triangles),
             Some(children) => stack.extend(children),
-            None => triangles.extend(tree.faces[node.faces.clone()].iter().filter(|&&face| single(face))),
+            None => {
+                let faces = tree.faces[node.faces.clone()].iter().copied();
+                memory::extend(&mut triangles, faces.filter(|&face| single(face)));
+            }
         }
     }
     triangles
@@ -106,11 +110,11 @@ fn gather(tree: &Tree, boxes: &[Aabb], from: &Aabb, node: usize, triangles: &mut
     while let Some(index) = stack.pop() {
         let node = &tree.nodes[index];
         if boxes[index].is_apart_from(from) {
-            triangles.extend_from_slice(&tree.closures[node.closure.clone()]);
+            memory::extend(triangles, tree.closures[node.closure.clone()].iter().copied());
         } else if let Some(children) = node.children {
             stack.extend(children);
         } else {
-            triangles.extend_from_slice(&tree.faces[node.faces.clone()]);
+            memory::extend(triangles, tree.faces[node.faces.clone()].iter().copied());
         }
     }
 }

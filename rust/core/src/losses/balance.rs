@@ -12,8 +12,10 @@
 
 use crate::error::Result;
 use crate::mass::{Centre, Method};
+use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, narrow, scale, sub, widen};
 use crate::number::{Data, Real, Room};
+use crate::options::positive;
 use crate::pressure::PressureCurve;
 use crate::quantity::{Quantity, unknown_choice};
 use crate::sampling::{CHUNK, Chunk, Row, SUMS, Walk, fold};
@@ -138,7 +140,7 @@ impl<R: Real> Supports<R> {
     fn new(scene: &Scene<R>, centre: Vec3<R::Wide>) -> Self {
         let (heights, arms) = (scene.heights(), R::apart::<Arms, _>((scene, centre)));
         let walk = &scene.template.samples.walk;
-        let mut reaches = Vec::with_capacity(walk.chunks.len());
+        let mut reaches = memory::with_capacity(walk.chunks.len());
         let mut rows = [[R::zero(); CHUNK]; 3];
         for chunk in &walk.chunks {
             walk.interpolate(chunk, &heights, &mut rows[0]);
@@ -154,7 +156,7 @@ impl<R: Real> Supports<R> {
     fn seen_from(&self, scene: &Scene<R>, centre: Vec3<R::Wide>, by: [R::Wide; 2]) -> Self {
         let arms = R::apart::<Arms, _>((scene, add(centre, scene.plane.raise(by))));
         let by = [R::narrow(by[0]), R::narrow(by[1])];
-        let mut reaches = Vec::with_capacity(self.reaches.len());
+        let mut reaches = memory::with_capacity(self.reaches.len());
         for &Reach { lowest, arms: [x, y], first } in &self.reaches {
             reaches.push(Reach {
                 lowest,
@@ -162,7 +164,7 @@ impl<R: Real> Supports<R> {
                 first: [first[0], first[1] - by[0], first[2] - by[1]],
             });
         }
-        Supports { heights: self.heights.clone(), arms, reaches }
+        Supports { heights: memory::copied(&self.heights), arms, reaches }
     }
 }
 
@@ -178,7 +180,7 @@ impl<R: Real> Room<(&Scene<'_, R>, Vec3<R::Wide>)> for Arms {
         let plane = scene.narrow_plane();
         let near = narrow::<R>(from);
         let rest = narrow::<R>(sub(from, widen(near)));
-        let mut arms = [vec![R::zero(); vertices.len()], vec![R::zero(); vertices.len()]];
+        let mut arms = [memory::filled(R::zero(), vertices.len()), memory::filled(R::zero(), vertices.len())];
         let [x, y] = &mut arms;
         for ((&vertex, x), y) in vertices.iter().zip(x).zip(y) {
             [*x, *y] = plane.flatten(sub(sub(vertex, near), rest));
@@ -520,6 +522,11 @@ impl Quantity for BalanceCost {
         1
     }
 
+    fn check(&self, _: &Template) -> Result<()> {
+        self.curve.check()?;
+        positive("sigma", self.sigma)
+    }
+
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Balance<R> {
         self.forward_about(scene, self.method.forward(scene), out)
     }
@@ -552,7 +559,7 @@ impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>, &Balance<R>, R, &mut [Vec3<R>])
         let still = Side { exponent, top: still.top, share: R::narrow(R::Wide::of(1.0) / still.total) };
 
         let (mut d_arms, mut d_heights) =
-            (vec![R::zero(); supports.heights.len()], vec![R::zero(); supports.heights.len()]);
+            (memory::filled(R::zero(), supports.heights.len()), memory::filled(R::zero(), supports.heights.len()));
         let mut rows = [[R::zero(); CHUNK]; 4];
         for (chunk, reach) in walk.chunks.iter().zip(&supports.reaches) {
             let clearances = [spread.clearance(reach), still.clearance(reach)];

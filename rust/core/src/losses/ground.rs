@@ -2,8 +2,10 @@
 //! mean of β1 tanh(h/β2)² over those below it (Eq. 7). Both means run over all points.
 
 use crate::error::Result;
+use crate::memory;
 use crate::number::vector::Vec3;
 use crate::number::{Real, Room};
+use crate::options::{not_negative, positive};
 use crate::quantity::{Quantity, unknown_choice};
 use crate::sampling::{CHUNK, Place, Points, Row, SUMS, fold};
 use crate::scene::Scene;
@@ -227,6 +229,13 @@ impl Quantity for GroundLoss {
         2
     }
 
+    fn check(&self, _: &Template) -> Result<()> {
+        not_negative("alpha1", self.alpha1)?;
+        positive("alpha2", self.alpha2)?;
+        not_negative("beta1", self.beta1)?;
+        positive("beta2", self.beta2)
+    }
+
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Vec<R> {
         let heights = scene.heights();
         let mut sums = self.sums();
@@ -237,7 +246,7 @@ impl Quantity for GroundLoss {
 
     fn backward<R: Real>(&self, scene: &Scene<R>, heights: &Vec<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
         let sides = Sides::new(self, self.shares(scene.template, d_out));
-        let mut d_heights = vec![R::zero(); heights.len()];
+        let mut d_heights = memory::filled(R::zero(), heights.len());
         let mut row = [R::zero(); CHUNK];
         for place in self.points.places(scene.template) {
             place.read(heights, &mut row);

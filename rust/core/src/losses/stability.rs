@@ -1,7 +1,9 @@
 //! L_stability = ‖g(m̄) − g(s̄)‖₂ (Eq. 4): the distance, on the ground, from the centre of mass to the centre of pressure,
 //! metres.
 
+use crate::error::Result;
 use crate::mass::{Centre, Method};
+use crate::memory;
 use crate::number::Real;
 use crate::number::vector::{Vec3, dot, scale, sub};
 use crate::pressure::{CenterOfPressure, Cop};
@@ -46,6 +48,10 @@ impl Quantity for StabilityLoss {
         1
     }
 
+    fn check(&self, template: &Template) -> Result<()> {
+        self.pressure.check(template)
+    }
+
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
         let heights = scene.heights();
         let centre = self.method.forward(scene);
@@ -55,6 +61,6 @@ impl Quantity for StabilityLoss {
     }
 
     fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        self.backward_with(scene, saved, d_out[0], vec![R::zero(); saved.2.len()], d_points);
+        self.backward_with(scene, saved, d_out[0], memory::filled(R::zero(), saved.2.len()), d_points);
     }
 }

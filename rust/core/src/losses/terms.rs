@@ -2,10 +2,12 @@
 //!
 //! Stability and ground look at the samples together.
 
+use crate::error::Result;
 use crate::losses::balance::{Balance, BalanceCost};
 use crate::losses::ground::{GroundLoss, GroundSums};
 use crate::losses::stability::{StabilityLoss, distance_on_ground};
 use crate::mass::Centre;
+use crate::memory;
 use crate::number::Real;
 use crate::number::vector::Vec3;
 use crate::pressure::{Cop, LoadSums};
@@ -40,7 +42,7 @@ impl StabilityTerms {
     /// same look at the samples.
     fn look<R: Real>(&self, scene: &Scene<R>, mut ground: GroundSums<R>, out: &mut [R]) -> (Centre<R>, Cop<R>, Vec<R>) {
         let heights = scene.heights();
-        let mut loads = LoadSums::new(self.stability.pressure, &heights);
+        let mut loads = LoadSums::new(self.stability.pressure, scene.template, &heights);
         let mut row = [R::zero(); CHUNK];
         for place in Points::Samples.places(scene.template) {
             place.read(&heights, &mut row);
@@ -66,6 +68,11 @@ impl Quantity for StabilityTerms {
         NUM_TERMS
     }
 
+    fn check(&self, template: &Template) -> Result<()> {
+        self.stability.check(template)?;
+        self.ground.check(template)
+    }
+
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
         self.look(scene, self.ground.sums(), out)
     }
@@ -76,7 +83,7 @@ impl Quantity for StabilityTerms {
     }
 
     fn forward_and_backward<R: Real>(&self, scene: &Scene<R>, d_out: &[R], out: &mut [R], d_points: &mut [Vec3<R>]) {
-        let mut d_heights = vec![R::zero(); scene.template.mesh.num_vertices];
+        let mut d_heights = memory::filled(R::zero(), scene.template.mesh.num_vertices);
         let ground = self.ground.sums_and_gradient(scene.template, &d_out[1..], &mut d_heights);
         let saved = self.look(scene, ground, out);
         self.stability.backward_with(scene, &saved, d_out[0], d_heights, d_points);
@@ -106,6 +113,11 @@ impl Quantity for BalanceTerms {
 
     fn len(&self, _: &Template) -> usize {
         NUM_TERMS
+    }
+
+    fn check(&self, template: &Template) -> Result<()> {
+        self.balance.check(template)?;
+        self.ground.check(template)
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {

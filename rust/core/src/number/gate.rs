@@ -27,11 +27,11 @@ pub trait Work<D> {
 pub trait Gates: Sized {
     /// The lanes of its numbers at a level, most first.
     fn widths(level: Level) -> &'static [usize];
-    /// Runs `work` on the number with `width` lanes, one of [`Gates::widths`] of the current level: the CPU has been asked
-    /// for its instructions ([`Level::is_here`]).
+    /// Runs `work` on the number with `width` lanes, one of [`Gates::widths`] of the level. Panics unless it is, and the CPU
+    /// has the level: this is the only way to the lane types, whose operations rely on its instructions.
     fn enter<W: Work<Self>>(level: Level, width: usize, work: W) -> W::Output;
     /// Runs `work` on the number with the most lanes that the level has in this format, for work on many numbers of one
-    /// body.
+    /// body. Panics unless the CPU has the level.
     fn enter_registers<W: Work<Self>>(level: Level, work: W) -> W::Output;
 }
 
@@ -59,6 +59,11 @@ impl Level {
             #[cfg(not(target_arch = "x86_64"))]
             _ => false,
         }
+    }
+
+    /// Panics on a machine without the level.
+    pub(crate) fn expect_here(self) {
+        assert!(self.is_here(), "this machine has no {}", self.name());
     }
 
     /// Those that this machine has, the best first.
@@ -99,6 +104,8 @@ impl Gates for f32 {
     }
 
     fn enter<W: Work<f32>>(level: Level, width: usize, work: W) -> W::Output {
+        level.expect_here();
+        assert!(Self::widths(level).contains(&width), "{} has no {width} lanes", level.name());
         match (level, width) {
             #[cfg(target_arch = "x86_64")]
             (_, 16) => work.run::<super::simd::F32x16>(),
@@ -123,6 +130,7 @@ impl Gates for f64 {
     }
 
     fn enter<W: Work<f64>>(level: Level, _: usize, work: W) -> W::Output {
+        level.expect_here();
         match level {
             Level::Scalar => work.run::<f64>(),
             _ => work.run::<Fused<f64>>(),
@@ -130,6 +138,7 @@ impl Gates for f64 {
     }
 
     fn enter_registers<W: Work<f64>>(level: Level, work: W) -> W::Output {
+        level.expect_here();
         match level {
             #[cfg(target_arch = "x86_64")]
             Level::Avx512 => work.run::<super::simd::F64x16>(),
@@ -158,6 +167,30 @@ pub(super) fn apart_at_current_level<F: Room<A>, A>(arguments: A) -> F::Output {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::panic::catch_unwind;
+
+    struct Nothing;
+
+    impl<D> Work<D> for Nothing {
+        type Output = usize;
+        fn run<R: Real<Data = D>>(self) -> usize {
+            R::LANES
+        }
+    }
+
+    #[test]
+    fn no_gate_opens_to_lanes_that_are_not_here() {
+        for (level, _) in Level::ALL {
+            let widths = if level.is_here() { f32::widths(level) } else { &[] };
+            for width in [0, 1, 2, 4, 8, 16, 32] {
+                let entered = catch_unwind(|| f32::enter(level, width, Nothing)).ok();
+                assert_eq!(entered, widths.contains(&width).then_some(width), "{level:?}, {width} lanes");
+            }
+            assert_eq!(catch_unwind(|| f32::enter_registers(level, Nothing)).is_ok(), level.is_here());
+            assert_eq!(catch_unwind(|| f64::enter_registers(level, Nothing)).is_ok(), level.is_here());
+            assert_eq!(catch_unwind(|| f64::enter(level, 1, Nothing)).is_ok(), level.is_here());
+        }
+    }
 
     #[test]
     fn the_environment_chooses_among_what_is_there() {

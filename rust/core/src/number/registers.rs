@@ -1,8 +1,8 @@
 //! What lane types are made of on every CPU: registers of one or two parts, with an intrinsic for each operation.
 //!
 //! A CPU's own file (`simd`, `neon`) names its intrinsics, and these macros write its types. Their
-//! operations may run only behind a gate ([`super::gate`]) of their CPU level, which the gate has made sure of: that is the
-//! SAFETY of every `unsafe` in these files. The crossings between single and double precision are kept out of line, so
+//! operations may run only behind a gate ([`super::gate`]), which has asked the CPU for their level and is the only way to
+//! these types: what is called *behind the gate* in these files. The crossings between single and double precision are kept out of line, so
 //! that sums in double precision do not take registers from the loops around them.
 
 // What the macros' text names: their users take all of this file.
@@ -17,6 +17,7 @@ macro_rules! operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
+                // SAFETY: behind the gate.
                 $name($(unsafe { $intrinsics::$method(self.$part, other.$part) }),+)
             }
         }
@@ -36,6 +37,7 @@ macro_rules! lanes {
         impl $name {
             #[inline(always)]
             fn array(self) -> [$float; $lanes] {
+                // SAFETY: a lane type is its registers in a row (repr(C)), as long as the array, and every bit pattern is a number.
                 unsafe { std::mem::transmute(self) }
             }
         }
@@ -49,6 +51,7 @@ macro_rules! lanes {
             type Output = Self;
             #[inline(always)]
             fn neg(self) -> Self {
+                // SAFETY: behind the gate.
                 $name($(unsafe { $intrinsics::sub($intrinsics::splat(-0.0), self.$part) }),+)
             }
         }
@@ -59,6 +62,7 @@ macro_rules! lanes {
             const POWERS: &'static [f64] = <$float as Format>::POWERS;
             #[inline(always)]
             fn low_bits_as_power(self) -> Self {
+                // SAFETY: behind the gate.
                 $name($(unsafe { $intrinsics::low_bits_as_power(self.$part) }),+)
             }
         }
@@ -74,39 +78,48 @@ macro_rules! arithmetic {
 
         #[inline(always)]
         fn of(value: f64) -> Self {
+            // SAFETY: behind the gate.
             $name($(unsafe { splat_part!($intrinsics, value as $float, $part) }),+)
         }
         #[inline(always)]
         fn splat(number: $float) -> Self {
+            // SAFETY: behind the gate.
             $name($(unsafe { splat_part!($intrinsics, number, $part) }),+)
         }
         #[inline(always)]
         fn mul_add(self, factor: Self, term: Self) -> Self {
+            // SAFETY: behind the gate.
             $name($(unsafe { $intrinsics::fmadd(self.$part, factor.$part, term.$part) }),+)
         }
         #[inline(always)]
         fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+            // SAFETY: behind the gate.
             $name($(unsafe { $intrinsics::fnmadd(self.$part, factor.$part, term.$part) }),+)
         }
         #[inline(always)]
         fn if_negative(self, below: Self, otherwise: Self) -> Self {
+            // SAFETY: behind the gate.
             $name($(unsafe { $intrinsics::if_negative(self.$part, below.$part, otherwise.$part) }),+)
         }
         #[inline(always)]
         fn negative(self) -> u32 {
+            // SAFETY: behind the gate.
             0 $(| (unsafe { $intrinsics::negative(self.$part) } << ($part * $intrinsics::LANES)))+
         }
         // The instructions give their second operand where the first is NaN.
         #[inline(always)]
         fn at_least(self, floor: Self) -> Self {
+            // SAFETY: behind the gate.
             $name($(unsafe { $intrinsics::max(floor.$part, self.$part) }),+)
         }
         #[inline(always)]
         fn at_most(self, ceiling: Self) -> Self {
+            // SAFETY: behind the gate.
             $name($(unsafe { $intrinsics::min(ceiling.$part, self.$part) }),+)
         }
         #[inline(always)]
         fn sqrt(self) -> Self {
+            // SAFETY: behind the gate.
             $name($(unsafe { $intrinsics::sqrt(self.$part) }),+)
         }
         #[inline(always)]
@@ -140,6 +153,7 @@ macro_rules! arithmetic {
             for (l, number) in numbers.iter_mut().enumerate() {
                 *number = lane(l).0;
             }
+            // SAFETY: a lane type is its registers in a row (repr(C)), as long as the array, and every bit pattern is a number.
             unsafe { std::mem::transmute(numbers) }
         }
     };
@@ -157,6 +171,7 @@ macro_rules! double {
             type Wide = Self;
             #[inline(always)]
             fn apart<F: Room<A>, A>(arguments: A) -> F::Output {
+                // SAFETY: behind the gate.
                 unsafe { $apart::<F, A>(arguments) }
             }
             #[inline(always)]
@@ -183,30 +198,37 @@ macro_rules! single {
             type Wide = $wide;
             #[inline(always)]
             fn apart<F: Room<A>, A>(arguments: A) -> F::Output {
+                // SAFETY: behind the gate.
                 unsafe { $apart::<F, A>(arguments) }
             }
             #[inline(always)]
             fn widen(self) -> $wide {
+                // SAFETY: behind the gate.
                 unsafe { $border::widen(self) }
             }
             #[inline(always)]
             fn widen_in_line(self) -> $wide {
+                // SAFETY: behind the gate.
                 unsafe { $border::widen_in_line(self) }
             }
             #[inline(always)]
             fn narrow(wide: $wide) -> Self {
+                // SAFETY: behind the gate.
                 unsafe { $border::narrow(wide) }
             }
             #[inline(always)]
             fn add_to(self, sum: &mut $wide) {
+                // SAFETY: behind the gate.
                 unsafe { $border::add_to(self, sum) }
             }
             #[inline(always)]
             fn read_rows(rows: &[&[f32]], origin: &[[f32; 3]], out: &mut [MaybeUninit<Self>]) {
+                // SAFETY: behind the gate.
                 unsafe { $border::read_rows(rows, origin, out) }
             }
             #[inline(always)]
             fn write_rows(numbers: &[Self], rows: &mut [&mut [f32]]) {
+                // SAFETY: behind the gate.
                 unsafe { $border::write_rows(numbers, rows) }
             }
         }
@@ -233,7 +255,7 @@ pub(super) fn read_squares<S: Square, const N: usize>(
     for start in (0..whole).step_by(N) {
         let mut block = [S::zero(); N];
         for (number, row) in block.iter_mut().zip(rows) {
-            // start + N ≤ out.len() = row.len()
+            // SAFETY: behind the gate; start + N ≤ out.len() = row.len().
             *number = unsafe { S::load(row.as_ptr().add(start)) };
         }
         S::turn(&mut block);
@@ -257,7 +279,7 @@ pub(super) fn write_squares<S: Square, const N: usize>(numbers: &[S], rows: &mut
         }
         S::turn(&mut block);
         for (number, row) in block.iter().zip(rows.iter_mut()) {
-            // start + N ≤ numbers.len() = row.len()
+            // SAFETY: behind the gate; start + N ≤ numbers.len() = row.len().
             unsafe { number.store(row.as_mut_ptr().add(start)) };
         }
     }

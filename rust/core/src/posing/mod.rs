@@ -4,6 +4,7 @@
 mod passes;
 
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::number::gate::{Level, Work};
 use crate::number::{Data, Dual, Real, Scalar, all_finite};
 use crate::skinning::blend::Tile;
@@ -82,33 +83,29 @@ impl<'a, T: Data> Posing<'a, T> {
 
     /// Vertices (B, V, 3) and joints (B, J, 3).
     pub fn forward(&self, vertices: &mut [T], joints: &mut [T]) -> Result<()> {
-        T::enter_registers(self.level, Pose { posing: self, vertices, joints })
+        memory::guarded(|| T::enter_registers(self.level, Pose { posing: self, vertices, joints }))
     }
 
     /// Their derivatives along a direction.
     pub fn jvp(&self, along: &Bodies<T>, vertices: &mut [T], joints: &mut [T]) -> Result<()> {
         self.check_direction(along)?;
         let slope = |x: Dual| if x.slope.is_finite() { T::of(x.slope) } else { T::zero() };
-        self.write::<Dual>(self.skin.start(), |body| self.dual(body, along), slope, vertices, joints)
+        memory::guarded(|| {
+            self.write::<Dual>(self.skin.start(), |body| self.dual(body, along), slope, vertices, joints)
+        })
     }
 
     /// The gradient of Σ d_vertices · vertices + Σ d_joints · joints.
     pub fn vjp(&self, upstream: Upstream<T>, gradients: Gradients<T>) -> Result<()> {
-        T::enter_registers(self.level, Pull { posing: self, upstream, gradients })
+        memory::guarded(|| T::enter_registers(self.level, Pull { posing: self, upstream, gradients }))
     }
 
     /// The derivative of that gradient along a direction.
     pub fn vjp_jvp(&self, upstream: Upstream<T>, along: &Bodies<T>, gradients: Gradients<T>) -> Result<()> {
         self.check_direction(along)?;
         let parameters = |body| self.dual(body, along);
-        self.pull::<Dual>(
-            self.skin.start(),
-            parameters,
-            |x| Dual::of(x.value()),
-            |x| T::of(x.slope),
-            upstream,
-            gradients,
-        )
+        let (constant, number) = (|x: T| Dual::of(x.value()), |x: Dual| T::of(x.slope));
+        memory::guarded(|| self.pull::<Dual>(self.skin.start(), parameters, constant, number, upstream, gradients))
     }
 
     /// Numbers of [`Posing::jacobian`] a body.
@@ -126,7 +123,8 @@ impl<'a, T: Data> Posing<'a, T> {
         }
         check("jacobian", out.len(), self.num_bodies * self.jacobian_width())?;
         let numbers = |rows: Rows<T>, body: usize| rows.of(body).iter().map(|x| x.value()).collect::<Vec<f64>>();
-        let rows: Vec<_> = out.chunks_exact_mut(self.jacobian_width().max(1)).enumerate().collect();
+        let rows = out.chunks_exact_mut(self.jacobian_width().max(1)).enumerate();
+        let rows = memory::guarded(|| Ok(memory::collect(rows)))?;
         threads::each(rows, true, self.interrupted, &|(body, row)| {
             let placed = self.skin.place(Parameters {
                 form: self.form,
@@ -286,7 +284,7 @@ impl<'a, T: Data> Posing<'a, T> {
     fn groups<P>(&self, mut share: impl FnMut(Range<usize>) -> P) -> Vec<P> {
         let size = self.num_bodies.div_ceil(num_threads()).clamp(1, GROUP);
         let starts = (0..self.num_bodies).step_by(size);
-        starts.map(|start| share(start..(start + size).min(self.num_bodies))).collect()
+        memory::collect(starts.map(|start| share(start..(start + size).min(self.num_bodies))))
     }
 
     fn run<P: Send>(&self, groups: Vec<P>, work: impl Fn(P) + Sync) -> Result<()> {

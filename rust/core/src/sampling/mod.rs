@@ -12,6 +12,7 @@ pub use points::{Place, Points};
 pub use walk::{CHUNK, Chunk, Row, SUMS, Walk, fold, sum_row};
 
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::number::vector::{Vec3, add_scaled, add_to, cross, dot, narrow, sub, widen};
 use crate::number::{BLOCK, Data, Real, Room, Scalar, WideScalar};
@@ -46,7 +47,7 @@ pub struct Weights {
 
 impl Weights {
     pub fn new(double: Vec<f64>) -> Self {
-        Weights { single: double.iter().map(|&weight| weight as f32).collect(), double }
+        Weights { single: memory::collect(double.iter().map(|&weight| weight as f32)), double }
     }
 
     #[inline(always)]
@@ -68,14 +69,14 @@ impl Samples {
         if num_samples == 0 || num_samples > MAX_SAMPLES {
             return Err(Error::SampleCount { got: num_samples, limit: MAX_SAMPLES });
         }
-        let picks = pick(&areas(mesh, vertices), num_samples, seed);
-        let faces: Vec<u32> = picks.iter().map(|pick| pick.0).collect();
-        let barycentric: Vec<_> = picks.iter().map(|pick| pick.1).collect();
-        let corners: Vec<_> = faces.iter().map(|&face| mesh.faces[face as usize]).collect();
-        let parts: Vec<_> = faces.iter().map(|&face| mesh.face_parts[face as usize]).collect();
-        let part_sums = part_sums(mesh, &parts, &corners, &barycentric);
-        let walk = Walk::new(&faces, &corners, &barycentric);
-        Ok(Samples { faces, corners, barycentric, parts, part_sums, walk })
+        memory::guarded(|| {
+            let (faces, barycentric) = pick(&areas(mesh, vertices), num_samples, seed);
+            let corners = memory::collect(faces.iter().map(|&face| mesh.faces[face as usize]));
+            let parts = memory::collect(faces.iter().map(|&face| mesh.face_parts[face as usize]));
+            let part_sums = part_sums(mesh, &parts, &corners, &barycentric);
+            let walk = Walk::new(&faces, &corners, &barycentric);
+            Ok(Samples { faces, corners, barycentric, parts, part_sums, walk })
+        })
     }
 
     pub fn len(&self) -> usize {
@@ -138,7 +139,7 @@ fn areas(mesh: &Mesh, vertices: &[Vec3<f64>]) -> Vec<f64> {
         let normal = cross(sub(b, a), sub(c, a));
         dot(normal, normal).sqrt() / 2.0
     };
-    mesh.faces.iter().map(area).collect()
+    memory::collect(mesh.faces.iter().map(area))
 }
 
 /// A uniform number in [0, 1) from the generator's 53 highest bits, the same on every machine.
@@ -147,36 +148,38 @@ fn uniform(random: &mut ChaCha8Rng) -> f64 {
 }
 
 /// Faces by cumulated area, then a uniform point in the triangle: (1−√r, √r(1−s), √r s).
-fn pick(areas: &[f64], num_samples: usize, seed: u64) -> Vec<(u32, [f64; 3])> {
-    let mut cumulated = Vec::with_capacity(areas.len());
+fn pick(areas: &[f64], num_samples: usize, seed: u64) -> (Vec<u32>, Vec<[f64; 3]>) {
+    let mut cumulated = memory::with_capacity(areas.len());
     let mut total = 0.0;
     for area in areas {
         total += area;
         cumulated.push(total);
     }
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut picks: Vec<(u32, [f64; 3])> = (0..num_samples)
-        .map(|_| {
-            let target = uniform(&mut random) * total;
-            let face = cumulated.partition_point(|&sum| sum <= target).min(areas.len() - 1);
-            let (root, s) = (uniform(&mut random).sqrt(), uniform(&mut random));
-            (face as u32, [1.0 - root, root * (1.0 - s), root * s])
-        })
-        .collect();
-    // By face, so that a pass walks the vertices in order. The sort is stable: the order is part of the seed's meaning.
-    picks.sort_by_key(|pick| pick.0);
-    picks
+    let mut picks = memory::with_capacity(num_samples);
+    let mut points = memory::with_capacity(num_samples);
+    for pick in 0..num_samples {
+        let target = uniform(&mut random) * total;
+        let face = cumulated.partition_point(|&sum| sum <= target).min(areas.len() - 1);
+        let (root, s) = (uniform(&mut random).sqrt(), uniform(&mut random));
+        picks.push((face as u32, pick as u32));
+        points.push([1.0 - root, root * (1.0 - s), root * s]);
+    }
+    // By face, so that a pass walks the vertices in order; then as they were picked: the order is part of the seed's meaning.
+    picks.sort_unstable();
+    let barycentric = memory::collect(picks.iter().map(|&(_, pick)| points[pick as usize]));
+    (memory::collect(picks.iter().map(|&(face, _)| face)), barycentric)
 }
 
 fn part_sums(mesh: &Mesh, parts: &[u32], corners: &[[u32; 3]], barycentric: &[[f64; 3]]) -> Vec<PartSum> {
-    let mut members = vec![Vec::new(); mesh.num_parts];
+    let mut members = memory::filled(Vec::new(), mesh.num_parts);
     for (sample, &part) in parts.iter().enumerate() {
-        members[part as usize].push(sample);
+        memory::push(&mut members[part as usize], sample);
     }
-    let mut sums = vec![PartSum::default(); mesh.num_parts];
-    let mut weight_of = vec![0.0; mesh.num_vertices];
+    let mut sums = memory::filled(PartSum::default(), mesh.num_parts);
+    let mut weight_of = memory::filled(0.0, mesh.num_vertices);
     for (sum, members) in sums.iter_mut().zip(members) {
-        let mut touched = Vec::new();
+        let mut touched = memory::with_capacity(3 * members.len());
         sum.count = members.len();
         for sample in members {
             for (&corner, &weight) in corners[sample].iter().zip(&barycentric[sample]) {
@@ -186,9 +189,9 @@ fn part_sums(mesh: &Mesh, parts: &[u32], corners: &[[u32; 3]], barycentric: &[[f
         }
         touched.sort_unstable();
         touched.dedup();
-        sum.weights =
-            Weights::new(touched.iter().map(|&vertex| std::mem::take(&mut weight_of[vertex as usize])).collect());
-        sum.vertices = touched;
+        let weights = touched.iter().map(|&vertex| std::mem::take(&mut weight_of[vertex as usize]));
+        sum.weights = Weights::new(memory::collect(weights));
+        sum.vertices = memory::copied(&touched);
     }
     sums
 }
@@ -201,6 +204,10 @@ impl Quantity for SampleSurface {
 
     fn len(&self, template: &Template) -> usize {
         3 * template.samples.len()
+    }
+
+    fn check(&self, _: &Template) -> Result<()> {
+        Ok(())
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) {

@@ -2,6 +2,7 @@
 
 use super::walk::{CHUNK, Chunk, Row, Walk};
 use crate::error::Result;
+use crate::memory;
 use crate::number::Real;
 use crate::quantity::unknown_choice;
 use crate::template::Template;
@@ -41,9 +42,10 @@ impl Points {
         let walk = &template.samples.walk;
         let count = template.mesh.num_vertices;
         match self {
-            Points::Samples => walk.chunks.iter().map(|chunk| Place::Samples(walk, chunk)).collect(),
+            Points::Samples => memory::collect(walk.chunks.iter().map(|chunk| Place::Samples(walk, chunk))),
             Points::Vertices => {
-                (0..count).step_by(CHUNK).map(|start| Place::Vertices(start..count.min(start + CHUNK))).collect()
+                let place = |start| Place::Vertices(start..count.min(start + CHUNK));
+                memory::collect((0..count).step_by(CHUNK).map(place))
             }
         }
     }

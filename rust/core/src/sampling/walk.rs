@@ -1,6 +1,7 @@
 //! The walk: the order in which passes visit the samples, and how numbers go from vertices to samples and back.
 
 use super::Weights;
+use crate::memory;
 use crate::number::{Data, Real, Room};
 use std::ops::Range;
 
@@ -35,23 +36,25 @@ const GROUP: usize = 8;
 
 impl Walk {
     pub(super) fn new(faces: &[u32], corners: &[[u32; 3]], barycentric: &[[f64; 3]]) -> Self {
-        let samples: Vec<u32> = (0..faces.len() as u32).collect();
+        let samples = memory::collect(0..faces.len() as u32);
         let same_face = |a: &u32, b: &u32| faces[*a as usize] == faces[*b as usize];
-        let mut groups: Vec<&[u32]> = samples.chunk_by(same_face).flat_map(|face| face.chunks(GROUP)).collect();
-        groups.sort_by_key(|group| group.len());
-        let mut walk = Walk::default();
-        for run in groups.chunk_by(|a, b| a.len() == b.len()) {
-            for chunk in run.chunks(CHUNK / run[0].len()) {
-                let (first_sample, first_group) = (walk.order.len(), walk.corners.len());
-                for group in chunk {
-                    walk.order.extend_from_slice(group);
-                    walk.corners.push(corners[group[0] as usize]);
+        let mut walk = Walk { order: memory::with_capacity(samples.len()), ..Walk::default() };
+        for size in 1..=GROUP {
+            let groups = samples.chunk_by(same_face).flat_map(|face| face.chunks(GROUP));
+            for (i, group) in groups.filter(|group| group.len() == size).enumerate() {
+                let (sample, place) = (walk.order.len(), walk.corners.len());
+                if i.is_multiple_of(CHUNK / size) {
+                    memory::push(&mut walk.chunks, Chunk { samples: sample..sample, groups: place..place });
                 }
-                let (samples, groups) = (first_sample..walk.order.len(), first_group..walk.corners.len());
-                walk.chunks.push(Chunk { samples, groups });
+                walk.order.extend_from_slice(group);
+                memory::push(&mut walk.corners, corners[group[0] as usize]);
+                let chunk = walk.chunks.last_mut().expect("one was begun");
+                (chunk.samples.end, chunk.groups.end) = (sample + size, place + 1);
             }
         }
-        walk.weights = Weights::new(walk.order.iter().flat_map(|&sample| barycentric[sample as usize]).collect());
+        let mut weights = memory::with_capacity(3 * samples.len());
+        weights.extend(walk.order.iter().flat_map(|&sample| barycentric[sample as usize]));
+        walk.weights = Weights::new(weights);
         walk
     }
 

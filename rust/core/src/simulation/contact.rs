@@ -1,6 +1,9 @@
 //! What of a body can touch a plane: the corners of its convex hull, or those of the hulls of its convex decomposition.
 
+use crate::error::{Error, Result};
+use crate::memory;
 use crate::number::vector::Vec3;
+use crate::threads::num_threads;
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::parry::transformation::try_convex_hull;
 use rapier3d_f64::parry::transformation::vhacd::{VHACD, VHACDParameters};
@@ -16,12 +19,23 @@ pub enum Shape {
 }
 
 impl Shape {
+    pub fn check(&self) -> Result<()> {
+        match self {
+            Shape::Decomposition { resolution, .. } if !(2..=1024).contains(resolution) => {
+                let (expected, got) = ("2 to 1024".into(), resolution.to_string());
+                Err(Error::Argument { name: "resolution", expected, got })
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// The points that can touch a plane. None where there is no hull.
     pub fn touching(&self, points: &[Vec3<f64>]) -> Option<Vec<Vec3<f64>>> {
-        let points: Vec<Vector> = points.iter().map(|&[x, y, z]| Vector::new(x, y, z)).collect();
+        let points = memory::collect(points.iter().map(|&[x, y, z]| Vector::new(x, y, z)));
         let corners = match self {
             Shape::Hull => corners(&points)?,
             Shape::Decomposition { resolution, faces } => {
+                memory::ask(VOXEL_BYTES * (*resolution as usize).pow(3) * num_threads());
                 let parameters = VHACDParameters { resolution: *resolution, ..VHACDParameters::default() };
                 let parts = VHACD::decompose(&parameters, &points, faces, false);
                 let hulls = parts.compute_convex_hulls(parameters.convex_hull_downsampling);
@@ -33,6 +47,11 @@ impl Shape {
     }
 }
 
+/// What the engine's voxels and hulls take at most, bytes each: it does not ask for them, and every thread may be there.
+const VOXEL_BYTES: usize = 32;
+const HULL_BYTES: usize = 512;
+
 fn corners(points: &[Vector]) -> Option<Vec<Vector>> {
+    memory::ask(HULL_BYTES * points.len() * num_threads());
     try_convex_hull(points).ok().map(|(corners, _)| corners).filter(|corners| corners.len() >= 4)
 }

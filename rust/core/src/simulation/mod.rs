@@ -9,13 +9,14 @@ mod world;
 
 use crate::batch::Batch;
 use crate::error::{Error, Result, status};
+use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, dot};
 use crate::number::{Data, all_finite};
+use crate::options::{not_negative, positive};
 use crate::solid::Solid;
 use crate::threads;
 use crate::volume::MassProperties;
 use contact::Shape;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// How bodies are put on their ground and let go.
 pub struct Simulation {
@@ -60,15 +61,10 @@ impl Place {
 impl Simulation {
     /// An error names the number that is out of range.
     pub fn check(&self) -> Result<()> {
-        let positive = |name, value: f64| match value > 0.0 && value.is_finite() {
-            true => Ok(()),
-            false => Err(Error::Argument { name, expected: "a positive number".into(), got: value.to_string() }),
-        };
+        positive("contact", self.contact)?;
         positive("step", self.step)?;
-        if !(self.friction >= 0.0 && self.friction.is_finite()) {
-            let got = self.friction.to_string();
-            return Err(Error::Argument { name: "friction", expected: "zero or more".into(), got });
-        }
+        not_negative("friction", self.friction)?;
+        self.shape.check()?;
         if !self.looks.is_sorted() {
             let got = format!("{:?}", self.looks);
             return Err(Error::Argument { name: "looks", expected: "ascending steps".into(), got });
@@ -77,12 +73,12 @@ impl Simulation {
     }
 
     fn unknown(&self, status: u32) -> Motion {
-        Motion { status, places: vec![Place::nowhere(); 1 + self.looks.len()] }
+        Motion { status, places: memory::filled(Place::nowhere(), 1 + self.looks.len()) }
     }
 
     /// Whatever the engine may do to one body, the others must not notice.
     fn run(&self, solid: &Solid, normal: Vec3<f64>, height: f64, points: impl FnOnce() -> Vec<Vec3<f64>>) -> Motion {
-        let places = catch_unwind(AssertUnwindSafe(|| {
+        let places = memory::isolated(|| {
             let points = self.shape.touching(&points())?;
             let depth = points.iter().map(|point| -dot(normal, *point)).fold(f64::NEG_INFINITY, f64::max);
             let mut centre = solid.centre;
@@ -94,9 +90,9 @@ impl Simulation {
             let mut places = vec![Place::at(centre)];
             places.extend(fall.run(centre, &self.looks)?);
             Some(places)
-        }));
+        });
         match places {
-            Ok(Some(places)) => Motion { status: solid.status, places },
+            Some(Some(places)) => Motion { status: solid.status, places },
             _ => self.unknown(solid.status | status::NOT_SIMULATED),
         }
     }
@@ -108,29 +104,34 @@ impl<T: Data> Batch<'_, T> {
     pub fn simulate(&self, simulation: &Simulation) -> Result<Vec<Motion>> {
         simulation.check()?;
         let solids = self.solids(&simulation.densities, simulation.contact)?;
-        let mut motions: Vec<Motion> = solids.iter().map(|solid| simulation.unknown(solid.status)).collect();
-        let starts = |solid: &Solid| solid.is_grounded() || (solid.is_solid() && !simulation.snap);
-        let bodies = solids.iter().zip(&mut motions).enumerate().filter(|(_, (solid, _))| starts(solid)).collect();
-        threads::each(bodies, true, self.interrupted(), &|(body, (solid, motion))| {
-            let ground = self.ground_of(body);
-            let offset = |vertex: &[T; 3]| std::array::from_fn(|k| vertex[k].value() - solid.centre[k]);
-            let points = || self.vertices_of(body).as_chunks::<3>().0.iter().map(offset).collect();
-            *motion = simulation.run(solid, ground.normal, ground.height, points);
-        })?;
-        Ok(motions)
+        memory::guarded(|| {
+            let mut motions = memory::collect(solids.iter().map(|solid| simulation.unknown(solid.status)));
+            let starts = |solid: &Solid| solid.is_grounded() || (solid.is_solid() && !simulation.snap);
+            let bodies = solids.iter().zip(&mut motions).enumerate().filter(|(_, (solid, _))| starts(solid));
+            threads::each(memory::collect(bodies), true, self.interrupted(), &|(body, (solid, motion))| {
+                let ground = self.ground_of(body);
+                let offset = |vertex: &[T; 3]| std::array::from_fn(|k| vertex[k].value() - solid.centre[k]);
+                let points = || memory::collect(self.vertices_of(body).as_chunks::<3>().0.iter().map(offset));
+                *motion = simulation.run(solid, ground.normal, ground.height, points);
+            })?;
+            Ok(motions)
+        })
     }
 
     /// The points of each body that can touch a plane, in the world; none for a body that is not finite or has no hull.
     pub fn touching(&self, shape: &Shape) -> Result<Vec<Vec<Vec3<f64>>>> {
-        let mut found = vec![Vec::new(); self.len()];
-        threads::each(found.iter_mut().enumerate().collect(), true, self.interrupted(), &|(body, found)| {
-            if all_finite(self.vertices_of(body)) {
-                let point = |vertex: &[T; 3]| std::array::from_fn(|k| vertex[k].value());
-                let points: Vec<Vec3<f64>> = self.vertices_of(body).as_chunks::<3>().0.iter().map(point).collect();
-                let touching = catch_unwind(AssertUnwindSafe(|| shape.touching(&points)));
-                *found = touching.ok().flatten().unwrap_or_default();
-            }
-        })?;
-        Ok(found)
+        shape.check()?;
+        memory::guarded(|| {
+            let mut found = memory::filled(Vec::new(), self.len());
+            let bodies = memory::collect(found.iter_mut().enumerate());
+            threads::each(bodies, true, self.interrupted(), &|(body, found)| {
+                if all_finite(self.vertices_of(body)) {
+                    let point = |vertex: &[T; 3]| std::array::from_fn(|k| vertex[k].value());
+                    let points = memory::collect(self.vertices_of(body).as_chunks::<3>().0.iter().map(point));
+                    *found = memory::isolated(|| shape.touching(&points)).flatten().unwrap_or_default();
+                }
+            })?;
+            Ok(found)
+        })
     }
 }

@@ -3,6 +3,7 @@
 //! Vertices come in tiles of W, x, y and z apart, so that a loop over a tile fills vector registers. The sums of N bodies
 //! stay in registers while a tile's directions stream past once.
 
+use crate::memory;
 use crate::number::{Real, Scalar};
 
 /// A number of W vertices each, from the start of a cache line: a register of them is never read from two lines.
@@ -30,7 +31,7 @@ pub fn tiles<C: Scalar, const W: usize>(numbers: &[f64]) -> Vec<Tile<C, W>> {
         // −0 + 0 is 0: adding a direction zero times must change no bit.
         std::array::from_fn(|axis| Row(std::array::from_fn(|i| C::of(points.get(i).map_or(0.0, |p| p[axis] + 0.0)))))
     };
-    points.chunks(W).map(tile).collect()
+    memory::collect(points.chunks(W).map(tile))
 }
 
 /// K directions of a set of points.
@@ -47,7 +48,7 @@ impl<C: Scalar, const W: usize> Blend<C, W> {
         let number = |vertex: usize, axis: usize, k: usize| {
             C::of(if vertex < num_vertices { numbers[(3 * vertex + axis) * count + k] } else { 0.0 })
         };
-        let mut directions = Vec::with_capacity(num_tiles * count);
+        let mut directions = memory::with_capacity(num_tiles * count);
         for tile in 0..num_tiles {
             for k in 0..count {
                 directions

@@ -12,6 +12,7 @@
 use super::chain::apply;
 use super::rotation::Form;
 use super::{Body, Mat3, Skin};
+use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, cross, scale, sub, zero};
 use crate::number::{Dual, Scalar};
 
@@ -28,8 +29,11 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
     /// (P, V + J) derivatives, P = 3 J + the number of betas: by the rotation vectors, then by the betas. That by the
     /// translation is the identity for every point. The rotations must be vectors.
     pub fn jacobian(&self, body: &Body<f64>) -> Vec<Vec3<f64>> {
-        let vertices: Vec<Held> = (0..self.num_vertices).map(|vertex| self.held(vertex, body)).collect();
-        let mut rows = Vec::new();
+        let (points, joints) = (self.num_vertices + self.num_joints(), self.num_joints());
+        // Of each vertex what its joints carry, in small pieces.
+        memory::ask(self.num_vertices * joints * size_of::<(Vec3<f64>, f64)>());
+        let vertices = memory::collect((0..self.num_vertices).map(|vertex| self.held(vertex, body)));
+        let mut rows = memory::with_capacity((3 * joints + body.parameters.betas.len()) * points);
         for joint in 0..self.num_joints() {
             for axis in 0..3 {
                 self.by_rotation(body, &vertices, joint, axis, &mut rows);

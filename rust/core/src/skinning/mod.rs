@@ -14,6 +14,7 @@ pub mod rotation;
 pub mod weights;
 
 use crate::error::Result;
+use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, narrow, of, sub, widen};
 use crate::number::{Real, Scalar};
 use blend::{Blend, Registers, Tile, all, load, tiles};
@@ -131,21 +132,23 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
     pub fn new(model: &Model) -> Result<Self> {
         let (num_betas, num_expressions) = model.check()?;
         let (num_vertices, num_joints) = (model.v_template.len() / 3, model.parents.len());
-        let triples = |numbers: &[f64]| numbers.as_chunks::<3>().0.to_vec();
+        let triples = |numbers: &[f64]| memory::copied(numbers.as_chunks::<3>().0);
         let directions = |surface, joints: &[f64], len| Directions {
             surface: Blend::new(num_vertices, surface, len),
-            joints: joints.to_vec(),
+            joints: memory::copied(joints),
         };
-        Ok(Skin {
-            num_vertices,
-            skeleton: Skeleton::new(model.parents, triples(model.rest_rotation).as_chunks::<3>().0.to_vec())?,
-            template: tiles(model.v_template),
-            betas: directions(model.shapedirs, model.joint_shapes, num_betas),
-            expression: directions(model.expressiondirs, model.joint_expressions, num_expressions),
-            pose: Blend::new(num_vertices, model.posedirs, model.posedirs.len() / (3 * num_vertices)),
-            joints: triples(model.joints),
-            pose_mean: triples(model.pose_mean),
-            weights: Weights::new(model.weights, num_joints),
+        memory::guarded(|| {
+            Ok(Skin {
+                num_vertices,
+                skeleton: Skeleton::new(model.parents, triples(model.rest_rotation).as_chunks::<3>().0.to_vec())?,
+                template: tiles(model.v_template),
+                betas: directions(model.shapedirs, model.joint_shapes, num_betas),
+                expression: directions(model.expressiondirs, model.joint_expressions, num_expressions),
+                pose: Blend::new(num_vertices, model.posedirs, model.posedirs.len() / (3 * num_vertices)),
+                joints: triples(model.joints),
+                pose_mean: triples(model.pose_mean),
+                weights: Weights::new(model.weights, num_joints),
+            })
         })
     }
 
@@ -177,7 +180,7 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
         expression: &[V::Scalar],
     ) -> Vec<Tile<C, W>> {
         let (betas, expression) = (betas.as_chunks::<1>().0, expression.as_chunks::<1>().0);
-        let mut shaped = self.template.clone();
+        let mut shaped = memory::copied(&self.template);
         for (tile, points) in shaped.iter_mut().enumerate() {
             let [displacement]: [Registers<V, P>; 1] = self.shape(tile, betas, expression);
             let rest = plus(constants(points), displacement);

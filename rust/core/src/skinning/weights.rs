@@ -1,6 +1,7 @@
 //! Skinning weights: each vertex follows a few joints, and neighbours mostly follow the same ones.
 
 use super::blend::{Registers, Row, all, load};
+use crate::memory;
 use crate::number::{Real, Scalar};
 
 /// A joint's rigid motion: rows (rotation, offset) of a 3 × 4 matrix.
@@ -22,11 +23,11 @@ impl<C: Scalar, const W: usize> Weights<C, W> {
                 let column: [f64; W] =
                     std::array::from_fn(|i| rows.get(i * num_joints + joint).copied().unwrap_or_default());
                 if column.iter().any(|&weight| weight != 0.0) {
-                    table.joints.push(joint);
-                    table.weights.push(Row(column.map(C::of)));
+                    memory::push(&mut table.joints, joint);
+                    memory::push(&mut table.weights, Row(column.map(C::of)));
                 }
             }
-            table.starts.push(table.joints.len());
+            memory::push(&mut table.starts, table.joints.len());
         }
         table
     }

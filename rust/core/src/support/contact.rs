@@ -3,7 +3,9 @@
 
 use crate::error::Result;
 use crate::ground::Plane;
+use crate::memory;
 use crate::number::{Data, Real, Room, Scalar, WideScalar};
+use crate::options::positive;
 use crate::quantity::unknown_choice;
 use crate::scene::Scene;
 
@@ -65,6 +67,10 @@ pub(super) struct Touch<R> {
 }
 
 impl Contact {
+    pub fn check(&self) -> Result<()> {
+        positive("threshold", self.threshold)
+    }
+
     pub fn find<R: Real>(&self, scene: &Scene<R>) -> Contacts<R> {
         R::apart::<Find, _>((self, scene))
     }
@@ -129,7 +135,7 @@ impl<R: Real> Room<(&Contact, &Scene<'_, R>)> for Find {
                         count = count + test.if_negative(R::of(1.0), R::zero());
                         let x = w.mul_add(edges_x.1, v.mul_add(edges_x.0, flat_a[0]));
                         let y = w.mul_add(edges_y.1, v.mul_add(edges_y.0, flat_a[1]));
-                        touches.push(Touch { sample: walk.order[place], lanes, test, flat: [x, y] });
+                        memory::push(&mut touches, Touch { sample: walk.order[place], lanes, test, flat: [x, y] });
                     }
                 }
             }
@@ -154,7 +160,7 @@ fn rounding<R: Real>(scene: &Scene<R>, threshold: f64) -> R {
 /// For each vertex the lanes in which it certainly lies above contact: a face with three such vertices has no contacts.
 #[inline(always)]
 fn lanes_above<R: Real>(heights: &[R], high: R) -> Vec<u32> {
-    let mut above = Vec::with_capacity(heights.len());
+    let mut above = memory::with_capacity(heights.len());
     for &height in heights {
         above.push((high - height).negative());
     }
@@ -176,7 +182,7 @@ impl<R: Real> Contacts<R> {
         }
         let body = OneBody::new(scene, lane);
         let touches = self.touches.iter().filter(|touch| touch.lanes >> lane & 1 == 1);
-        touches.map(|touch| body.flat(touch.sample)).collect()
+        memory::collect(touches.map(|touch| body.flat(touch.sample)))
     }
 }
 

@@ -1,6 +1,7 @@
 //! The hull of the contacts, on lanes as far as it goes: what lies inside the polygon of the contacts that are extreme in
 //! some directions (after Akl and Toussaint) cannot be a corner. What is left is for the exact hull.
 
+use crate::memory;
 use crate::number::{Real, Room, Scalar};
 use crate::scene::Scene;
 use crate::support::contact::{Contacts, OneBody};
@@ -96,7 +97,7 @@ fn lane_edges<R: Real>(
     let nowhere = [[0.0, 0.0, -1.0]; DIRECTIONS];
     let rounding = contacts.rounding.lane(lane).value();
     let body = OneBody::new(scene, lane);
-    let mut points = Vec::with_capacity(DIRECTIONS);
+    let mut points = memory::with_capacity(DIRECTIONS);
     for place in extremes {
         let place = place.lane(lane).value();
         if place >= 0.0 {
@@ -124,15 +125,15 @@ impl<R: Real> Room<(&Contacts<R>, &Scene<'_, R>, Edges<R>)> for Hulls {
 
     #[inline(always)]
     fn enter((contacts, scene, edges): (&Contacts<R>, &Scene<R>, Edges<R>)) -> Vec<Hull> {
-        let mut candidates = vec![Vec::new(); R::LANES];
+        let mut candidates = memory::filled(Vec::new(), R::LANES);
         for touch in &contacts.touches {
             let mut lanes = touch.lanes & !edges.inside(touch.flat);
             while lanes != 0 {
-                candidates[lanes.trailing_zeros() as usize].push(touch.sample);
+                memory::push(&mut candidates[lanes.trailing_zeros() as usize], touch.sample);
                 lanes &= lanes - 1;
             }
         }
-        let mut hulls = Vec::with_capacity(R::LANES);
+        let mut hulls = memory::with_capacity(R::LANES);
         for (lane, mut samples) in candidates.into_iter().enumerate() {
             let num_contacts = contacts.count(lane);
             if num_contacts == 0 {
@@ -142,14 +143,14 @@ impl<R: Real> Room<(&Contacts<R>, &Scene<'_, R>, Edges<R>)> for Hulls {
             // In public order: of equal points the first is the corner.
             samples.sort_unstable();
             let body = OneBody::new(scene, lane);
-            let mut positions = Vec::with_capacity(samples.len());
+            let mut positions = memory::with_capacity(samples.len());
             for &sample in &samples {
                 positions.push(body.flat(sample));
             }
             let corners = hull::convex_hull(&positions);
             hulls.push(Hull {
-                samples: corners.iter().map(|&i| samples[i]).collect(),
-                corners: corners.iter().map(|&i| positions[i]).collect(),
+                samples: memory::collect(corners.iter().map(|&i| samples[i])),
+                corners: memory::collect(corners.iter().map(|&i| positions[i])),
                 num_contacts,
             });
         }

@@ -1,12 +1,13 @@
 //! Convex hull in the plane: Andrew's monotone chain with exact orientation tests, so that duplicates, collinear and
 //! nearly collinear points need no tolerance.
 
+use crate::memory;
 use robust::{Coord, orient2d};
 
 /// Indices of the hull's corners, counter-clockwise from the lowest x; no corner is repeated or lies on an edge.
 /// One distinct point gives one corner, collinear points give their two ends. Of equal points the first is the corner.
 pub fn convex_hull(points: &[[f64; 2]]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..points.len()).collect();
+    let mut order = memory::collect(0..points.len());
     let along = |i: usize, j: usize, k: usize| points[i][k].total_cmp(&points[j][k]);
     order.sort_unstable_by(|&i, &j| along(i, j, 0).then(along(i, j, 1)).then(i.cmp(&j)));
     order.dedup_by_key(|i| points[*i]);
@@ -17,7 +18,7 @@ pub fn convex_hull(points: &[[f64; 2]]) -> Vec<usize> {
     let mut upper = chain(points, order.iter().rev().copied());
     lower.pop();
     upper.pop();
-    lower.extend(upper);
+    memory::extend(&mut lower, upper);
     lower
 }
 
@@ -31,7 +32,7 @@ fn chain(points: &[[f64; 2]], order: impl Iterator<Item = usize>) -> Vec<usize> 
             }
             chain.pop();
         }
-        chain.push(next);
+        memory::push(&mut chain, next);
     }
     chain
 }

@@ -10,7 +10,9 @@ pub mod program;
 
 pub use contact::{Contact, ContactRule};
 
+use crate::error::Result;
 use crate::mass::{Centre, Method};
+use crate::memory;
 use crate::number::vector::{Vec3, narrow};
 use crate::number::{Real, Scalar, WideScalar};
 use crate::quantity::Quantity;
@@ -54,7 +56,7 @@ impl BaseOfSupport {
         let lift = value(scene.ground.height);
         let place = |&[x, y]: &[f64; 2]| std::array::from_fn(|k| x * e1[k] + y * e2[k] + lift * normal[k] + origin[k]);
         BaseOfSupport {
-            polygon: hull.corners.iter().map(place).collect(),
+            polygon: memory::collect(hull.corners.iter().map(place)),
             area: hull::area(&hull.corners),
             margin,
             num_contacts: hull.num_contacts,
@@ -122,6 +124,10 @@ impl Quantity for SupportMargin {
 
     fn len(&self, _: &Template) -> usize {
         1
+    }
+
+    fn check(&self, _: &Template) -> Result<()> {
+        self.contact.check()
     }
 
     fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> SavedMargin<R> {

@@ -4,6 +4,7 @@
 //! m does the hull reach? maximise t subject to Σ w_i (x_i − c) = t (m − c), Σ w_i = 1, w, t ≥ 0. The point is supported
 //! when t ≥ 1. Mehrotra's predictor-corrector interior-point method; its 3 × 3 normal equations are factored by faer.
 
+use crate::memory;
 use faer::linalg::solvers::{Ldlt, Solve};
 use faer::{Col, Mat, Side};
 
@@ -29,8 +30,8 @@ pub fn is_convex_combination(points: &[[f64; 2]], point: [f64; 2]) -> bool {
         return false;
     }
     // Unit-sized columns: the ray as a unit vector, the points in units of their spread.
-    let mut columns: Vec<[f64; 3]> =
-        points.iter().map(|p| [(p[0] - mean[0]) / spread, (p[1] - mean[1]) / spread, 1.0]).collect();
+    let mut columns = memory::with_capacity(points.len() + 1);
+    columns.extend(points.iter().map(|p| [(p[0] - mean[0]) / spread, (p[1] - mean[1]) / spread, 1.0]));
     columns.push([-target[0] / distance, -target[1] / distance, 0.0]);
     reach(&columns) * spread >= distance
 }
@@ -46,7 +47,7 @@ fn reach(columns: &[[f64; 3]]) -> f64 {
             break;
         }
         if size < least {
-            (least, best) = (size, at.x.clone());
+            (least, best) = (size, memory::copied(&at.x));
         }
         let Some(factor) = Factor::new(columns, &at) else { break };
         let affine = factor.direction(columns, &at, &residual, &|i| at.x[i] * at.s[i]);
@@ -70,8 +71,8 @@ fn reach(columns: &[[f64; 3]]) -> f64 {
 /// interior iterate comes close to it, on some programmes no closer than 1e-9; the vertex itself is exact to rounding.
 fn vertex(columns: &[[f64; 3]], x: &[f64]) -> Option<f64> {
     let ([ray_x, ray_y, _], points) = columns.split_last()?;
-    let points: Vec<[f64; 2]> = points.iter().map(|p| [p[0], p[1]]).collect();
-    let mut heaviest: Vec<usize> = (0..points.len().min(x.len())).collect();
+    let points = memory::collect(points.iter().map(|p| [p[0], p[1]]));
+    let mut heaviest = memory::collect(0..points.len().min(x.len()));
     heaviest.sort_unstable_by(|&i, &j| x[j].total_cmp(&x[i]));
     let ray = [-ray_x, -ray_y];
     let mut edge = Edge { ends: [points[*heaviest.first()?], points[*heaviest.get(1)?]], ray };
@@ -140,9 +141,9 @@ impl Iterate {
     /// Uniform weights and t = 0 satisfy the equations; a small positive t keeps the iterate interior.
     fn start(columns: &[[f64; 3]]) -> Self {
         let n = columns.len();
-        let mut x = vec![1.0 / (n - 1) as f64; n];
+        let mut x = memory::filled(1.0 / (n - 1) as f64, n);
         x[n - 1] = 0.1;
-        Iterate { x, y: [0.0, 0.0, -2.0], s: vec![1.0; n] }
+        Iterate { x, y: [0.0, 0.0, -2.0], s: memory::filled(1.0, n) }
     }
 
     fn advance(&mut self, step: &Iterate, primal: f64, dual: f64) {
@@ -174,7 +175,7 @@ impl Residual {
                 primal[k] -= column[k] * x;
             }
         }
-        let dual = (0..n).map(|i| cost(i, n) - dot(columns[i], at.y) - at.s[i]).collect();
+        let dual = memory::collect((0..n).map(|i| cost(i, n) - dot(columns[i], at.y) - at.s[i]));
         let gap = at.x.iter().zip(&at.s).map(|(x, s)| x * s).sum::<f64>() / n as f64;
         Residual { primal, dual, gap }
     }
@@ -226,8 +227,8 @@ impl Factor {
         }
         let y = self.0.solve(&right);
         let y = [y[0], y[1], y[2]];
-        let s: Vec<f64> = (0..n).map(|i| residual.dual[i] - dot(columns[i], y)).collect();
-        let x = (0..n).map(|i| (-excess(i) - at.x[i] * s[i]) / at.s[i]).collect();
+        let s = memory::collect((0..n).map(|i| residual.dual[i] - dot(columns[i], y)));
+        let x = memory::collect((0..n).map(|i| (-excess(i) - at.x[i] * s[i]) / at.s[i]));
         Iterate { x, y, s }
     }
 }

@@ -9,12 +9,16 @@ pub mod roll;
 
 use crate::error::{Error, Result};
 use crate::ground::{Ground, Plane};
+use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, dot, scale};
 use crate::number::{Data, Real, Room, Scalar};
+use crate::options::{not_negative, positive};
+use crate::quantity::Quantity;
 use crate::scene::Scene;
 use crate::solid::{Extent, GRAVITY, Solid};
 use crate::support::hull::convex_hull;
 use crate::support::margin::{Margin, Nearest};
+use crate::template::Template;
 use crate::volume::MassProperties;
 use roll::{Cloud, Place, Roller, angle};
 use std::f64::consts::TAU;
@@ -83,13 +87,28 @@ pub struct Stance {
 }
 
 impl TipTest {
-    /// An error for a tolerance out of range.
+    /// An error names the number that is out of its range.
     pub fn new(densities: &[f64], contact: f64, tolerance: f64, nudge: f64, fallen: f64) -> Result<Self> {
-        if !(0.0..=BAND).contains(&tolerance) {
+        let densities = MassProperties { densities: densities.to_vec() };
+        let test = TipTest { densities, contact, tolerance, nudge, fallen };
+        test.check_numbers()?;
+        Ok(test)
+    }
+
+    /// An error names the number that is out of its range, or densities that are not the template's.
+    pub fn check(&self, template: &Template) -> Result<()> {
+        self.densities.check(template)?;
+        self.check_numbers()
+    }
+
+    fn check_numbers(&self) -> Result<()> {
+        positive("contact", self.contact)?;
+        if !(0.0..=BAND).contains(&self.tolerance) {
             let expected = format!("0 to {BAND} m");
-            return Err(Error::Argument { name: "tolerance", expected, got: tolerance.to_string() });
+            return Err(Error::Argument { name: "tolerance", expected, got: self.tolerance.to_string() });
         }
-        Ok(TipTest { densities: MassProperties { densities: densities.to_vec() }, contact, tolerance, nudge, fallen })
+        not_negative("nudge", self.nudge)?;
+        positive("fallen", self.fallen)
     }
 
     /// What the lanes know of each body.
@@ -150,8 +169,8 @@ impl TipTest {
         let plane = Plane { axes: Ground { normal: scale(-1.0, down), height: 0.0 }.axes() };
         let height = points.iter().map(|point| dot(down, *point)).fold(f64::NEG_INFINITY, f64::max);
         let stands = points.iter().filter(|point| dot(down, **point) >= height - self.tolerance);
-        let feet: Vec<[f64; 2]> = stands.map(|point| plane.flatten(*point)).collect();
-        let corners: Vec<[f64; 2]> = convex_hull(&feet).into_iter().map(|i| feet[i]).collect();
+        let feet = memory::collect(stands.map(|point| plane.flatten(*point)));
+        let corners = memory::collect(convex_hull(&feet).into_iter().map(|i| feet[i]));
         let about = |axis: Vec3<f64>| {
             let rows: Vec3<f64> = std::array::from_fn(|k| dot(solid.inertia[k], axis));
             dot(rows, axis)
@@ -281,7 +300,7 @@ impl<T: Data> Cloud for Vertices<'_, T> {
             let point = self.vertices[vertex as usize];
             [0, 1, 2].map(|k| (point[k].value() - self.origin[k]) - self.centre[k])
         };
-        vertices.map(offset).collect()
+        memory::collect(vertices.map(offset))
     }
 
     fn count(&self) -> usize {
@@ -305,11 +324,11 @@ impl<R: Real> Room<(&Extent<R>,)> for Low {
     #[inline(always)]
     fn enter((extent,): (&Extent<R>,)) -> Vec<Vec<u32>> {
         let limit = extent.lowest + R::of(BAND);
-        let mut low = vec![Vec::new(); R::LANES];
+        let mut low = memory::filled(Vec::new(), R::LANES);
         for (vertex, &height) in extent.heights.iter().enumerate() {
             let mut lanes = (height - limit).negative();
             while lanes != 0 {
-                low[lanes.trailing_zeros() as usize].push(vertex as u32);
+                memory::push(&mut low[lanes.trailing_zeros() as usize], vertex as u32);
                 lanes &= lanes - 1;
             }
         }

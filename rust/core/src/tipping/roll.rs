@@ -6,6 +6,7 @@
 //! point touches. It rests where the centre lies over what touches.
 
 use crate::ground::{Ground, Plane};
+use crate::memory;
 use crate::number::vector::{Vec3, add, cross, dot, scale, sub};
 use crate::number::{Fused, Real, Room};
 use crate::support::hull::convex_hull;
@@ -154,9 +155,9 @@ impl Stop {
     /// None where the body is at rest.
     fn downhill(&self, down: Vec3<f64>) -> Option<Way> {
         let plane = Plane { axes: Ground { normal: down, height: 0.0 }.axes() };
-        let flat: Vec<[f64; 2]> = self.touching.iter().map(|point| plane.flatten(*point)).collect();
+        let flat = memory::collect(self.touching.iter().map(|point| plane.flatten(*point)));
         let corners = convex_hull(&flat);
-        let feet: Vec<[f64; 2]> = corners.iter().map(|&i| flat[i]).collect();
+        let feet = memory::collect(corners.iter().map(|&i| flat[i]));
         let nearest = Nearest::find(&feet, [0.0; 2])?;
         let margin = Margin::new(nearest.map(|i| feet[i]), [0.0; 2]);
         let towards = plane.raise(margin.direction.map(|x| -x));
@@ -166,7 +167,7 @@ impl Stop {
 
 impl Points {
     fn new(offsets: &[Vec3<f64>]) -> Self {
-        Points { axes: [0, 1, 2].map(|k| offsets.iter().map(|offset| offset[k]).collect()) }
+        Points { axes: [0, 1, 2].map(|k| memory::collect(offsets.iter().map(|offset| offset[k]))) }
     }
 
     /// Of all points, towards `down`, and the largest.
@@ -177,7 +178,7 @@ impl Points {
     fn stop(&self, down: Vec3<f64>) -> Stop {
         let (heights, height) = self.heights(down);
         let touching = heights.iter().enumerate().filter(|(_, own)| **own >= height - TOUCH);
-        Stop { height, touching: touching.map(|(point, _)| self.at(point)).collect() }
+        Stop { height, touching: memory::collect(touching.map(|(point, _)| self.at(point))) }
     }
 
     fn at(&self, point: usize) -> Vec3<f64> {
@@ -187,7 +188,7 @@ impl Points {
     fn near(&self, down: Vec3<f64>, band: f64) -> Vec<Vec3<f64>> {
         let (heights, height) = self.heights(down);
         let low = heights.iter().enumerate().filter(|(_, own)| **own >= height - band);
-        low.map(|(point, _)| self.at(point)).collect()
+        memory::collect(low.map(|(point, _)| self.at(point)))
     }
 
     /// The direction in which the first of the points touches that do not yet.
@@ -212,7 +213,7 @@ impl Room<(&Points, Vec3<f64>)> for Along {
     #[inline(always)]
     fn enter((points, down): (&Points, Vec3<f64>)) -> (Vec<f64>, f64) {
         let [x, y, z] = &points.axes;
-        let mut out = vec![0.0; x.len()];
+        let mut out = memory::filled(0.0, x.len());
         for (((out, x), y), z) in out.iter_mut().zip(x).zip(y).zip(z) {
             *out = x * down[0] + y * down[1] + z * down[2];
         }
@@ -249,7 +250,7 @@ impl Room<(&Points, Vec3<f64>, Vec3<f64>, f64, f64)> for Steepest {
     #[inline(always)]
     fn enter((points, down, towards, height, pivot): (&Points, Vec3<f64>, Vec3<f64>, f64, f64)) -> f64 {
         let [x, y, z] = &points.axes;
-        let mut slopes = vec![0.0; x.len()];
+        let mut slopes = memory::filled(0.0, x.len());
         for (((out, &x), &y), &z) in slopes.iter_mut().zip(x).zip(y).zip(z) {
             *out = slope([x, y, z], down, towards, height, pivot);
         }

@@ -1,0 +1,230 @@
+"""Which files belong together: recordings of markers, and the forces and centres of mass that were measured with them.
+
+Names decide, without the words that say what is in a file: `squats.trc` and `squats_grf.mot`, `markers_walk.trc` and
+`grf_walk.mot`, `MarkerData/walk.trc` and `ID/walk_grf.mot` are of one recording each, `walk1/markers.trc` and
+`walk1/grf.mot` are because of their folder. Where names say nothing, the only two files of a folder belong together.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+# What laboratories call kinds of files, not recordings of people.
+KINDS = frozenset(
+    """marker markers markerdata mkr mkrs trc trcs mot mots sto stos c3d csv xml mocap
+    grf grfs force forces forcedata forceplate forceplates plate plates fp fps external externalloads loads ground
+    reaction cop analog analogs id inverse dynamics com center centre centers centres of mass
+    bodykinematics bodykin kinematics ik body pos position positions global vel velocity acc acceleration
+    data trial trials opensim opensimdata osim results recordings motion motions""".split()  # noqa: SIM905
+)
+STILL = ("static", "stand", "neutral", "calib", "t-pose", "tpose")
+
+Words = tuple[str, ...]
+
+
+def words(name: str) -> Words:
+    """What of a file's or a folder's name says whose it is: "grf_walk-2" is ("walk", "2")."""
+    parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
+    found = tuple(re.findall(r"[^\W_]+", parted.lower()))
+    return () if name.lower() in KINDS else tuple(word for word in found if word not in KINDS)
+
+
+def still(name: str) -> bool:
+    """Whether a name says that somebody stands still."""
+    return any(word in name.lower() for word in STILL)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a file is below `root`: `owner`, the folders that say whose it is, and the `words` of its own name, or of
+    its folder's where its own has none."""
+
+    path: Path
+    owner: Words
+    words: Words
+
+    @classmethod
+    def of(cls, path: Path, root: Path) -> Place:
+        folders = [part for part in path.parent.relative_to(root).parts if words(part)]
+        own = words(path.stem)
+        if not own and folders:
+            own = words(folders.pop())
+        return cls(path, tuple(folders), own)
+
+    def rank(self, other: Place) -> int | None:
+        """How well another file's name says that it belongs to this recording, 0 best; None: it does not say so."""
+        if self.words == other.words and (self.words or self.path.parent == other.path.parent):
+            return 0
+        if self.words and other.words and _inside(self.words, other.words):
+            return 1
+        stem = self.path.stem.lower()
+        if words(stem):
+            begin = r"(?<!\d)" if stem[0].isdigit() else ""
+            if re.search(rf"{begin}{re.escape(stem)}(?!\d)", other.path.stem.lower()):
+                return 2
+        return 3 if other.words and _inside(other.words, self.words) else None
+
+    def akin(self, other: Place) -> bool:
+        """Whether their folders can be of one person."""
+        shared = min(len(self.owner), len(other.owner))
+        return self.owner[:shared] == other.owner[:shared]
+
+
+@dataclass
+class Pairs:
+    """`forces` and `com` of recordings, by the file of their markers; `notes` on those that names do not tell, and why
+    other files are `left`, `rivals` of which belong to a recording that has another one."""
+
+    forces: dict[Path, Path] = field(default_factory=dict)
+    com: dict[Path, Path] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    left: dict[Path, str] = field(default_factory=dict)
+    rivals: dict[Path, Path] = field(default_factory=dict)  # the file that is left: the recording's markers
+
+
+def pair(
+    markers: Sequence[Path],
+    tables: Mapping[Path, str],
+    root: Path,
+    given: Iterable[Path] = (),
+    aliases: Mapping[Path, Path] | None = None,
+) -> Pairs:
+    """Gives each table, whose kind is "forces" or "com", to the recording that it belongs to.
+
+    `given`: recordings that bring their own forces. `aliases`: a file whose name counts for a table, too.
+    """
+    found = Pairs(forces={path: path for path in given})
+    recordings = [Place.of(path, root) for path in markers]
+    for kind, paired in (("forces", found.forces), ("com", found.com)):
+        places = [Place.of(path, root) for path, what in tables.items() if what == kind]
+        strangers = _by_name(places, recordings, paired, found, aliases or {}, root)
+        _by_number(kind, strangers, places, recordings, found, root)
+    return found
+
+
+def _by_name(
+    tables: list[Place],
+    recordings: list[Place],
+    paired: dict[Path, Path],
+    found: Pairs,
+    aliases: Mapping[Path, Path],
+    root: Path,
+) -> list[Place]:
+    """Those tables of which no name says whose they are."""
+    strangers: list[Place] = []
+    claims: dict[Path, list[tuple[tuple[int, int, int], Path]]] = {}
+    for table in tables:
+        names = [table, *([Place.of(aliases[table.path], root)] if table.path in aliases else [])]
+        able = sorted(
+            ((rank, _steps(one.path, table.path), -len(one.path.stem)), one.path)
+            for one in recordings
+            if one.akin(table)
+            for rank in [min((r for r in map(one.rank, names) if r is not None), default=None)]
+            if rank is not None
+        )
+        if not able:
+            strangers.append(table)
+        elif len(able) > 1 and able[0][0] == able[1][0]:
+            which = " and ".join(_under(path, root) for score, path in able if score == able[0][0])
+            found.left[table.path] = f"it can belong to {which}; give it the name of one of them"
+        else:
+            claims.setdefault(able[0][1], []).append((able[0][0], table.path))
+    for recording, claimed in claims.items():
+        for _, path in sorted(claimed):
+            if recording in paired:
+                found.left[path] = (
+                    f"{_under(recording, root)} has {_what(paired, found)} {_from(recording, paired, root)}"
+                )
+                found.rivals[path] = recording
+            else:
+                paired[recording] = path
+    return strangers
+
+
+def _by_number(
+    kind: str, strangers: list[Place], tables: list[Place], recordings: list[Place], found: Pairs, root: Path
+) -> None:
+    """Gives those tables to a recording which are the only ones of their kind, in a folder or of a person."""
+    paired = found.forces if kind == "forces" else found.com
+    what = "forces" if kind == "forces" else "centre of mass"
+    for table in strangers:
+        owner, why = _only(table, tables, recordings, paired, None if kind == "forces" else found.forces)
+        if owner is None:
+            found.left[table.path] = (
+                "its name has no recording's name in it; expected such as "
+                f"{recordings[0].path.stem}_{'grf' if kind == 'forces' else 'com'}{table.path.suffix}"
+            )
+        else:
+            paired[owner.path] = table.path
+            found.notes.append(
+                f"{_under(table.path, root)}: taken as the {what} of {_under(owner.path, root)}, the only recording "
+                f"{why}"
+            )
+
+
+def _only(
+    table: Place,
+    tables: list[Place],
+    recordings: list[Place],
+    paired: dict[Path, Path],
+    forces: dict[Path, Path] | None,
+) -> tuple[Place | None, str]:
+    """The one recording that a table can belong to: in its folder, or else among those of one person; and in words
+    which one that is."""
+    for near, where in (
+        (lambda other: other.path.parent == table.path.parent, "in its folder"),
+        (lambda other: other.akin(table), "there is"),
+    ):
+        able = [one for one in recordings if near(one)]
+        if sum(map(near, tables)) > 1 or not able:
+            continue
+        move = [one for one in able if not still(one.path.stem) and not still(" ".join(one.words))]
+        loaded = [] if forces is None else [one for one in able if one.path in forces]
+        for some, why in ((able, where), (loaded, "with forces"), (move, "in which nobody stands still")):
+            if len(some) == 1 and some[0].path not in paired:
+                return some[0], why
+    return None, ""
+
+
+def _what(paired: dict[Path, Path], found: Pairs) -> str:
+    return "forces" if paired is found.forces else "a centre of mass"
+
+
+def _from(recording: Path, paired: dict[Path, Path], root: Path) -> str:
+    own = paired[recording] == recording
+    return "of its own" if own else f"from {_under(paired[recording], root)}"
+
+
+def _inside(few: Words, many: Words) -> bool:
+    return any(many[begin : begin + len(few)] == few for begin in range(len(many) - len(few) + 1))
+
+
+def _steps(one: Path, other: Path) -> int:
+    """From folder to folder."""
+    a, b = one.parent.parts, other.parent.parts
+    shared = next((k for k, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+    return len(a) + len(b) - 2 * shared
+
+
+def _under(path: Path, root: Path) -> str:
+    return path.relative_to(root).as_posix()
+
+
+def names(markers: Sequence[Path], root: Path) -> list[str]:
+    """Names of recordings that tell them apart and can be those of folders: the file's, or its folder's where the
+    file's says nothing, with folders before it where several have the same."""
+    places = [Place.of(path, root) for path in markers]
+    short = [
+        place.path.parent.name if not words(place.path.stem) and place.path.parent != root else place.path.stem
+        for place in places
+    ]
+    longer = ["_".join([*place.owner, name]) for place, name in zip(places, short, strict=True)]
+    whole = ["_".join(path.relative_to(root).with_suffix("").parts) for path in markers]
+    ended = ["_".join([*path.relative_to(root).with_suffix("").parts, path.suffix[1:]]) for path in markers]
+    found = list(short)
+    for better in (longer, whole, ended):
+        found = [name if found.count(name) == 1 else better[row] for row, name in enumerate(found)]
+    return found

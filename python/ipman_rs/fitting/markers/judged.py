@@ -1,0 +1,145 @@
+"""What the judge of all doors (`ipman_rs.data.judge`) asks of a recording of markers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ipman_rs.data import check, judge
+from ipman_rs.data.check import Finding
+from ipman_rs.data.tracks import TO_Y_UP, Tracks
+from ipman_rs.ground import Ground
+
+from .anatomy import ANYWHERE, MIDDLE, SIDED, SPREAD
+from .sets import Meaning
+
+Array = NDArray[np.float64]
+
+HEAD = ("forehead", "occiput", "temple", "head", "ear", "eye", "nose", "jaw", "head_top")
+TRUNK = (
+    "c7", "clavicle", "sternum", "lower_sternum", "sternoclavicular", "scapula", "acromion", "shoulder_front",
+    "shoulder_back", "shoulder", "mid_shoulder", "neck", "spine1", "spine2", "spine3", "collar",
+)  # fmt: skip
+PELVIS = ("asis", "psis", "sacrum", "iliac_crest", "hip_centre", "hip", "mid_hip", "pelvis")
+ARMS = ("upper_arm", "biceps", "elbow", "elbow_lateral", "elbow_medial", "forearm", "radius", "ulna", "wrist",
+        "wrist_back", "hand", "hand_back", "hand_back_5", "index", "pinky", "thumb")  # fmt: skip
+FEET = re.compile(r"heel|toe|malleolus|metatarsal|midfoot|ankle|foot")
+
+SKIN = (-0.015, 0.04)  # m from the skin to a marker's middle; 7 to 15 mm are usual
+
+
+def region(meaning: Meaning) -> str:
+    """The part of the body where a marker is: head, trunk, arms, pelvis or legs."""
+    if isinstance(meaning, tuple):
+        return "legs"  # places of their own are those of clusters on legs, and of feet
+    name = _without_side(meaning)
+    if name in TRUNK or re.fullmatch(r"[tl]\d+", name):
+        return "trunk"
+    return "head" if name in HEAD else "arms" if name in ARMS else "pelvis" if name in PELVIS else "legs"
+
+
+def on_skin(meaning: Meaning) -> bool:
+    """Whether such a marker is stuck to the skin: not inside the body, not on a plate or a wand."""
+    if isinstance(meaning, tuple):
+        return meaning[2] < ANYWHERE
+    return meaning in MIDDLE or (_without_side(meaning) in SIDED and _without_side(meaning) not in SPREAD)
+
+
+def _without_side(name: str) -> str:
+    return name.removeprefix("left_").removeprefix("right_")
+
+
+def of_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool = False) -> list[Finding]:
+    """Size, place and stance of the markers whose places are known; `up_is_said`: by the user, who knows.
+
+    Axes are the file's own: option `--up` names them.
+    """
+    known = tracks.select([name for name in tracks.names if name in meanings])
+    rows = rows_to_judge(known)
+    points = np.where(known.confidence[rows, :, None] > 0, known.points[rows], np.nan)
+    if not len(points):
+        return []
+    found = of_size(points, known.unit)
+    if any(each.level == "wrong" for each in found):
+        return found
+    with np.errstate(invalid="ignore"):
+        found += check.place("markers", points[np.isfinite(points).all(axis=-1)])
+    rotation = TO_Y_UP[tracks.up]
+    up = ways(points @ rotation, known, meanings)
+    return found + ([] if up_is_said else check.upright("markers", up, Ground(rotation[1])))
+
+
+def of_size(points: Array, unit: float) -> list[Finding]:
+    """Whether points (T, M, 3) m of a person can be, that were given in units of so many metres."""
+    found = check.size_of_body("markers", points)
+    if not any(each.level == "wrong" for each in found):
+        return found
+    fits = [
+        name
+        for name, metres in (("m", 1.0), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254))
+        if check.size_of_body("markers", points / unit * metres)[0].level == "ok"
+    ]
+    if not fits:
+        return found
+    said = found[0].what.rpartition(": ")[2]
+    return [Finding("wrong", f"markers: {said}, if the file's unit is right", option=f"--units {fits[0]}")]
+
+
+def of_rate(tracks: Tracks) -> list[Finding]:
+    return judge.rate(tracks.rate) if len(tracks) > 1 else []
+
+
+def rows_to_judge(tracks: Tracks) -> NDArray[np.int64]:
+    """Frames in which something was seen, a few hundred of them."""
+    seen = np.flatnonzero(tracks.confidence.any(axis=1))
+    if len(seen) <= check.SAMPLE:
+        return seen
+    return seen[np.linspace(0, len(seen) - 1, check.SAMPLE).astype(np.int64)]
+
+
+def ways(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> Array:
+    """From the feet, or the legs, to the head, the trunk or the pelvis: (T, 3), NaN where neither was seen."""
+    places = [meanings[name] for name in tracks.names]
+    regions = np.array([region(place) for place in places])
+    feet = np.array([isinstance(place, str) and FEET.search(place) is not None for place in places])
+    upper, lower = np.isin(regions, ("head", "trunk")), feet | (regions == "legs")
+    upper = upper if upper.any() else regions == "pelvis"
+    lower = feet if feet.any() else lower if lower.any() else regions == "pelvis"
+    if not upper.any() or not lower.any() or (upper & lower).any():
+        return np.full((len(points), 3), np.nan)
+    return _mean(points[:, upper]) - _mean(points[:, lower])
+
+
+def _mean(points: Array) -> Array:
+    known = np.isfinite(points).all(axis=-1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        return np.where(known, points, 0).sum(axis=1) / known.sum(axis=1)
+
+
+def coverage(known: Sequence[str], meanings: Mapping[str, Meaning]) -> list[Finding]:
+    """What the markers that were seen do not say of the body."""
+    seen = {region(meanings[name]) for name in known}
+    if not seen & {"head", "trunk", "arms"}:
+        said = "no marker above the pelvis was ever seen: trunk, arms, mass and centre of mass are the body's mean"
+        return [Finding("odd", said)]
+    lacking = [part for part in ("head", "trunk", "arms", "pelvis", "legs") if part not in seen]
+    if "head" in lacking and len(lacking) == 1:
+        return []
+    if not lacking:
+        return []
+    parts = " and ".join(lacking)
+    return [Finding("odd", f"no marker on {parts} was ever seen: there the body's mean is shown")]
+
+
+def of_skin(distances: Mapping[str, float]) -> list[Finding]:
+    """Markers that are not on the skin of the fitted body: distances in metres, by name."""
+    off = {name: away for name, away in distances.items() if not SKIN[0] <= away <= SKIN[1]}
+    if not off:
+        return []
+    worst = sorted(off, key=lambda name: -abs(off[name] - 0.01))
+    said = ", ".join(f"{name} {1e3 * off[name]:+.0f} mm" for name in worst[:6]) + (", …" if len(off) > 6 else "")
+    what = f"{len(off)} of {len(distances)} markers are not on the skin of the fitted body ({said}; 7 to 15 is usual)"
+    return [Finding("odd", what, "are they where their names say? (--markers)")]
