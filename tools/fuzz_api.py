@@ -246,7 +246,7 @@ def _odd_tensor(draw: random.Random, array: np.ndarray) -> Any:
         lambda: tensor.double() * 1e308, lambda: tensor.mT.contiguous().mT,
         lambda: tensor.to_mkldnn() if tensor.dtype == torch.float32 else None,
         lambda: torch.nn.Parameter(tensor), lambda: tensor.conj(),
-        lambda: torch.view_as_real(tensor.to(torch.complex64).conj())[..., 1], lambda: tensor[0,
+        lambda: tensor.to(torch.complex64).conj().imag, lambda: tensor[0,
         0, 0], lambda: "x",
     )  # fmt: skip
     return draw.choice(changes)()
