@@ -113,7 +113,7 @@ def _meshes() -> list[Kind]:
 
 
 def _bodies() -> list[Kind]:
-    from miniatures import amass, models
+    from miniatures import amass, models  # pyright: ignore[reportMissingImports]
 
     from ipman_rs.body import joint_regressors
     from ipman_rs.cli.measure import Request, read
@@ -149,7 +149,7 @@ def _bodies() -> list[Kind]:
 def _keypoints() -> list[Kind]:
     import json
 
-    import keypoint_files
+    import keypoint_files  # pyright: ignore[reportMissingImports]
 
     from ipman_rs.fitting import camera_file, keypoints
 
@@ -190,7 +190,7 @@ def _settings() -> list[Kind]:
 
 
 def _recordings() -> list[Kind]:
-    from miniatures import c3d_file, moyo, opensim
+    from miniatures import c3d_file, moyo, opensim  # pyright: ignore[reportMissingImports]
 
     from ipman_rs.data import c3d, safe_xml, trc
     from ipman_rs.data import opensim as storage
@@ -216,7 +216,7 @@ def _recordings() -> list[Kind]:
 
 
 def _pickles() -> list[Kind]:
-    from miniatures import models, threedpw
+    from miniatures import models, threedpw  # pyright: ignore[reportMissingImports]
 
     from ipman_rs.body import safe_pickle
     from ipman_rs.fitting import presented

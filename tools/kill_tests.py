@@ -40,7 +40,7 @@ class Command:
 
 
 def _evaluate(folder: Path) -> list[str]:
-    import evaluate_files as files
+    import evaluate_files as files  # pyright: ignore[reportMissingImports]
 
     true = files.truth(frames=1500)
     files.save(folder / "true.npz", true)
@@ -49,7 +49,7 @@ def _evaluate(folder: Path) -> list[str]:
 
 
 def _fit(folder: Path) -> list[str]:
-    import keypoint_files as files
+    import keypoint_files as files  # pyright: ignore[reportMissingImports]
 
     (folder / "people").mkdir()
     (folder / "quick.yaml").write_text(files.QUICK)
@@ -60,7 +60,7 @@ def _fit(folder: Path) -> list[str]:
 
 
 def _validate(folder: Path) -> list[str]:
-    import test_validate_cli as made
+    import test_validate_cli as made  # pyright: ignore[reportMissingImports]
 
     person = made.person.__wrapped__() if hasattr(made.person, "__wrapped__") else made.person._get_wrapped_function()()
     (folder / "lab").mkdir()

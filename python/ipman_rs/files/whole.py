@@ -7,15 +7,12 @@ import os
 import re
 import secrets
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any, BinaryIO
 
 try:
-    from fcntl import LOCK_EX, LOCK_NB, flock
+    import fcntl
 except ImportError:  # Windows, which deletes no file that is open
-    LOCK_EX = LOCK_NB = 0
-
-    def flock(fd: Any, operation: int) -> None: ...
-
+    fcntl = None  # type: ignore[assignment]
 
 _PART = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{12}\.part")
 
@@ -66,7 +63,7 @@ def _part(path: Path) -> tuple[Path, BinaryIO]:
         part = path.with_name(f".{name}.{secrets.token_hex(6)}.part")
         file = part.open("xb")
         try:
-            flock(file, LOCK_EX | LOCK_NB)
+            _lock(file)
         except BlockingIOError:  # another process takes it for a leftover
             file.close()
             continue
@@ -75,6 +72,12 @@ def _part(path: Path) -> tuple[Path, BinaryIO]:
         if part.exists():
             return part, file
         file.close()
+
+
+def _lock(file: IO[bytes]) -> None:
+    """OSError where another process has locked it, or the file system has no locks."""
+    if fcntl is not None:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _remove_leftovers(path: Path) -> None:
@@ -89,5 +92,5 @@ def _remove_leftovers(path: Path) -> None:
         if known is None or known["name"] != name:
             continue
         with contextlib.suppress(OSError), open(entry.path, "rb") as left:
-            flock(left, LOCK_EX | LOCK_NB)
+            _lock(left)
             os.unlink(entry.path)
