@@ -27,7 +27,7 @@ def warn(text: str) -> None:
 def _line(text: str) -> None:
     import click
 
-    click.echo(one_line(text), err=True)
+    click.echo(one_line(text, 600), err=True)
 
 
 def say(text: str) -> None:
