@@ -123,7 +123,7 @@ def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], lis
     stands &= there
     if not stands.any():
         return there, []
-    which = [names[column] or "one without a name" for column in np.flatnonzero(stands.any(axis=0)).tolist()]
+    which = [names[int(column)] or "one without a name" for column in np.flatnonzero(stands.any(axis=0)).tolist()]
     first = points[stands][0]
     value = first[int(np.abs(first).argmax())]
     return there & ~stands, [f"{value:.7g} is taken as not seen ({_some(which)})"]
@@ -197,8 +197,8 @@ def _person(
 
 def _scale(unit: str | float, seen: Array, source: str) -> float:
     """Metres a unit."""
-    if isinstance(unit, float):
-        return unit
+    if not isinstance(unit, str):
+        return float(unit)
     if unit:
         scale = metres(unit)
         if scale is None:

@@ -150,7 +150,7 @@ def judged_fit(recorded: Recorded) -> list[Finding]:
     """What it says of the fit: the markers' mean distance from their places, and the person's mass."""
     with torch.no_grad():
         vertices = recorded.fit.candidate.vertices[:: max(1, len(recorded.tracks) // WEIGHED)]
-        mass = ipt.mass_properties(vertices, recorded.fit.problem.body.template).mass.numpy()
+        mass = np.asarray(ipt.mass_properties(vertices, recorded.fit.problem.body.template).mass)
     errors = recorded.errors
     known = errors[np.isfinite(errors)]
     found = judge.marker_error(float(known.mean())) if len(known) else []
