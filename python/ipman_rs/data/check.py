@@ -152,7 +152,7 @@ def size_of_body(what: str, points: NDArray[Any]) -> list[Finding]:
 
 
 def _norms(vectors: NDArray[Any]) -> NDArray[np.float64]:
-    """The norms of vectors (..., 3), NaN for those that are not finite. Those whose squares are not finite have one, too."""
+    """The norms of vectors (..., 3), NaN where they are not finite; where only their squares are not, a large one."""
     numbers = np.asarray(vectors, np.float64)
     return np.linalg.norm(np.where(np.isfinite(numbers), np.clip(numbers, -1e100, 1e100), np.nan), axis=-1)
 
