@@ -242,4 +242,4 @@ def test_names_that_a_spreadsheet_would_run(tmp_path):
         rows = list(csv.DictReader(stream))
     assert {row["sequence"] for row in rows} == {f"'{name}" for name in names.tolist()}
     assert {row["method"] for row in rows} == {"'=cmd"}
-    assert all(np.isfinite(float(row["mean"])) and int(row["frames"]) == 10 for row in rows)
+    assert all(np.isfinite(float(row["mean"])) and int(row["frames"]) in range(1, 11) for row in rows)

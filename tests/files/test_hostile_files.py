@@ -87,6 +87,9 @@ def test_presets_of_other_types_are_refused_by_name(tmp_path, what):
     path.write_text(f"stages:\n- {{name: pose, {PRESETS[what]}}}\n")
     with pytest.raises(ValueError, match=r"mine\.yaml: "):
         config.load(path)
+    path.write_text("start: {yaws: null}\nstages:\n- {name: pose, free: [orient], weights: {reprojection: 4}}\n")
+    with pytest.raises(ValueError, match=r"mine\.yaml: start, yaws: "):
+        config.load(path)
     path.write_text("stages:\n- {name: pose, free: [orient], weights: {reprojection: 4}}\n")
     assert config.load(path).stages[0].weights == {"reprojection": 4.0}
 

@@ -151,15 +151,15 @@ def size_of_body(what: str, points: NDArray[Any]) -> list[Finding]:
     return [Finding("wrong", said, advice, option)]
 
 
-def _lengths(vectors: NDArray[Any]) -> NDArray[np.float64]:
-    """Of vectors (..., 3), NaN for those that are not finite. Those whose squares are not finite have one, too."""
+def _norms(vectors: NDArray[Any]) -> NDArray[np.float64]:
+    """The norms of vectors (..., 3), NaN where they are not finite; where only their squares are not, a large one."""
     numbers = np.asarray(vectors, np.float64)
     return np.linalg.norm(np.where(np.isfinite(numbers), np.clip(numbers, -1e100, 1e100), np.nan), axis=-1)
 
 
 def place(what: str, positions: NDArray[Any]) -> list[Finding]:
     """Whether positions (F, 3) of bodies or cameras can be metres in a world of people."""
-    distance = _lengths(positions)
+    distance = _norms(positions)
     distance = distance[np.isfinite(distance)]
     if not len(distance) or np.median(distance) <= WORLD:
         return []
@@ -173,7 +173,7 @@ def place(what: str, positions: NDArray[Any]) -> list[Finding]:
 
 def radians(what: str, pose: NDArray[Any]) -> list[Finding]:
     """Whether rotation vectors (F, J, 3) can be radians."""
-    largest = _lengths(pose).max(axis=-1)
+    largest = _norms(pose).max(axis=-1)
     largest = largest[np.isfinite(largest)]
     if not len(largest) or np.median(largest) <= 2 * np.pi:
         return []

@@ -89,9 +89,9 @@ def _config(name: str, content: Any) -> Config:
     terms, start = _terms("terms", content.get("terms")), content.get("start") or {}
     _known("start", start, ("search", "yaws", "iterations"))
     _expect("start, search", start.get("search", ""), "str")
-    search(start)
     for option in ("yaws", "iterations"):
         _whole(f"start, {option}", start.get(option, 1), 1)
+    search(start)
     listed = content.get("stages") or ()
     if not listed or not isinstance(listed, (list, tuple)):
         raise ValueError(f"stages: expected a list of at least one, got {_short(listed)}")
