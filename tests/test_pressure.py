@@ -61,6 +61,25 @@ def test_hovering_bodies_keep_their_centre(lift, dtype, blob):
     np.testing.assert_allclose(got, expected, rtol=0, atol=2 * np.spacing(dtype(lift)) + 1e-12)
 
 
+@pytest.mark.parametrize("lift", [0.5, 1000.0])
+@pytest.mark.parametrize("size", [4.0, 100.0, 300.0])
+def test_a_tall_hovering_body_keeps_its_centre(size, lift, blob):
+    """On its tip: the lowest of its few samples lies metres above its lowest vertex. Single precision rounds coordinates
+    to 6e-8 of them, which moves an exponent by γ times as much; three roundings of the size and the height are allowed.
+    """
+    points = size * np.array([[0.0, 0, 0], [0.4, 1, 0.1], [-0.3, 1, 0.4], [-0.1, 1.1, -0.3]])
+    faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+    cone = ip.BodyTemplate(points, faces, num_samples=12, seed=3)
+    vertices = (points + [0.0, lift, 0.0]).astype(np.float32)
+    samples = ip.sample_surface(vertices.astype(np.float64), cone)
+    weights = np.exp(-10.0 * (samples[:, 1] - samples[:, 1].min()))
+    assert samples[:, 1].min() > lift + 0.09 * size
+    expected = (weights[:, None] * samples).sum(0) / weights.sum()
+    got = ip.center_of_pressure(vertices, cone, ip.Ground())
+    spread = np.ptp(samples, axis=0).max()
+    np.testing.assert_allclose(got, expected, rtol=0, atol=3 * 6e-8 * (size + lift) * (1 + 10.0 * spread))
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_epsilon_swallows_a_hovering_body(dtype, blob):
     """As released: Σρ is nothing beside 1e-6, so the centre falls back to the world's origin, not to NaN."""

@@ -12,6 +12,8 @@ use ipman::number::gate::Level;
 use ipman::pressure::{CenterOfPressure, PressureCurve};
 use ipman::sampling::Points;
 use ipman::support::{Contact, ContactRule, SupportMargin};
+use ipman::volume::MassProperties;
+use ipman::weighted::{Pool, Reduction};
 use ipman::{Batch, Error, Template};
 
 fn terms() -> StabilityTerms {
@@ -174,4 +176,33 @@ fn an_interruption_stops_between_bodies() {
     let normals = [0.0, 1.0, 0.0].repeat(37);
     let batch = Batch::new(&template, &data, &normals, &[0.0; 37], &|| true).unwrap();
     assert_eq!(batch.value(&terms()).unwrap_err(), Error::Interrupted);
+}
+
+/// As numpy and torch do.
+#[test]
+fn options_and_weights_out_of_range_are_named() {
+    let (template, data) = bodies(1);
+    let batch = Batch::new(&template, &data, &[0.0, 1.0, 0.0], &[0.0], &|| false).unwrap();
+    let named = |error: Option<Error>| match error {
+        Some(Error::Argument { name, .. }) => name,
+        other => panic!("{other:?}"),
+    };
+    for gamma in [-1.0, f64::NAN, f64::INFINITY] {
+        let mut quantity = terms();
+        quantity.stability.pressure.curve.gamma = gamma;
+        assert_eq!(named(batch.value(&quantity).err()), "gamma");
+        assert_eq!(named(batch.vjp(&quantity, &[1.0; 3]).err()), "gamma");
+    }
+    let mut quantity = terms();
+    quantity.ground.beta2 = 0.0;
+    assert_eq!(named(batch.value(&quantity).err()), "beta2");
+    let contact = Contact { rule: ContactRule::Paper, threshold: f64::NAN };
+    assert_eq!(named(batch.status(&contact).err()), "threshold");
+    let dense = MassProperties { densities: vec![-985.0] };
+    assert_eq!(named(batch.solids(&dense, 0.1).err()), "density");
+    let pool = Pool { valid: None, reduction: Reduction::Mean };
+    for weights in [[1.0, f64::NAN, 1.0], [f64::INFINITY, 1.0, 1.0]] {
+        let mut gradient = vec![0.0; data.len()];
+        assert_eq!(named(pool.weighted(&batch, &terms(), &weights, &mut gradient).err()), "weights");
+    }
 }
