@@ -2,6 +2,7 @@
 
     python tools/validate_recordings.py            prints the tables, many minutes; fits are kept in out/validation
     python tools/validate_recordings.py --write    and puts them into docs/validation.md, the pictures beside it
+    python tools/validate_recordings.py --short    without the fine body and every recording's own shape
 
 The data are read from $IPMAN_SHARED_DATA or ../shared/data.
 """
