@@ -2,6 +2,7 @@
 
     python tools/validate_recordings.py            prints the tables, many minutes; fits are kept in out/validation
     python tools/validate_recordings.py --write    and puts them into docs/validation.md, the pictures beside it
+    python tools/validate_recordings.py --short    without the fine body and every recording's own shape
 
 The data are read from $IPMAN_SHARED_DATA or ../shared/data.
 """
@@ -95,10 +96,10 @@ def people(records: list[dict[str, Any]]) -> Iterator[str]:
         "volume × 985 against the plates, %": lambda one: (
             None if report.weighed(one) is None else 100 * (one["mass"]["volume_mean"] / report.weighed(one) - 1)
         ),
-        "upward force, rms, % of the weight, moving": lambda one: (
-            one["force"] and one["kind"] != "quiet standing" and 100 * one["force"]["share"]
+        "upward force, rms, % of the weight, moving on the floor": lambda one: (
+            one["force"] and one["kind"] in ("walking", "movement in place") and 100 * one["force"]["share"]
         ),
-        "ZMP of the parts − CoP, mean distance, walking, mm": lambda one: (
+        "ZMP of the parts from the CoP, one plate, walking, mm": lambda one: (
             "single support" in one["cop"] and millimetres(one["cop"]["single support"], "moving: ZMP of the parts")
         ),
     }
@@ -111,8 +112,9 @@ def people(records: list[dict[str, Any]]) -> Iterator[str]:
             if value not in (None, False):
                 each.setdefault(one["person"], float(value))
         spread = f" ± {np.std([*each.values()], ddof=1):.1f}" if len(each) > 1 else ""
-        told = ", ".join(f"{person} {value:+.1f}" for person, value in each.items())
-        yield f"| {name} | {len(each)} | {np.mean([*each.values()]):+.1f}{spread} | {told} |"
+        sign = "+" if "−" in name or "against" in name else ""
+        told = ", ".join(f"{person} {value:{sign}.1f}" for person, value in each.items())
+        yield f"| {name} | {len(each)} | {np.mean([*each.values()]):{sign}.1f}{spread} | {told} |"
 
 
 def against(one: dict[str, Any], judge: str, axis: int) -> float | None:

@@ -292,7 +292,7 @@ def test_who_stands_still_by_the_markers_gives_the_shape(run, person, folder, tm
     written(lab / "z01.trc", person)
     said = run(lab, "-o", tmp_path / "out", "--rate", "10")
     assert said.code == 0, said.err
-    assert "z01: its markers stand still; its shape and places of markers are kept for the others" in said.out
+    assert "z01: its markers stand still, so its shape and places of markers are kept for the others" in said.out
     assert records(tmp_path / "out")["lift"]["fit"]["shape_from"] == "z01"
 
 

@@ -17,7 +17,7 @@ LOW, SLOW = 0.03, 0.5  # m, m/s: what is on the floor is lower and slower
 STEP = 0.12  # m: as far one foot goes before the other, of somebody who walks
 TRAVEL = 0.5  # m of the centre of mass, of somebody who goes somewhere
 PACE = 0.3  # m/s: faster, a foot goes forwards or backwards under the body
-STANCE = 0.8  # of the time in which a foot goes backwards it is the lower one, of somebody who walks on a treadmill
+STANCE = 0.8  # of the time in which a foot goes backwards it is down, of somebody who walks on a treadmill
 FALLS = -0.5 * GRAVITY  # m/s²: less is the upward acceleration of somebody in the air, after the low pass
 FLIGHT = 0.08  # s: as long at least somebody is in the air who runs or jumps
 
@@ -77,12 +77,12 @@ class Movement:
 
     @property
     def stance(self) -> float:
-        """Which part of the time in which a foot goes backwards under the body it is the lower one."""
+        """In which part of the time in which a foot goes backwards under the body it is as low as the other one."""
         if len(self.com) < 3:
             return 0.0
         back = np.gradient(self.ahead, 1 / self.rate, axis=0) < -PACE
-        lower = self.heights <= self.heights.min(axis=1, keepdims=True)
-        return float(lower[back].mean()) if back.any() else 0.0
+        low = self.heights < self.heights.min(axis=1, keepdims=True) + LOW
+        return float(low[back].mean()) if back.any() else 0.0
 
     @property
     def flies(self) -> bool:
