@@ -374,6 +374,9 @@ def test_columns_of_external_loads(folder):
     found = opensim.plates(renamed, loads=loads)
     np.testing.assert_array_equal(found.forces, right.forces)
     np.testing.assert_array_equal(found.points, right.points)
+    second = external_loads.Load("1_ground_force_v", "1_ground_force_p", "")
+    one = external_loads.ExternalLoads("sway_grf.mot", (second,), "x")
+    assert opensim.plates(table, loads=one).notes == ("forces that x does not name are left out: ground_force_vx",)
     gone = external_loads.ExternalLoads("renamed.mot", (external_loads.Load("FP3v", "FP1p", ""),), "loads.xml")
     with pytest.raises(
         ValueError, match="loads.xml: expected three columns that begin with 'FP3v'; renamed.mot has FP1vx"

@@ -200,7 +200,22 @@ def plates(table: Storage, unit: str = "m", up: str = "y", loads: ExternalLoads 
     )
     found = ForcePlates(table.times, forces, points, moments, UP[up], table.source, notes=table.notes)
     _plausible(found, up)
+    if loads is not None and (unnamed := _unnamed(table, found)):
+        note = f"forces that {loads.source} does not name are left out: {', '.join(unnamed)}"
+        found = replace(found, notes=(*found.notes, note))
     return on_the_body(found)
+
+
+def _unnamed(table: Storage, found: ForcePlates) -> list[str]:
+    """The first columns of plates that carry a load and are not among those found."""
+    known = [found.forces[:, plate] for plate in range(found.forces.shape[1])]
+    names = []
+    for name in table.columns:
+        wrench = _wrench(table, name)
+        loaded = wrench is not None and np.nanmax(np.abs(wrench[0]), initial=0.0) > LOADED
+        if wrench is not None and loaded and not any(np.array_equal(wrench[0], one, equal_nan=True) for one in known):
+            names.append(name)
+    return names
 
 
 def on_the_body(found: ForcePlates) -> ForcePlates:
