@@ -65,9 +65,9 @@ def validate(
 ) -> None:
     """Compare the engine's centre of mass, centre of pressure and pressure with measurements.
 
-    FOLDER holds recordings of one person: markers (.trc, .c3d), force plates (.mot, .sto, or
-    those of the .c3d) and centres of mass by others, such as OpenSim's (.sto, or .csv with columns time_s, com_x_m,
-    com_y_m, com_z_m; y up) or Plug-in Gait's CentreOfMass in the .c3d. Names and folders say which belong together:
+    FOLDER holds recordings of one person: markers (.trc, .c3d), force plates (.mot, .sto, or those of the .c3d) and
+    centres of mass by others, such as OpenSim's (.sto, or .csv with columns time_s, com_x_m, com_y_m, com_z_m; y up) or
+    Plug-in Gait's CentreOfMass in the .c3d. Names and folders say which belong together:
     squats.trc, squats_grf.mot and squats_com.sto; markers_walk.trc and grf_walk.mot; MarkerData/walk.trc and
     ID/walk_grf.mot; walk/markers.trc and walk/grf.mot; or the only two. OpenSim's ExternalLoads (.xml) say in which
     columns forces are. Bodies are fitted to the markers alone, as by `ipman fit`, and are kept: run it again and it
@@ -102,8 +102,9 @@ def validate(
         console.error(str(failure))
     if page is not None:
         console.print_validation(records)
-        for note in notes:
-            console.say(note)
+    for note in notes:
+        console.say(note)
+    if page is not None:
         console.say(f"report: {page}")
     sys.exit(1 if failures else 0)
 
