@@ -4,10 +4,8 @@
     python tools/kill_tests.py render --kills 3 --seed 1
 
 The process group gets SIGKILL at 5 to 95 % of the time that the uninterrupted run took. Then the same command runs to
-its
-end. Every file must have the same bytes (checkpoints: the same tensors), nothing may be left over,
-and the second run must
-end with the first one's exit code. Inputs are the smallest that are of use, made by the tests' own writers.
+its end. Every file must have the same bytes (checkpoints: the same tensors), nothing may be left over, and the second
+run must end with the first one's exit code. Inputs are the smallest that are of use, made by the tests' own writers.
 """
 
 from __future__ import annotations
