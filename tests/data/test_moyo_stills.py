@@ -154,7 +154,7 @@ def test_words_that_are_no_choice(sessions, tmp_path):
         ValueError, match="frames: expected all, selected, or a list in a .py or .json file, got 'still'"
     ):
         data.open("moyo", sessions, frames="still")
-    with pytest.raises(ValueError, match=r"none.json: No such file"):
+    with pytest.raises(ValueError, match=r"none.json: there is no such file"):
         data.open("moyo", sessions, frames=str(tmp_path / "none.json"))
 
 

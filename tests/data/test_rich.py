@@ -221,7 +221,7 @@ def test_ways_to_the_world_that_cannot_be(one):
         path.write_text(json.dumps(said | change))
         refused(root, f"Pavallion_multicam2world.json: {message}")
     path.write_text(json.dumps(said)[:30])
-    refused(root, "Pavallion_multicam2world.json: expected R, t and c")
+    refused(root, "Pavallion_multicam2world.json: is no JSON")
     path.unlink()
     refused(root, "Pavallion_multicam2world.json: there is no such file")
 

@@ -78,9 +78,10 @@ def test_a_body_in_the_air(figure, lite, tmp_path):
 def test_a_body_in_millimetres(figure, lite, tmp_path):
     np.savez(tmp_path / "mm.npz", vertices=1000 * ip.body.posed(lite, "standing"), faces=lite.faces)
     said = figure("com", tmp_path / "mm.npz", "--body", "anny-lite")
-    assert said.code == 0
-    assert said.err.count("\n") == 1
-    assert "is it in millimetres?" in said.err
+    assert (said.code, said.err.count("\n")) == (1, 1)
+    assert "looks like millimetres" in said.err
+    assert "--units mm" in said.err
+    assert figure("com", tmp_path / "mm.npz", "--body", "anny-lite", "--units", "mm").code == 0
 
 
 @pytest.mark.parametrize(

@@ -193,6 +193,6 @@ def test_bad_input(figure, methods, lite, tmp_path):
     assert "anna.npz: expected parameters" in figure("compare", base, ours).err
     fitted(ours, "anna", lite, "tree")
     (ours / "anna" / "fit.json").write_text("{")
-    assert "fit.json: expected the record of a fit" in figure("compare", base, ours).err
+    assert "fit.json: is no JSON" in figure("compare", base, ours).err
     fitted(tmp_path / "others", "carl", lite, "tree")
     assert "nobody of the same name" in figure("compare", base, tmp_path / "others").err

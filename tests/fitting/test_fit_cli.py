@@ -130,7 +130,7 @@ def test_bad_items_leave_the_others_as_they_are(fit, tmp_path, standing):
     assert "confidence above 0" in failures["zero"]
     assert "expected a person" in failures["nobody"]
     assert "only 4 of" in failures["few"]
-    assert "expected JSON" in failures["corrupt"]
+    assert "is no JSON" in failures["corrupt"]
     assert "one of the formats" in failures["other"]
     assert "at least 32" in failures["pixel"] or "ipman_rs[photo]" in failures["pixel"]
     assert any("upside-down" in flag for flag in said.flags["turned"])
@@ -152,7 +152,7 @@ def test_when_all_fail_there_is_no_report(fit, tmp_path):
     (tmp_path / "corrupt.json").write_text("{")
     said = fit(tmp_path / "corrupt.json", tmp_path / "absent.json")
     assert said.code == 1
-    assert "expected JSON" in said.err
+    assert "is no JSON" in said.err
     assert "there is no such file" in said.err
     assert not said.report["bodies"]
 
@@ -375,7 +375,7 @@ def test_a_known_camera(fit, tmp_path, standing):
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        ("no json", "not a JSON file"),
+        ("no json", "is no JSON"),
         ('{"eye": 3}', "expected an object with some of R, t"),
         ('{"R": [1, 2, 3]}', "R: expected 3 × 3 finite numbers"),
         ('{"R": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}', "R: expected a rotation"),

@@ -75,7 +75,7 @@ def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(path, formats=("JPEG", "MPO", "PNG")) as image:  # others start programs
+            with Image.open(path, formats=("JPEG", "PNG")) as image:  # others start programs
                 pixels = np.array(ImageOps.exif_transpose(image).convert("RGB"))
     except Exception as error:  # damaged bytes can fail in any way
         raise ValueError(f"{path}: expected an image: {error}") from None

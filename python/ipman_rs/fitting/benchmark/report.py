@@ -256,18 +256,19 @@ def _number(value: float, digits: int) -> str:
 
 def _write_csv(found: Found, path: Path) -> None:
     """A line a body and row."""
-    with being_written(path) as stream, io.TextIOWrapper(stream, "utf-8", newline="") as file:
-        lines = csv.writer(file)
-        head: list[str] | None = None
-        for block, truth, results in found:
-            for result in results:
-                numbers = columns(result.figures, results[0].figures)
-                if head is None:
-                    head = list(numbers)
-                    lines.writerow(["block", "row", "body", "family", *head])
-                for body, family in enumerate(truth.family.tolist()):
-                    values = [f"{numbers[key][body]:.3f}" for key in head]
-                    lines.writerow([block.name, result.row.name, body, family, *values])
+    file = io.StringIO(newline="")
+    lines = csv.writer(file)
+    head: list[str] | None = None
+    for block, truth, results in found:
+        for result in results:
+            numbers = columns(result.figures, results[0].figures)
+            if head is None:
+                head = list(numbers)
+                lines.writerow(["block", "row", "body", "family", *head])
+            for body, family in enumerate(truth.family.tolist()):
+                values = [f"{numbers[key][body]:.3f}" for key in head]
+                lines.writerow([block.name, result.row.name, body, family, *values])
+    write_whole(path, file.getvalue())
 
 
 def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:

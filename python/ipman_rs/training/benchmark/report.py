@@ -151,16 +151,17 @@ def _signed(value: float, digits: int = 1) -> str:
 
 def _write_csv(found: Found, path: Path) -> None:
     """A line a body, row and seed."""
-    with being_written(path) as stream, io.TextIOWrapper(stream, "utf-8", newline="") as file:
-        lines = csv.writer(file)
-        lines.writerow(["labels", "row", "seed", "body", *COLUMNS])
-        for tilt, results in found.items():
-            for result in results:
-                for seed, figures in enumerate(result.figures):
-                    numbers = columns(figures)
-                    for body in range(len(figures.pve)):
-                        values = [f"{numbers[key][body]:.3f}" for key in COLUMNS]
-                        lines.writerow([f"{tilt:g}", result.row.name, seed, body, *values])
+    file = io.StringIO(newline="")
+    lines = csv.writer(file)
+    lines.writerow(["labels", "row", "seed", "body", *COLUMNS])
+    for tilt, results in found.items():
+        for result in results:
+            for seed, figures in enumerate(result.figures):
+                numbers = columns(figures)
+                for body in range(len(figures.pve)):
+                    values = [f"{numbers[key][body]:.3f}" for key in COLUMNS]
+                    lines.writerow([f"{tilt:g}", result.row.name, seed, body, *values])
+    write_whole(path, file.getvalue())
 
 
 def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:

@@ -173,7 +173,7 @@ class Images:
             return Image.fromarray(own(row))
         if frame.images is None:
             raise BadSample(f"{frame.names[0]}: no image")
-        with Image.open(regular(self.folder / str(frame.images[0])), formats=("JPEG", "MPO", "PNG")) as image:
+        with Image.open(regular(self.folder / str(frame.images[0])), formats=("JPEG", "PNG")) as image:
             return image.convert("RGB")
 
 
