@@ -135,8 +135,8 @@ def _judged(recording: Recording, template: Any, normal: np.ndarray, up_is_said:
     few = np.asarray(recording.vertices[judge.evenly(count, max(1, min(check.SAMPLE, SAMPLED_VERTICES // size)))])
     findings = judge.bodies(few, template, normal, up_is_said=up_is_said)
     if not any(each.level == "wrong" for each in findings):
-        masses = ip.mass_properties(few[judge.evenly(len(few), WEIGHED)], template).mass
-        findings += judge.mass(float(np.median(masses[np.isfinite(masses)]))) if np.isfinite(masses).any() else []
+        weighed = few[judge.evenly(len(few), WEIGHED)]
+        findings += judge.masses(ip.mass_properties(weighed, template).mass, weighed)
     return findings
 
 
