@@ -85,7 +85,7 @@ def test_a_mesh_without_known_parts_is_judged_by_its_shape(name):
         (1e2, "--units cm"),
         (10, "--units dm"),
         (1 / 0.0254, "--units in"),
-        (0.8 / 0.01, "--units cm or --units in"),
+        (60, "--units in or --units cm"),
         (1 / 0.3048, "--units ft"),
         (1e-3, "--units km"),
         (1e-5, "--units UNIT"),

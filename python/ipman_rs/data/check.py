@@ -25,7 +25,7 @@ UNITS = (
     ("kilometres", "km", 1e3), ("inches", "in", 0.0254), ("feet", "ft", 0.3048), ("micrometres", "1e-6", 1e-6),
 )  # fmt: skip
 TALL = 1.9  # m: the diagonal of the box of an adult who stands
-UNLIKE = 2.2  # times as large or small: no other unit is told for it
+UNLIKE = 2.5  # times as small: no other unit is told for it
 SMALL = 0.45  # m: newborn children span about so much
 BODY = (0.25, 3.5)  # m: extent of a body's joints or markers, rolled up or with raised arms
 WORLD = 100.0  # m: no body or camera is farther from the origin of its world
@@ -168,8 +168,8 @@ def extent_of(points: NDArray[Any]) -> float:
 
 def units_of(extent: float) -> list[tuple[str, str, float]]:
     """Up to two units, nearest first, in which a person who spans so much would be one: name, option and metres."""
-    sizes = [(abs(np.log(extent * metres / TALL)), each) for each in UNITS if extent * (metres := each[2]) > 0]
-    return [each for away, each in sorted(sizes)[:2] if away < np.log(UNLIKE)]
+    fits = [each for each in UNITS if TALL / UNLIKE < extent * each[2] <= BODY[1]]
+    return sorted(fits, key=lambda each: abs(np.log(extent * each[2] / TALL)))[:2]
 
 
 def _norms(vectors: NDArray[Any]) -> NDArray[np.float64]:
