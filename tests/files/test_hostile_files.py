@@ -150,6 +150,9 @@ def test_damaged_npy_is_refused_by_name(tmp_path):
             read_parts(path, FACES, None)
         with pytest.raises(ValueError, match=r"labels\.npy: "):
             joint_regressors.read(path)
+    path.write_bytes(good.replace(b"}", b" ", 1))
+    with pytest.raises(FileError, match=r"is no readable \.npy file \(its header is damaged"):
+        read_parts(path, FACES, None)
 
 
 def test_text_of_characters_that_are_none(tmp_path):
