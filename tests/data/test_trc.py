@@ -117,14 +117,14 @@ def test_names_with_their_persons(read):
 @pytest.mark.parametrize(
     "gap",
     ["9999.99", "-9999.99", "9999.990000", "999999", "99999.9", "-3.697314e28", "-3.69731E+28", "1e20", "NaN",
-     "nan(snan)", "-nan(ind)", "-1.#IND00", "1.#QNAN0", "0", "0.000"],
+     "nan(snan)", "-nan(ind)", "-1.#IND00", "1.#QNAN0", "-", "null", "0", "0.000"],
 )  # fmt: skip
 def test_what_stands_for_a_gap(read, gap):
     rows = [f"1\t0\t1\t2\t3\t{gap}\t{gap}\t{gap}\t7\t8\t9", "2\t0.01\t1\t2\t3\t4\t5\t6\t7\t8\t9"]
     found = read(text(rows))
     np.testing.assert_array_equal(found.confidence, [[1, 0, 1], [1, 1, 1]])
     np.testing.assert_array_equal(found.points[0, 1], 0)
-    if gap.strip("-0123456789.e+E") == "" and float(gap):
+    if gap != "-" and gap.strip("-0123456789.e+E") == "" and float(gap):
         assert found.notes == (f"{float(gap):.7g} is taken as not seen (L.ASIS)",)
     else:
         assert found.notes == ()
@@ -198,7 +198,8 @@ FULL = "1\t0\t1\t2\t3\t4\t5\t6\t7\t8\t9"
         (["1\t0\t1\t2\t3\t4\t5\t6"], "line 7: expected 14 columns for 4 markers, got 8"),
         (["1 0 1 2 3 4 5 6 7"], "line 7: expected 11 columns for 3 markers, got 9"),
         ([FULL, f"{FULL}\t1\t2\t3"], "line 7: expected 11 columns for 3 markers, got 11"),
-        (["1\t0\t1\t2\t3\t4\t5\t6\t7\t8\tx"], "line 7: expected numbers: .*'x'"),
+        (["1\t0\t1\t2\t3\t4\t5\t6\t7\t8\tx"], "line 7: expected numbers: 'x' is none"),
+        (["1\t0\t1\t2\t3\t4\t5\t6\t7\t8\t9,5"], "line 7: expected numbers: '9,5' is none; decimals need a point"),
     ],
 )  # fmt: skip
 def test_rows_that_cannot_be(read, rows, message):

@@ -125,6 +125,15 @@ def test_damaged_yaml_is_refused(tmp_path, damage):
         config.load(path)
 
 
+def test_yaml_in_other_encodings(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_bytes("a: é".encode("utf-16"))
+    assert read_yaml(path) == {"a": "é"}
+    path.write_bytes("a: é".encode("latin-1"))
+    with pytest.raises(ValueError, match=r"a\.yaml: is no YAML: it is no text in UTF-8; save it as UTF-8"):
+        read_yaml(path)
+
+
 def npy(array: np.ndarray) -> bytes:
     stream = io.BytesIO()
     np.save(stream, array)
