@@ -111,6 +111,11 @@ def test_names_with_their_persons(read):
     names = ("S1:C7", "S2:C7", "S2:L.ASIS")
     with pytest.raises(ValueError, match=r"two people in it, S1 \(1 marker\) and S2 \(2 markers\): say which one"):
         read(text(ROWS, names=names))
+    points = np.arange(1, 55).reshape(3, 6, 3) * 10.0
+    names_of_two = ("Al:C7", "Bob:LKNE", "Al:L.ASIS", "Bob:RKNE", "Al:R.ASIS", "Bob:LANK")
+    with pytest.raises(ValueError, match=r"two people in it, Al \(3 markers\) and Bob \(3 markers\): say which one"):
+        read(text(points, names=names_of_two))
+    same(read(text(points, names=names_of_two), subject="Al"), NAMES, points[:, ::2])
     same(read(text(ROWS, names=names), subject="S2"), ("C7", "L.ASIS"), ROWS[:, 1:])
 
 
@@ -126,8 +131,32 @@ def test_what_stands_for_a_gap(read, gap):
     np.testing.assert_array_equal(found.points[0, 1], 0)
     if gap != "-" and gap.strip("-0123456789.e+E") == "" and float(gap):
         assert found.notes == (f"{float(gap):.7g} is taken as not seen (L.ASIS)",)
+    elif gap.strip("0.") == "":
+        assert found.notes == ("0, 0, 0 is taken as not seen (L.ASIS)",)
     else:
         assert found.notes == ()
+
+
+@pytest.mark.parametrize("place", [(-1, -1, -1), (-500, -500, 2)])
+def test_one_place_again_and_again_is_a_gap(read, place):
+    points = 1000 + 10 * np.random.default_rng(0).normal(size=(20, 3, 3))
+    points[[3, 4, 9], 0] = points[[6, 7, 8], 2] = place
+    found = read(text(points))
+    lost = (points == place).all(-1)
+    np.testing.assert_array_equal(found.confidence, ~lost)
+    said = ", ".join(map(str, place))
+    assert found.notes == (f"{said} is taken as not seen (C7, R.ASIS)",)
+
+
+def test_places_that_are_held_are_no_gap(read):
+    """All markers stand still, one of them at a round place; one is held for a while; one has two names."""
+    still = np.repeat(ROWS[:1], 20, axis=0)
+    still[:, 1] = 500
+    assert read(text(still)).confidence.all()
+    points = 1000 + 10 * np.random.default_rng(0).normal(size=(20, 3, 3))
+    points[5:12, 0] = points[5, 0]
+    points[:, 2] = points[:, 0]
+    assert read(text(points)).confidence.all()
 
 
 def test_what_stands_for_no_gap(read):
