@@ -200,6 +200,15 @@ def test_rates(run, tmp_path):
     assert analyze(run, tmp_path / "fast.npz")["flags"] == ["2e+04 frames a second; --rate HZ says otherwise"]
 
 
+def test_a_rate_for_each_frame(run, tmp_path):
+    np.savez(tmp_path / "same.npz", **{**walk_parameters(), "mocap_framerate": np.full(8, 25.0)})
+    body = analyze(run, tmp_path / "same.npz", "--body", "anny-lite")
+    assert [frame["seconds"] for frame in body["frames"]] == [number / 25 for number in range(8)]
+    np.savez(tmp_path / "other.npz", **{**walk_parameters(), "mocap_framerate": np.arange(8.0)})
+    line = refused(run, "analyze", tmp_path / "other.npz", "--body", "anny-lite")
+    assert "mocap_framerate holds 8 different numbers, expected one; --rate HZ says otherwise" in line
+
+
 def test_a_root_that_is_one_matrix_is_one_body(run, tmp_path):
     models.smpl(tmp_path / "SMPL_NEUTRAL.npz")
     turn, betas = np.array([0.1, 0.6, -0.1]), np.linspace(-1, 1, 10)

@@ -111,23 +111,52 @@ def test_names_with_their_persons(read):
     names = ("S1:C7", "S2:C7", "S2:L.ASIS")
     with pytest.raises(ValueError, match=r"two people in it, S1 \(1 marker\) and S2 \(2 markers\): say which one"):
         read(text(ROWS, names=names))
+    points = np.arange(1, 55).reshape(3, 6, 3) * 10.0
+    names_of_two = ("Al:C7", "Bob:LKNE", "Al:L.ASIS", "Bob:RKNE", "Al:R.ASIS", "Bob:LANK")
+    with pytest.raises(ValueError, match=r"two people in it, Al \(3 markers\) and Bob \(3 markers\): say which one"):
+        read(text(points, names=names_of_two))
+    same(read(text(points, names=names_of_two), subject="Al"), NAMES, points[:, ::2])
     same(read(text(ROWS, names=names), subject="S2"), ("C7", "L.ASIS"), ROWS[:, 1:])
 
 
 @pytest.mark.parametrize(
     "gap",
     ["9999.99", "-9999.99", "9999.990000", "999999", "99999.9", "-3.697314e28", "-3.69731E+28", "1e20", "NaN",
-     "nan(snan)", "-nan(ind)", "-1.#IND00", "1.#QNAN0", "0", "0.000"],
+     "nan(snan)", "-nan(ind)", "-1.#IND00", "1.#QNAN0", "-", "null", "0", "0.000"],
 )  # fmt: skip
 def test_what_stands_for_a_gap(read, gap):
     rows = [f"1\t0\t1\t2\t3\t{gap}\t{gap}\t{gap}\t7\t8\t9", "2\t0.01\t1\t2\t3\t4\t5\t6\t7\t8\t9"]
     found = read(text(rows))
     np.testing.assert_array_equal(found.confidence, [[1, 0, 1], [1, 1, 1]])
     np.testing.assert_array_equal(found.points[0, 1], 0)
-    if gap.strip("-0123456789.e+E") == "" and float(gap):
+    if gap != "-" and gap.strip("-0123456789.e+E") == "" and float(gap):
         assert found.notes == (f"{float(gap):.7g} is taken as not seen (L.ASIS)",)
+    elif gap.strip("0.") == "":
+        assert found.notes == ("0, 0, 0 is taken as not seen (L.ASIS)",)
     else:
         assert found.notes == ()
+
+
+@pytest.mark.parametrize("place", [(-1, -1, -1), (-500, -500, 2)])
+def test_one_place_again_and_again_is_a_gap(read, place):
+    points = 1000 + 10 * np.random.default_rng(0).normal(size=(20, 3, 3))
+    points[[3, 4, 9], 0] = points[[6, 7, 8], 2] = place
+    found = read(text(points))
+    lost = (points == place).all(-1)
+    np.testing.assert_array_equal(found.confidence, ~lost)
+    said = ", ".join(map(str, place))
+    assert found.notes == (f"{said} is taken as not seen (C7, R.ASIS)",)
+
+
+def test_places_that_are_held_are_no_gap(read):
+    """All markers stand still, one of them at a round place; one is held for a while; one has two names."""
+    still = np.repeat(ROWS[:1], 20, axis=0)
+    still[:, 1] = 500
+    assert read(text(still)).confidence.all()
+    points = 1000 + 10 * np.random.default_rng(0).normal(size=(20, 3, 3))
+    points[5:12, 0] = points[5, 0]
+    points[:, 2] = points[:, 0]
+    assert read(text(points)).confidence.all()
 
 
 def test_what_stands_for_no_gap(read):
@@ -198,7 +227,8 @@ FULL = "1\t0\t1\t2\t3\t4\t5\t6\t7\t8\t9"
         (["1\t0\t1\t2\t3\t4\t5\t6"], "line 7: expected 14 columns for 4 markers, got 8"),
         (["1 0 1 2 3 4 5 6 7"], "line 7: expected 11 columns for 3 markers, got 9"),
         ([FULL, f"{FULL}\t1\t2\t3"], "line 7: expected 11 columns for 3 markers, got 11"),
-        (["1\t0\t1\t2\t3\t4\t5\t6\t7\t8\tx"], "line 7: expected numbers: .*'x'"),
+        (["1\t0\t1\t2\t3\t4\t5\t6\t7\t8\tx"], "line 7: expected numbers: 'x' is none"),
+        (["1\t0\t1\t2\t3\t4\t5\t6\t7\t8\t9,5"], "line 7: expected numbers: '9,5' is none; decimals need a point"),
     ],
 )  # fmt: skip
 def test_rows_that_cannot_be(read, rows, message):

@@ -309,6 +309,14 @@ def test_yolo(read):
     assert said(found) == ["points at 0, 0 taken as not seen"]
 
 
+def test_points_at_minus_one_were_not_seen(read):
+    points = COCO.copy()
+    points[7] = -1
+    found = read([instance(keypoints=points.tolist())])
+    assert seen(found, "left_elbow") == 0
+    assert said(found) == ["points at -1, -1 taken as not seen"]
+
+
 def test_points_without_numbers_were_not_seen(read):
     gap = [[None, None] if n == 7 else point for n, point in enumerate(COCO.tolist())]
     found = read([instance(keypoints=gap)])

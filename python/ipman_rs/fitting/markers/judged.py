@@ -28,6 +28,7 @@ ARMS = ("upper_arm", "biceps", "elbow", "elbow_lateral", "elbow_medial", "forear
         "wrist_back", "hand", "hand_back", "hand_back_5", "index", "pinky", "thumb")  # fmt: skip
 FEET = re.compile(r"heel|toe|malleolus|metatarsal|midfoot|ankle|foot")
 
+BELOW = 0.15  # m: farther below the floor is no marker of a foot
 SKIN = (-0.015, 0.04)  # m from the skin to a marker's middle; 7 to 15 mm are usual
 
 
@@ -83,6 +84,21 @@ def of_size(points: Array, unit: float) -> list[Finding]:
     said = found[0].what.rpartition(": ")[2]
     option = " or ".join(f"--units {option}" for _, option, _ in fits)
     return [Finding("wrong", f"markers: {said}, if the file's unit is right", option=option)]
+
+
+def of_floor(tracks: Tracks, meanings: Mapping[str, Meaning], ground: float = 0.0) -> list[Finding]:
+    """Whether the lowest marker of each frame is not below a floor at y = `ground` m."""
+    known = tracks.select([name for name in tracks.names if name in meanings])
+    rows = rows_to_judge(known)
+    if not len(rows):
+        return []
+    heights = np.where(known.confidence[rows] > 0, known.points[rows, :, 1], np.inf).min(axis=1) - ground
+    heights = heights[np.isfinite(heights)]
+    middle = float(np.median(heights)) if len(heights) else 0.0
+    if middle >= -BELOW:
+        return []
+    said = f"the lowest markers are {-middle:.2f} m below the floor in the median"
+    return [Finding("odd", said, option="--ground HEIGHT")]
 
 
 def of_rate(tracks: Tracks) -> list[Finding]:
