@@ -26,6 +26,7 @@ FARTHEST = 1e7  # in any unit: programs write a number beyond it for what was no
 # 999, 9999.99, 99999.9 …: what programs write for a marker that was not seen.
 NINES = np.array([10.0**whole - 10.0**-part for whole in range(3, 7) for part in range(8 - whole)])
 WORDS = 32767.0, 32768.0, 2147483648.0  # the last integers, which mean the same
+FEWEST = 6  # markers of a person; a ball, a bat or a box has fewer
 NAMELESS = re.compile(r"\*\d*|(?:unlabell?ed|unnamed|uname)[ _*-]*\d*", re.IGNORECASE)
 
 
@@ -142,6 +143,7 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     """The markers by name, without the subject that stands before a colon ("S01:LASI").
 
     Left out, and named: points without a name, the shorter of two markers of one name, other people than `subject`.
+    Two subjects are two people where both have a marker of one name, or both have FEWEST markers.
     ValueError for two people of whom none is chosen, and for an unknown one.
     """
     notes = []
@@ -151,6 +153,9 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     split = {column: names[column].rpartition(":") for column in known}
     people = dict.fromkeys(split[column][0].strip() for column in known)
     chosen = _person([*people], split, seen, source, subject)
+    joined = [*dict.fromkeys(w for c, (who, _, _) in split.items() if (w := who.strip()) and seen[:, c].any())]
+    if chosen is None and len(joined) > 1:
+        notes.append(f"the markers of {_some(joined)} are taken as one person's (subject, --subject: those of one)")
     if chosen is not None:
         others = [column for column in known if split[column][0].strip() not in ("", chosen)]
         known = [column for column in known if column not in set(others)]
@@ -187,7 +192,12 @@ def _person(
         return known[subject.strip().rstrip(":").lower()]
     markers = {person: {split[c][2].strip() for c in split if split[c][0].strip() == person} for person in people}
     shown = [p for p in people if any(seen[:, c].any() for c in split if split[c][0].strip() == p)]
-    rivals = [p for p in shown if p and any(markers[p] & markers[other] for other in shown if other and other != p)]
+    large = [p for p in shown if len(markers[p]) >= FEWEST]
+    rivals = [
+        p
+        for p in shown
+        if p and any(markers[p] & markers[q] or (p in large and q in large) for q in shown if q and q != p)
+    ]
     if not rivals:
         hidden = [p for p in people if p and p not in shown]
         return next((p for p in shown if p and any(markers[p] & markers[other] for other in hidden)), None)
