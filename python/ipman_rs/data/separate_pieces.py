@@ -43,7 +43,7 @@ def _below(heights: Array, piece: NDArray[np.int64], large: NDArray[np.bool_], g
     return [Finding("odd", what, "the ground and the contact are theirs: take them out of the file")]
 
 
-def separate(faces: NDArray[np.integer[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def separate(faces: NDArray[np.integer[Any]]) -> tuple[NDArray[np.integer[Any]], NDArray[np.int64]]:
     """The vertices (N,) that faces (F, 3) use, and for each the number of its piece, from 0: faces join vertices."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
