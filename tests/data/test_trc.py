@@ -119,6 +119,20 @@ def test_names_with_their_persons(read):
     same(read(text(ROWS, names=names), subject="S2"), ("C7", "L.ASIS"), ROWS[:, 1:])
 
 
+def test_two_people_who_share_no_name(read):
+    """Each was recorded with markers of their own: half a person each would be nobody."""
+    rows = np.arange(1.0, 1 + 2 * 12 * 3).reshape(2, 12, 3)
+    names = [f"{('Al', 'Bob')[number % 2]}:M{number}" for number in range(12)]
+    with pytest.raises(ValueError, match=r"two people in it, Al \(6 markers\) and Bob \(6 markers\): say which one"):
+        read(text(rows, names=names, markers=12))
+    same(read(text(rows, names=names, markers=12), subject="Al"), [f"M{k}" for k in range(0, 12, 2)], rows[:, ::2])
+    wand = read(
+        text(rows[:, :11], names=[*[f"Al:M{k}" for k in range(6)], *[f"Wand:{k}" for k in range(5)]], markers=11)
+    )
+    assert wand.names[-1] == "4"
+    assert wand.notes == ("the markers of Al, Wand are taken as one person's (subject, --subject: those of one)",)
+
+
 @pytest.mark.parametrize(
     "gap",
     ["9999.99", "-9999.99", "9999.990000", "999999", "99999.9", "-3.697314e28", "-3.69731E+28", "1e20", "NaN",

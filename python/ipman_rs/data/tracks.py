@@ -187,6 +187,7 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     """The markers by name, without the subject that stands before a colon ("S01:LASI").
 
     Left out, and named: points without a name, the shorter of two markers of one name, other people than `subject`.
+    Two subjects are two people where both have a marker of one name, or both have FEWEST markers.
     ValueError for two people of whom none is chosen, and for an unknown one.
     """
     notes = []
@@ -196,6 +197,9 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     split = {column: names[column].rpartition(":") for column in known}
     people = dict.fromkeys(split[column][0].strip() for column in known)
     chosen = _person([*people], split, seen, source, subject)
+    joined = [*dict.fromkeys(w for c, (who, _, _) in split.items() if (w := who.strip()) and seen[:, c].any())]
+    if chosen is None and len(joined) > 1:
+        notes.append(f"the markers of {_some(joined)} are taken as one person's (subject, --subject: those of one)")
     if chosen is not None:
         others = [column for column in known if split[column][0].strip() not in ("", chosen)]
         known = [column for column in known if column not in set(others)]
