@@ -106,6 +106,20 @@ def test_markers_without_a_name(read):
     assert "more than one marker is called C7" in twice.notes[0]
 
 
+@pytest.mark.parametrize("headings", ["\tTime", "Frame#\t", "\t", "Frame No.\tTime (s)", "Bild\tZeit"])
+def test_headings_that_are_missing_or_called_otherwise(read, headings):
+    """Each marker keeps its own coordinates, also without a name for frames and times."""
+    content = text(ROWS)
+    same(read(content.replace("Frame#\tTime", headings)))
+    if headings.strip():
+        same(read(text(ROWS, axes=False).replace("Frame#\tTime", headings)))
+    if headings != "\t":
+        same(read(content.replace("Frame#\tTime", headings.strip())))  # its tab is missing as well
+        if "Zeit" not in headings:
+            same(read(text(ROWS, tab=" ").replace("Frame# Time", headings.replace("\t", " "))))
+    same(read(content.replace("Frame#\tTime", headings).replace("\tC7\t", "\t\t")), NAMES[1:], ROWS[:, 1:])
+
+
 def test_names_with_their_persons(read):
     same(read(text(ROWS, names=[f"S01:{name}" for name in NAMES])))
     names = ("S1:C7", "S2:C7", "S2:L.ASIS")

@@ -6,6 +6,7 @@ two tabs is a coordinate that was not measured, but tabs that are doubled throug
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,10 @@ from .tracks import Tracks, rate_of, tracks
 
 HEADER = 5  # lines: two of header fields, their values, the markers' names, their axes
 LEAST = 4  # columns of a row: frame, time and something of a marker
+FRAME = re.compile(r"frames?\s*(?:#|no\.?|nr\.?|number)?", re.IGNORECASE)
+TIME = re.compile(r"time\s*[(\[]?\s*(?:s|secs?|seconds)?\s*[)\]]?", re.IGNORECASE)
+HEADINGS = re.compile(rf"\s*{FRAME.pattern}(?:\s+{TIME.pattern}(?=\s)|(?=\s))|\s*{TIME.pattern}(?=\s)", re.IGNORECASE)
+X_AXIS = re.compile(r"x\d+", re.IGNORECASE)
 UNLIKE = 0.01  # of the rate: that far the header's may be from the times'
 
 
@@ -40,9 +45,8 @@ def read(
     head = next((row for row, line in enumerate(lines[:20]) if line.strip().lower().startswith("frame")), 3)
     header, notes = _header(lines[1:head]), []
     rows = [(number, line) for number, line in enumerate(lines[head + 1 :], head + 2) if line.strip()]
-    if rows and not _is_number(rows[0][1].split()[0]):  # the axes: X1, Y1, Z1, …
-        rows.pop(0)
-    names, table = _table_of(rows, lines[head], header, source)
+    axes = rows.pop(0)[1] if rows and not _is_number(rows[0][1].split()[0]) else ""  # X1, Y1, Z1, …
+    names, table = _table_of(rows, _names(lines[head], axes), header, source)
     if table.markers > len(names):
         more = table.markers - len(names)
         notes.append(f"{more} {'marker' if more == 1 else 'markers'} without a name behind the named ones left out")
@@ -81,20 +85,35 @@ def _is_number(text: str) -> bool:
         return False
 
 
-def _names(line: str) -> tuple[list[str], list[str]]:
-    """The markers' names: by the places of their columns, "" of one without a name; and those that are not blank."""
+def _names(line: str, axes: str) -> tuple[list[str], list[str]]:
+    """The markers' names: by the places of their columns, "" of one without a name; and those that are not blank.
+
+    `axes`: the line below, "" of a file without one, whose X1, X2, … stand in the columns in which markers begin.
+    """
     cells = [cell.strip() for cell in line.rstrip().split("\t")]
-    if len([cell for cell in cells if cell]) < 3:
-        words = line.split()[2:]
+    begins = [place for place, cell in enumerate(axes.rstrip().split("\t")) if X_AXIS.fullmatch(cell.strip())]
+    filled = [place for place, cell in enumerate(cells) if cell]
+    if begins and {place for place in filled if place >= begins[0]} <= set(begins) and len(cells) > begins[0]:
+        placed = [cells[place] for place in begins if place < len(cells)]
+        return placed, [name for name in placed if name]
+    if len(filled) < 3:
+        words = HEADINGS.sub("", line).split() if HEADINGS.match(line) else line.split()[2:]
         return words, words
-    second = [place for place, cell in enumerate(cells) if cell][1]  # Time
-    places = cells[second + 1 :]
-    filled = [cell for cell in places if cell]
-    while places and not places[0]:  # doubled tabs before the first name
-        places.pop(0)
+    filled = filled[_headings([cells[place] for place in filled], filled, len(begins)) :]
+    places = cells[filled[0] :]
+    names = [cell for cell in places if cell]
     if any(places[place] for place in range(len(places)) if place % 3):  # a column a name, or tabs as they came
-        return filled, filled
-    return places[::3], filled
+        return names, names
+    return places[::3], names
+
+
+def _headings(cells: list[str], places: list[int], markers: int) -> int:
+    """How many of a line's cells, which stand at these places, are Frame# and Time; of `markers`, 0 if unknown."""
+    frame = int(FRAME.fullmatch(cells[0]) is not None)
+    known = frame + (TIME.fullmatch(cells[frame]) is not None)
+    if markers:  # in other words
+        return max(known, min(2, len(cells) - markers))
+    return max(known, sum(place < 2 for place in places[:2]))
 
 
 @dataclass(frozen=True)
@@ -108,10 +127,10 @@ class _Table:
 
 
 def _table_of(
-    rows: Sequence[tuple[int, str]], line: str, header: dict[str, str], source: str
+    rows: Sequence[tuple[int, str]], names: tuple[list[str], list[str]], header: dict[str, str], source: str
 ) -> tuple[list[str], _Table]:
-    """The names and the rows that go together."""
-    by_place, filled = _names(line)
+    """The names, of two readings of them, and the rows that go together."""
+    by_place, filled = names
     declared = header.get("nummarkers", "")
     said = int(float(declared)) if _is_number(declared) else None
     try:
