@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -126,6 +128,26 @@ def test_names_with_their_persons(read):
     with pytest.raises(ValueError, match=r"two people in it, S1 \(1 marker\) and S2 \(2 markers\): say which one"):
         read(text(ROWS, names=names))
     same(read(text(ROWS, names=names), subject="S2"), ("C7", "L.ASIS"), ROWS[:, 1:])
+
+
+def test_two_people_of_whom_one_has_no_name(read):
+    points = np.concatenate([ROWS, ROWS + 700], axis=1)
+    content = text(points, names=[*NAMES, *(f"B:{name}" for name in NAMES)])
+    with pytest.raises(ValueError, match=r'two people in it, "" \(without.*\) \(3 markers\) and B .*--subject B\)'):
+        read(content)
+    same(read(content, subject="b"), NAMES, points[:, 3:])
+    same(read(content, subject=""), NAMES, ROWS)
+    alone = read(text(ROWS, names=("C7", "B:L.ASIS", "B:R.ASIS")))
+    same(alone)  # nothing of one is twice there
+    same(read(text(ROWS, names=("C7", "B:L.ASIS", "B:R.ASIS")), subject="B"))
+
+
+def test_five_thousand_subjects_at_once(read):
+    begun = time.perf_counter()
+    with pytest.raises(ValueError, match="two people in it"):
+        read(text(np.ones((1, 5000, 3)), names=[f"S{number}:C7" for number in range(5000)]))
+    read(text(np.ones((1, 5000, 3)), names=[f"S{number}:C{number}" for number in range(5000)]))
+    assert time.perf_counter() - begun < 4
 
 
 @pytest.mark.parametrize(

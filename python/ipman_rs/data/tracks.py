@@ -29,6 +29,9 @@ WORDS = 32767.0, 32768.0, 2147483648.0  # the last integers, which mean the same
 NAMELESS = re.compile(r"\*\d*|(?:unlabell?ed|unnamed|uname)[ _*-]*\d*", re.IGNORECASE)
 
 
+NOBODY = '"" (without a name before a colon)'
+
+
 @dataclass(frozen=True, eq=False)
 class Tracks:
     """M markers in T samples, metres, y up. A marker that was not seen has confidence 0 and lies at 0."""
@@ -142,6 +145,7 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     """The markers by name, without the subject that stands before a colon ("S01:LASI").
 
     Left out, and named: points without a name, the shorter of two markers of one name, other people than `subject`.
+    `subject` "" is who has none.
     ValueError for two people of whom none is chosen, and for an unknown one.
     """
     notes = []
@@ -152,11 +156,14 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     people = dict.fromkeys(split[column][0].strip() for column in known)
     chosen = _person([*people], split, seen, source, subject)
     if chosen is not None:
-        others = [column for column in known if split[column][0].strip() not in ("", chosen)]
-        known = [column for column in known if column not in set(others)]
+        own = {split[column][2].strip() for column in known if split[column][0].strip() == chosen}
+        nobodys = {split[column][2].strip() for column in known if not split[column][0].strip()}
+        with_him = {chosen} if own & nobodys else {"", chosen}  # names without a person are another one's, or his too
+        others = [column for column in known if split[column][0].strip() not in with_him]
+        known = [column for column in known if split[column][0].strip() in with_him]
         if others:
-            of = ", ".join(dict.fromkeys(split[column][0].strip() for column in others))
-            notes.append(f"the markers of {chosen} are taken, those of {of} left out ({len(others)})")
+            of = ", ".join(dict.fromkeys(split[column][0].strip() or NOBODY for column in others))
+            notes.append(f"the markers of {chosen or NOBODY} are taken, those of {of} left out ({len(others)})")
     best: dict[str, int] = {}
     twice = []
     for column in known:
@@ -180,19 +187,35 @@ def _person(
 ) -> str | None:
     """The chosen subject; None where all the markers can be of one person."""
     if subject is not None:
-        known = {person.lower(): person for person in people if person}
-        if subject.strip().rstrip(":").lower() not in known:
-            expected = f"one of {', '.join(known.values())}" if known else "none, for no marker has one"
+        known = {person.lower(): person for person in people}
+        wanted = subject.strip().rstrip(":").lower()
+        if wanted not in known or not any(people):
+            have = [person or NOBODY for person in people]
+            expected = f"one of {', '.join(have)}" if any(people) else "none, for no marker has one"
             raise ValueError(f"{source}: subject: expected {expected}, got {subject!r}")
-        return known[subject.strip().rstrip(":").lower()]
-    markers = {person: {split[c][2].strip() for c in split if split[c][0].strip() == person} for person in people}
-    shown = [p for p in people if any(seen[:, c].any() for c in split if split[c][0].strip() == p)]
-    rivals = [p for p in shown if p and any(markers[p] & markers[other] for other in shown if other and other != p)]
+        return known[wanted]
+    markers: dict[str, set[str]] = {person: set() for person in people}
+    shown, of_marker = dict.fromkeys(people, False), dict[str, list[str]]()
+    there = seen.any(axis=0)
+    for column, (person, _, marker) in split.items():
+        person, marker = person.strip(), marker.strip()
+        if marker not in markers[person]:
+            of_marker.setdefault(marker, []).append(person)
+        markers[person].add(marker)
+        shown[person] |= bool(there[column])
+    shared = [[person for person in each if shown[person]] for each in of_marker.values() if len(each) > 1]
+    rivals = {person for each in shared if len(each) > 1 for person in each}
     if not rivals:
-        hidden = [p for p in people if p and p not in shown]
-        return next((p for p in shown if p and any(markers[p] & markers[other] for other in hidden)), None)
-    of = " and ".join(f"{person} ({_count(len(markers[person]), 'marker')})" for person in rivals)
-    raise ValueError(f"{source}: two people in it, {of}: say which one (subject={rivals[0]!r}, --subject {rivals[0]})")
+        hidden = {person for each in of_marker.values() if not all(map(shown.get, each)) for person in each}
+        return next((person for person in people if person and shown[person] and person in hidden), None)
+    first, *more = [person for person in people if person in rivals]
+    of = [f"{person or NOBODY} ({_count(len(markers[person]), 'marker')})" for person in [first, *more]]
+    one = first or more[0]
+    raise ValueError(f"{source}: two people in it, {_and(of)}: say which one (subject={one!r}, --subject {one})")
+
+
+def _and(people: Sequence[str], most: int = 4) -> str:
+    return " and ".join([*people[:most], *([f"{len(people) - most} more"] if len(people) > most else [])])
 
 
 def _scale(unit: str | float, seen: Array, source: str) -> float:
