@@ -24,7 +24,8 @@ TO_Y_UP = {
 LARGEST = 20.0  # nobody's markers are farther apart, in metres; in millimetres everybody's are
 FARTHEST = 1e7  # in any unit: programs write a number beyond it for what was not seen, NDI's -3.697314e28
 # 999, 9999.99, 99999.9 …: what programs write for a marker that was not seen.
-NINES = np.array([10.0**whole - 10.0**-part for whole in range(3, 7) for part in range(8 - whole)])
+NINES = np.array([10.0**whole - 10.0**-part for whole in range(3, 8) for part in range(8 - whole)])
+MORE_NINES = np.array([float("9" * whole + "." + "9" * part) for whole in range(3, 8) for part in range(8 - whole, 9)])
 WORDS = 32767.0, 32768.0, 2147483648.0  # the last integers, which mean the same
 NAMELESS = re.compile(r"\*\d*|(?:unlabell?ed|unnamed|uname)[ _*-]*\d*", re.IGNORECASE)
 
@@ -119,7 +120,8 @@ def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], lis
     with np.errstate(invalid="ignore"):
         size = np.abs(points)
         nines = (size >= 999) & (size < FARTHEST)
-        nines[nines] = np.isclose(size[nines][:, None], NINES, rtol=6e-8, atol=0).any(-1)  # half of float32's spacing
+        large = size[nines]  # within half of float32's spacing, or with digits that only text has
+        nines[nines] = np.isclose(large[:, None], NINES, rtol=6e-8, atol=0).any(-1) | np.isin(large, MORE_NINES)
         far = (size >= FARTHEST).any(-1)
         alike = (size == size[..., :1]).all(-1)
     stands = far | (nines & (size >= 9999)).any(-1) | (alike & (nines.all(-1) | np.isin(size[..., 0], WORDS)))
