@@ -54,7 +54,9 @@ def read(
         notes.append(f"{table.short} rows end before the last marker; what they lack is taken as not seen")
     numbers = text_file.table(table.rows, [f"{source}: line {number}" for number in table.lines])
     numbers = numbers.reshape(len(table.rows), 1 + 3 * table.markers)
-    times = _times(numbers[:, 0], table.lines, source, notes) if rate is None else np.arange(len(numbers)) / rate
+    times = (
+        text_file.seconds(numbers[:, 0], table.lines, source, notes) if rate is None else np.arange(len(numbers)) / rate
+    )
     points = numbers[:, 1 : 1 + 3 * len(names)].reshape(len(times), len(names), 3)
     _compare(header, times, notes)
     said = header.get("units", "") if unit is None else unit
@@ -188,23 +190,6 @@ def _whole(cells: list[str]) -> bool:
     """Whether no marker has some of its coordinates only."""
     empty = [not cell.strip() for cell in cells[2:]]
     return all(len(set(empty[at : at + 3])) == 1 for at in range(0, len(empty), 3))
-
-
-def _times(times: np.ndarray, lines: Sequence[int], source: str, notes: list[str]) -> np.ndarray:
-    """Seconds. ValueError for a row without a time and for times that go back; equal ones are spread evenly."""
-    if np.isnan(times).any():
-        line = lines[int(np.isnan(times).argmax())]
-        raise ValueError(f"{source}: line {line}: expected seconds in the column Time, it is blank or no number")
-    steps = np.diff(times)
-    if not np.isfinite(times).all() or (steps < 0).any():
-        row = int((~np.isfinite(times)).argmax() if not np.isfinite(times).all() else (steps < 0).argmax() + 1)
-        raise ValueError(f"{source}: line {lines[row]}: expected times that increase, got {times[row]:g} s")
-    if not (steps == 0).any():
-        return times
-    if times[-1] == times[0]:
-        raise ValueError(f"{source}: line {lines[1]}: expected times that increase, all are {times[0]:g} s")
-    notes.append("some times are equal: they are taken as evenly spaced from the first to the last")
-    return np.linspace(times[0], times[-1], len(times))
 
 
 def _compare(header: dict[str, str], times: np.ndarray, notes: list[str]) -> None:
