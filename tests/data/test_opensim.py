@@ -301,6 +301,15 @@ def test_many_columns_at_once(tmp_path):
     assert time.perf_counter() - begun < 5
 
 
+def test_many_markers_at_once(tmp_path):
+    names = [f"M{number}" for number in range(20_000)]
+    head = "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tNumMarkers\tUnits\n100\t20000\tm\nFrame#\tTime\t"
+    (tmp_path / "a.trc").write_text(head + "\t\t\t".join(names) + "\n\n1\t0" + "\t1\t1.5\t2" * 20_000 + "\n")
+    begun = time.perf_counter()
+    opensim.check(tmp_path / "a.trc")
+    assert time.perf_counter() - begun < 5
+
+
 def test_names_with_blanks_in_them(tmp_path):
     (tmp_path / "a.sto").write_text("x\nendheader\ntime\tleft knee\ta\n0\t1\t2\n")
     assert [*opensim.storage(tmp_path / "a.sto").columns] == ["left knee", "a"]

@@ -67,7 +67,9 @@ def test_doubled_tabs_in_the_values_alone(read):
     lines[2] = "  100.0\t\t  100.0\t\t    3\t\t     3\t\t mm\t  100.0\t      1\t    3"
     same(read("\n".join(lines)))
     lines[2] = lines[2].replace("mm", "  ")
-    same(read("\n".join(lines)))  # nobody is 250 m long
+    found = read("\n".join(lines))
+    same(found)  # nobody is 250 m long
+    assert found.notes == ("its unit of length is not given: taken as mm (--units)",)
 
 
 def test_doubled_tabs_in_the_rows_alone(read):

@@ -360,7 +360,8 @@ def _frames(
 ) -> Frames:
     joints = np.full((len(tracks), len(markers), 3), np.nan)
     seen = np.where(tracks.confidence[..., None] > 0, tracks.points, np.nan)
-    joints[:, [markers.index(marker) for marker in tracks.names]] = seen
+    column = {marker: index for index, marker in enumerate(markers)}
+    joints[:, [column[marker] for marker in tracks.names]] = seen
     demand(tracks.source, size_of_body("joints", joints))
     at = None if forces is None else plates(storage(forces), loads=loads).at(tracks.times)
     lasted = float(tracks.times[-1] - tracks.times[0])  # the times of single samples are often rounded to milliseconds

@@ -56,10 +56,11 @@ class Tracks:
 
     def select(self, names: Sequence[str]) -> Tracks:
         """These markers, in this order. ValueError for one that was not recorded."""
-        missing = [name for name in names if name not in self.names]
+        column = {name: index for index, name in enumerate(self.names)}
+        missing = [name for name in names if name not in column]
         if missing:
             raise ValueError(f"names: {self.source} has no marker {missing[0]!r}; it has {', '.join(self.names)}")
-        columns = [self.names.index(name) for name in names]
+        columns = [column[name] for name in names]
         return replace(self, names=tuple(names), points=self.points[:, columns], confidence=self.confidence[:, columns])
 
 
@@ -99,7 +100,8 @@ def tracks(
         raise ValueError(f"{source}: expected coordinates, all are missing")
     scale = _scale(unit, points[seen], source)
     turned = np.where(seen[..., None], points, 0.0) * scale @ TO_Y_UP[up].T
-    told = (*notes, *said, *chosen.notes)
+    guessed = [not_given(likely_unit(points[seen]))] if unit == "" else []
+    told = (*notes, *said, *chosen.notes, *guessed)
     return Tracks(chosen.names, turned, seen.astype(float), np.asarray(times, float), source, told, up, scale)
 
 
@@ -229,7 +231,17 @@ def _scale(unit: str | float, seen: Array, source: str) -> float:
         if scale is None:
             raise ValueError(f"{source}: units: expected one of {', '.join(METRES)}, got {unit!r}")
         return scale
-    return METRES["mm"] if np.ptp(seen, axis=0).max() > LARGEST else METRES["m"]
+    return METRES[likely_unit(seen)]
+
+
+def likely_unit(points: Array) -> str:
+    """The unit of points (n, 3) of a person, where a file does not say it: nobody's are LARGEST metres apart."""
+    return "mm" if np.ptp(points, axis=0).max() > LARGEST else "m"
+
+
+def not_given(unit: str) -> str:
+    """The note on a unit that a file does not say."""
+    return f"its unit of length is not given: taken as {unit} (--units)"
 
 
 def _count(number: int, what: str) -> str:
