@@ -134,6 +134,16 @@ def test_analogue_samples_that_cannot_be():
         c3d_format.content(more)
 
 
+def test_a_rate_that_the_header_says_otherwise():
+    right = raw.c3d(raw.points_of(5, 40), np.ones((400, 6)), samples=10)
+    assert c3d_format.content(right).notes == ()
+    found = c3d_format.content(right.replace(raw.parameter(1, "RATE", 100.0), raw.parameter(1, "RATE", 50.0)))
+    assert "its header says 100 Hz, POINT:RATE says 50 Hz, which is believed (--rate)" in found.notes
+    assert "ANALOG:RATE and 10 samples a frame say 100 Hz, POINT:RATE says 50 Hz, which is believed (--rate)" in (
+        found.notes
+    )
+
+
 def test_an_offset_that_is_wrong():
     """As badParameterOffset of BTK's conformance files: the next parameter is where this one ends."""
     for offset in (5, 90):

@@ -204,6 +204,17 @@ def test_times(read):
     assert coarse.notes == ("some times are equal: they are taken as evenly spaced from the first to the last",)
 
 
+def test_times_with_a_gap(read):
+    """The rate is that of the frames on both sides of it."""
+    row = "\t1\t2\t3\t4\t5\t6\t7\t8\t9"
+    found = read(text([f"{n}\t{n / 100 + 5 * (n > 20):g}{row}" for n in range(50)]))
+    assert found.rate == pytest.approx(100)
+    said = "its times have a gap, at t = 0.2 s (of 5.01 s): the frames before and after are taken as neighbours"
+    assert found.notes == (said,)
+    lost = read(text([f"{n}\t{n / 100:g}{row}" for n in range(50) if n != 20]))
+    assert lost.rate == pytest.approx(100, rel=0.03)
+
+
 def test_a_header_that_says_otherwise(read):
     found = read(text(ROWS, rate="60", frames=238))
     assert found.notes == (

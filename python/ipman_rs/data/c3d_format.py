@@ -24,6 +24,7 @@ WIDTHS = {-1: 1, 1: 1, 2: 2, 4: 4}  # bytes of a character, byte, integer or rea
 MOST_DIMENSIONS = 7
 MOST_RECORDS = 20_000  # of parameters; files have hundreds
 NEARLY = 1e-3  # of a rate: that far the analogue one may be from a multiple of the points'
+UNLIKE = 0.01  # of a rate: that far two that mean the same may be from each other
 LARGEST_COUNT = 0xFFFF  # of two bytes: files with as many frames or more say elsewhere how many
 
 
@@ -63,6 +64,7 @@ def content(data: bytes) -> Content:
     notes: list[str] = []
     parameters = _parameters(numbers, begin, header[8], notes)
     start, layout = _layout(numbers, header, parameters, notes)
+    _compare_rates(float(numbers.reals(20, 1)[0]), header, parameters, notes)
     frames = _frames(len(data) - start, layout, header, parameters, notes)
     count = frames * layout.size // (4 if layout.real else 2)
     stored = numbers.reals(start, count) if layout.real else numbers.integers(start, count)
@@ -241,6 +243,19 @@ def _samples(header: list[int], parameters: Parameters) -> list[int]:
 
 def _or(counts: list[int]) -> str:
     return " or ".join(map(str, counts))
+
+
+def _compare_rates(of_header: float, header: list[int], parameters: Parameters, notes: list[str]) -> None:
+    """Notes of rates of the points that are not POINT:RATE, which is believed."""
+    rate, analogs = _first(parameters, "POINT", "RATE"), _first(parameters, "ANALOG", "RATE")
+    if not rate or not math.isfinite(rate) or rate <= 0:
+        return
+    others = [("its header says", of_header)]
+    if analogs and header[9] and header[2]:
+        others.append((f"ANALOG:RATE and {header[9]} samples a frame say", analogs / header[9]))
+    for what, other in others:
+        if math.isfinite(other) and other > 0 and abs(other / rate - 1) > UNLIKE:
+            notes.append(f"{what} {other:.4g} Hz, POINT:RATE says {rate:.4g} Hz, which is believed (--rate)")
 
 
 def _said_frames(header: list[int], parameters: Parameters) -> list[int]:

@@ -22,6 +22,7 @@ TO_Y_UP = {
     "z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
 }
 LARGEST = 20.0  # nobody's markers are farther apart, in metres; in millimetres everybody's are
+BREAK = 2.5  # times the usual step between two samples; rounded times differ by up to twice of it
 FARTHEST = 1e7  # in any unit: programs write a number beyond it for what was not seen, NDI's -3.697314e28
 # 999, 9999.99, 99999.9 …: what programs write for a marker that was not seen.
 NINES = np.array([10.0**whole - 10.0**-part for whole in range(3, 8) for part in range(8 - whole)])
@@ -65,9 +66,23 @@ class Tracks:
 
 
 def rate_of(times: Array) -> float:
-    """Samples a second, by the first time and the last: single ones are often rounded to milliseconds. 0 of one."""
+    """Samples a second, by the first time and the last: single ones are often rounded to milliseconds. 0 of one.
+
+    Time for which nothing was recorded is left out (`breaks`).
+    """
     lasted = float(times[-1] - times[0]) if len(times) > 1 else 0.0
-    return (len(times) - 1) / lasted if lasted > 0 else 0.0
+    if not lasted > 0:
+        return 0.0
+    steps, within = np.diff(times), ~breaks(times)
+    if within.all():
+        return (len(times) - 1) / lasted
+    return float(within.sum() / steps[within].sum())
+
+
+def breaks(times: Array) -> NDArray[np.bool_]:
+    """Which of the steps (T - 1,) between times are far longer than the others: the recording was interrupted."""
+    steps = np.diff(times)
+    return steps > BREAK * np.median(steps) if len(steps) > 2 else np.zeros(len(steps), bool)
 
 
 def tracks(
@@ -101,8 +116,17 @@ def tracks(
     scale = _scale(unit, points[seen], source)
     turned = np.where(seen[..., None], points, 0.0) * scale @ TO_Y_UP[up].T
     guessed = [not_given(likely_unit(points[seen]))] if unit == "" else []
-    told = (*notes, *said, *chosen.notes, *guessed)
+    told = (*notes, *said, *chosen.notes, *guessed, *_gaps(times))
     return Tracks(chosen.names, turned, seen.astype(float), np.asarray(times, float), source, told, up, scale)
+
+
+def _gaps(times: Array) -> list[str]:
+    rows = np.flatnonzero(breaks(np.asarray(times, float)))
+    places = [f"t = {times[row]:.4g} s (of {times[row + 1] - times[row]:.3g} s)" for row in rows]
+    if not places:
+        return []
+    what = "a gap" if len(places) == 1 else f"{len(places)} gaps"
+    return [f"its times have {what}, at {_some(places, 3)}: the frames before and after are taken as neighbours"]
 
 
 def turned(tracks: Tracks, normal: Sequence[float]) -> Tracks:
