@@ -86,6 +86,21 @@ def test_an_empty_column_is_a_gap_where_tabs_are_single(read):
     assert found.notes == ()
 
 
+@pytest.mark.parametrize("gap", [[""] * 3, ["5", "", "6"]])
+@pytest.mark.parametrize("marker", [0, 1, 2])
+def test_an_empty_column_is_a_gap_where_tabs_are_doubled(read, gap, marker):
+    """Eleven columns have ten pairs of tabs between them, whatever is in them."""
+    cells = ["1", "2", "3", "4", "5", "6", "7", "8", "9"]
+    cells[3 * marker : 3 * marker + 3] = gap
+    whole = "2\t\t0.01\t\t" + "\t\t".join("987654321")
+    found = read(text(["\t\t".join(["1", "0", *cells]), whole], tab="\t\t"))
+    expected = np.ones((2, 3))
+    expected[0, marker] = 0
+    np.testing.assert_array_equal(found.confidence, expected)
+    np.testing.assert_allclose(found.points[1], np.arange(9, 0, -1).reshape(3, 3) / 1000)
+    np.testing.assert_allclose(found.points[0, marker - 1], np.arange(1, 10).reshape(3, 3)[marker - 1] / 1000)
+
+
 def test_gaps_never_shift_columns_where_markers_without_a_name_follow(read):
     """Ten words for the first row would be as many as the names need, without the gap."""
     rows = ["1\t0\t\t\t\t10\t20\t30\t40\t50\t60\t7\t8\t9", "2\t0.01\t1\t2\t3\t4\t5\t6\t7\t8\t9\t7\t8\t9"]

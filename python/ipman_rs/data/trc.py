@@ -164,9 +164,12 @@ def _table(rows: Sequence[tuple[int, str]], markers: int, said: int | None, sour
 def _split(lines: Sequence[str], width: int) -> tuple[list[list[str]], bool]:
     """The columns of each row, and whether single tabs part them, or blanks: tabs doubled, mixed with blanks, missing.
 
-    Tabs are believed where the empty columns between them are whole markers that were not seen.
+    Tabs are believed where the empty columns between them are whole markers that were not seen, or every second one:
+    those are doubled, for no row is without its time.
     """
-    by_tabs = [_trimmed(line.rstrip("\r\n").split("\t"), width) for line in lines]
+    cells = [line.rstrip("\r\n").split("\t") for line in lines]
+    doubled = all(len(row) > 1 and not "".join(row[1::2]).strip() for row in cells)
+    by_tabs = [_trimmed(row[::2] if doubled else row, width) for row in cells]
     widest = max(map(len, by_tabs), default=width)
     fits = all(len(cells) >= LEAST for cells in by_tabs) and (widest <= width or (widest - width) % 3 == 0)
     if fits and all(_whole(cells) for cells in by_tabs):
