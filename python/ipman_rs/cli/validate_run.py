@@ -135,8 +135,10 @@ def _person(plan: Plan, recordings: list[Measured], told: Told) -> list[Record]:
             if name == chosen:
                 shape = name
             records.append(_compared(plan, one, fit, weight, told))
-        except FileError as error:
-            told.failures.append(error)
+        except OSError:
+            raise  # the output, which is that of all recordings, cannot be written
+        except Exception as error:  # whatever it is, the other recordings were not the cause
+            told.failures.append(error if isinstance(error, FileError) else _failure(one.trial, error))
             if name == chosen:
                 told.notes.append(f"{name} could not be compared: the others found their shapes themselves")
             continue
@@ -144,6 +146,11 @@ def _person(plan: Plan, recordings: list[Measured], told: Told) -> list[Record]:
         if np.isnan(weight) and _weighs(records[-1]):
             weight = records[-1]["mass"]["plates"]
     return records
+
+
+def _failure(trial: Trial, error: Exception) -> FileError:
+    """Of a recording that could not be compared for a reason that nobody foresaw."""
+    return FileError(trial.markers, f"cannot be compared: {type(error).__name__}{f': {error}' if str(error) else ''}")
 
 
 def _chosen(plan: Plan, recordings: list[Measured], told: Told) -> str | None:

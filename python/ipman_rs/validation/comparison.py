@@ -148,10 +148,11 @@ class Comparison:
 
     @cached_property
     def phases(self) -> Mapping[str, Mask]:
-        """The complete frames; of walking, those on one plate and those on two apart."""
+        """The complete frames; of walking, those on one plate and those on two apart; none without plates."""
+        if self.plates is None:
+            return {}
         if self.kind != "walking":
             return {"all": self.complete}
-        assert self.plates is not None
         count = (carried(self.plates) > 0).sum(axis=1)
         return {"single support": self.complete & (count == 1), "double support": self.complete & (count == 2)}
 
