@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 
 import numpy as np
@@ -11,6 +12,7 @@ from miniatures import opensim as miniature
 import ipman_rs.data as data
 from ipman_rs.data import external_loads, opensim
 
+COVERAGE = "sway.trc: no marker on trunk and arms was ever seen: there the body's mean is shown"
 Z_UP = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # turns y up into z up
 
 
@@ -48,7 +50,7 @@ def test_the_miniature_in_the_common_form(folder):
     assert np.isnan(frames.center_of_mass[: begin - 1]).all()
     some = found[np.array([9, 2, 9])]
     assert some.names.tolist() == ["sway/00009", "sway/00002", "sway/00009"]
-    assert [each for each in opensim.check(folder) if each.level != "ok"] == []
+    assert [each.what for each in opensim.check(folder) if each.level != "ok"] == [COVERAGE]
 
 
 def test_forces_on_the_markers_times_exactly(folder):
@@ -177,7 +179,9 @@ def test_markers_in_millimetres_that_are_said_to_be_metres(folder):
     (folder / "sway.trc").write_text(text)
     with pytest.raises(ValueError, match="looks like millimetres: a body spans 1[67][0-9]*, .*; divide by 1000"):
         data.open("opensim", folder / "sway.trc")
-    assert any("looks like millimetres" in each.what for each in opensim.check(folder) if each.level == "wrong")
+    (finding,) = (each for each in opensim.check(folder) if each.level == "wrong")
+    assert finding.option == "--units mm"
+    assert re.match(r"sway.trc: markers: a body spans 1[67]\d\d, expected", finding.what)
 
 
 def test_forces_and_centres_of_mass_in_other_units(folder):
@@ -198,8 +202,33 @@ def test_z_up_instead_of_y_up(folder):
     with pytest.raises(ValueError, match=r"sway_grf.mot: looks like z up: loaded plates push along z"):
         data.open("opensim", folder)
     miniature.trc(folder / "sway.trc", turn=Z_UP)
-    wrong = [each.what for each in opensim.check(folder) if each.level == "wrong"]
-    assert any("sway.trc: looks like z up: markers reach from 0.03 m along z over 1.67 m" in what for what in wrong)
+    (finding,) = (each for each in opensim.check(folder) if each.level == "wrong")
+    assert finding.what.startswith("sway.trc: markers: looks like +z up")
+    assert finding.option == "--up z"
+
+
+@pytest.mark.parametrize(
+    ("change", "level", "what", "option"),
+    [
+        ({"turn": [[1, 0, 0], [0, -1, 0], [0, 0, -1]]}, "wrong", "markers: looks like -y up", "--up -y"),
+        ({"names": ("Top.Head", "a", "b", "c", "d")}, "wrong", "4 of 5 markers have names without a known place", ""),
+        ({"rate": 0.06}, "odd", "0.06 frames a second", "--rate HZ"),
+        ({"names": ("L.Knee.Lat", *miniature.HEAD[1:])}, "odd", "no marker above the pelvis was ever seen", ""),
+        ({"names": ("Top.Head", *miniature.HEAD[1:4], "L.Heel")}, "odd", "more than one marker is called L.Heel", ""),
+    ],
+)
+def test_check_asks_the_judge_of_a_fit(tmp_path, change, level, what, option):
+    miniature.trc(tmp_path / "sway.trc", **change)
+    found = [each for each in opensim.check(tmp_path) if each.what.startswith(f"sway.trc: {what}")]
+    assert [(each.level, each.option) for each in found] == [(level, option)]
+
+
+def test_check_of_markers_of_another_place(tmp_path):
+    """500 m from the origin of the laboratory."""
+    miniature.trc(tmp_path / "sway.trc", unit="m", offset=(500.0, 0.0, 0.0))
+    (finding,) = (each for each in opensim.check(tmp_path) if each.level == "wrong")
+    assert "sway.trc: markers: looks like" in finding.what
+    assert "from the origin" in finding.what
 
 
 def test_two_files_of_forces(folder):
@@ -335,7 +364,7 @@ def test_forces_on_the_plates(folder):
     np.testing.assert_array_equal(found.points, right.points)
     assert found.notes == ("the forces of plate 2 point down, as those on the plates do; they were turned round",)
     odd = [each.what for each in opensim.check(folder) if each.level == "odd"]
-    assert odd == [f"sway_grf.mot: {found.notes[0]}"]
+    assert odd == [COVERAGE, f"sway_grf.mot: {found.notes[0]}"]
     np.testing.assert_allclose(data.open("opensim", folder)[:].forces[5, :, 1].sum(), 700, atol=1e-3)
 
 

@@ -18,7 +18,7 @@ from ..data.tracks import Tracks
 from ..files import write_whole
 from ..fitting import config, markers
 from ..fitting.markers import own
-from ..fitting.recorded import FEWEST, judged_tracks
+from ..fitting.markers.judged import FEWEST, of_tracks
 from ..validation import Comparison, computed, figures, measured, pictures, report
 from ..validation.figures import SPREAD
 from ..validation.folder import Kinds, Trial, find
@@ -217,7 +217,7 @@ def _of_markers(plan: Plan, tracks: Tracks) -> list[check.Finding]:
 
     said = plan.settings
     names = None if said.markers is None else own.read(said.markers, ip.load_body(said.model))
-    found = judged_tracks(tracks, names, said.up is not None)
+    found = of_tracks(tracks, names, said.up is not None)
     return [replace(each, option=each.option.replace("--rate", "--recorded-rate")) for each in found]
 
 

@@ -409,13 +409,27 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
                 found.append(Finding("ok", f"{file.name}: {what} in {other.name}"))
         try:
             tracks = trc.read(file)
-            found += standing(file.name, tracks.points, tracks.confidence > 0, "y")
+            of_markers = _of_markers(tracks, file.name)
+            found += of_markers
+            if any(each.level == "wrong" for each in of_markers):
+                continue  # what else can be told of them only repeats it
             found += sequences.told(file.name, _frames(name, tracks, list(tracks.names), forces, loads, com))
             if forces is not None:
                 found += _of_forces(plates(storage(forces), loads=loads), tracks, forces.name)
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
     return found
+
+
+def _of_markers(tracks: Tracks, name: str) -> list[Finding]:
+    """What `ipman fit` says of them, and how they stand where nobody knows the places of their names."""
+    from ipman_rs.fitting.markers import judged
+
+    found = [Finding("odd", note) for note in tracks.notes] + judged.of_tracks(tracks)
+    found = [replace(each, what=f"{name}: {each.what}") for each in found if each.level != "ok"]
+    if any(each.level == "wrong" for each in found):
+        return found
+    return found + standing(name, tracks.points, tracks.confidence > 0, "y")
 
 
 def _of_forces(found: ForcePlates, tracks: Tracks, name: str) -> list[Finding]:

@@ -14,6 +14,7 @@ from ipman_rs.data.tracks import TO_Y_UP, Tracks
 from ipman_rs.ground import Ground
 
 from .anatomy import ANYWHERE, MIDDLE, SIDED, SPREAD
+from .names import meanings as meanings_of
 from .sets import Meaning
 
 Array = NDArray[np.float64]
@@ -28,6 +29,7 @@ ARMS = ("upper_arm", "biceps", "elbow", "elbow_lateral", "elbow_medial", "forear
         "wrist_back", "hand", "hand_back", "hand_back_5", "index", "pinky", "thumb")  # fmt: skip
 FEET = re.compile(r"heel|toe|malleolus|metatarsal|midfoot|ankle|foot")
 
+FEWEST = 6  # known markers, without which a body is a guess
 SKIN = (-0.015, 0.04)  # m from the skin to a marker's middle; 7 to 15 mm are usual
 
 
@@ -50,6 +52,25 @@ def on_skin(meaning: Meaning) -> bool:
 
 def _without_side(name: str) -> str:
     return name.removeprefix("left_").removeprefix("right_")
+
+
+def of_tracks(
+    tracks: Tracks, own: Mapping[str, Meaning | None] | None = None, up_is_said: bool = False
+) -> list[Finding]:
+    """What the judge of all doors says of a recording before its fit: names, coverage, size, place, stance, rate."""
+    seen, _ = seen_names(tracks)
+    meant = meanings_of(seen, own)
+    unknown = [name for name in seen if name not in meant]
+    found = judge.known_markers([*meant], unknown, FEWEST) + of_rate(tracks)
+    if not meant:
+        return found
+    return found + coverage([*meant], meant) + of_points(tracks, meant, up_is_said)
+
+
+def seen_names(tracks: Tracks) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The markers that were ever seen, and those that are only in the file."""
+    seen = tracks.confidence.any(axis=0)
+    return tuple(np.array(tracks.names)[seen].tolist()), tuple(np.array(tracks.names)[~seen].tolist())
 
 
 def of_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool = False) -> list[Finding]:
