@@ -368,6 +368,22 @@ def test_forces_on_the_plates(folder):
     np.testing.assert_allclose(data.open("opensim", folder)[:].forces[5, :, 1].sum(), 700, atol=1e-3)
 
 
+@pytest.mark.parametrize("plate", [0, 1])
+def test_one_plate_of_two_that_carry_as_much_is_turned(plate):
+    """One pushes up, the other down, and both to the left: the median of all says z, of the sizes y."""
+    forces = np.tile([[[0.0, 350.0, 30.0], [0.0, 350.0, -30.0]]], (50, 1, 1))
+    forces[:, 1 - plate, 2], forces[:, plate, 2] = 30.0, -30.0
+    places = np.tile([[[0.0, 0.0, -0.1], [0.0, 0.0, 0.1]]], (50, 1, 1))
+    written = forces * np.where(np.arange(2) == plate, -1.0, 1.0)[:, None]
+    kinds = [(kind, vectors[:, k, axis], k, "xyz"[axis])
+             for kind, vectors in (("v", written), ("p", places)) for k in range(2) for axis in range(3)]  # fmt: skip
+    columns = {f"ground_force_{k + 1}_{kind}{axis}": values for kind, values, k, axis in kinds}
+    found = opensim.plates(opensim.Storage(np.arange(50) / 100, columns, None, "turned.mot"))
+    np.testing.assert_array_equal(found.forces, forces)
+    (note,) = found.notes
+    assert note.startswith(f"the forces of plate {plate + 1} point down")
+
+
 def test_the_positions_of_body_kinematics(folder):
     """Velocities and accelerations have the same columns; they come first in the alphabet."""
     right = data.open("opensim", folder)[:].center_of_mass

@@ -303,8 +303,8 @@ def _plausible(found: ForcePlates, up: str) -> None:
             f"{found.source}: looks like millimetres: centres of pressure {away:.4g} from the origin, expected metres, "
             f"up to {FAR:g}; say unit='mm' if so (--force-units mm)"
         )
-    push = np.median(found.forces[heavy], axis=0)
-    axis = "xyz"[int(np.abs(push).argmax())]
+    push = np.median(np.abs(found.forces[heavy]), axis=0)  # of either sign: `on_the_body` turns each plate by itself
+    axis = "xyz"[int(push.argmax())]
     if axis != up:
         raise ValueError(
             f"{found.source}: looks like {axis} up: loaded plates push along {axis} ({push[0]:.0f}, {push[1]:.0f}, "
