@@ -292,6 +292,23 @@ def test_forces_that_are_missing_for_a_while(tmp_path):
     assert np.isnan(some.at(times).center()[1]).all()
 
 
+def test_a_plate_whose_forces_are_no_numbers(folder):
+    """Nobody stood on the third, so its columns are NaN; the second lacks some samples."""
+    right = opensim.plates(opensim.storage(folder / "sway_grf.mot"))
+    table = opensim.storage(folder / "sway_grf.mot")
+    columns = {name: values.copy() for name, values in table.columns.items()}
+    for axis in "xyz":
+        columns[f"1_ground_force_v{axis}"][20:60] = np.nan
+        columns |= {f"2_ground_force_{kind}{axis}": np.full(len(table), np.nan) for kind in "vp"}
+    found = opensim.plates(opensim.Storage(table.times, columns, None, "three.mot"))
+    assert found.notes == (
+        "the forces of plate 3 are no numbers: it is left out",
+        "the forces of plate 2 are no numbers in 40 of 500 samples",
+    )
+    np.testing.assert_array_equal(found.forces[60:], right.forces[60:])
+    np.testing.assert_array_equal(found.forces[:, 0], right.forces[:, 0])
+
+
 def test_many_columns_at_once(tmp_path):
     """60,000 columns took minutes when each name was looked for among the earlier ones."""
     labels = ["time", *(f"c{number}" for number in range(60_000))]

@@ -115,6 +115,22 @@ class ForcePlates:
         )  # fmt: skip
 
 
+def recorded(found: ForcePlates) -> ForcePlates:
+    """Without the plates of which no force is a number; notes name them, and those that lack some samples."""
+    known = np.isfinite(found.forces).all(axis=-1)  # (T, P)
+    kept = known.any(axis=0)
+    if known.all() or not kept.any():
+        return found
+    notes = [f"the forces of plate {plate + 1} are no numbers: it is left out" for plate in np.flatnonzero(~kept)]
+    notes += [
+        f"the forces of plate {plate + 1} are no numbers in {(~known[:, plate]).sum()} of {len(found)} samples"
+        for plate in np.flatnonzero(kept & ~known.all(axis=0))
+    ]
+    parts = {name: getattr(found, name)[:, kept] for name in ("forces", "points", "moments")}
+    corners = None if found.corners is None else found.corners[kept]
+    return replace(found, **parts, corners=corners, notes=(*found.notes, *notes))
+
+
 def between(times: Array, values: Array, wanted: ArrayLike) -> Array:
     """Values (T, ...) at other times (n,), on straight lines between the samples: (n, ...).
 
@@ -162,7 +178,7 @@ def of_recording(found: c3d.Recording, up: str | None = None) -> ForcePlates:
     rate = found.rate * count if found.rate > 0 else float(count)
     times = found.times[0] + np.arange(len(found.analogs)) / rate
     corners = np.stack([plate.corners for plate in plates])
-    return ForcePlates(times, forces, points, moments, vertical, found.source, corners, notes)
+    return recorded(ForcePlates(times, forces, points, moments, vertical, found.source, corners, notes))
 
 
 def _usable(found: c3d.Recording, used: int) -> tuple[list[_Plate], tuple[str, ...]]:

@@ -27,7 +27,7 @@ from ipman_rs.ground import Ground
 from . import external_loads, pairing, sequences, text_file, trc
 from .check import Finding, demand, demanded, size_of_body
 from .external_loads import ExternalLoads, Load
-from .force_plates import LOADED, UP, ForcePlates, between, standing
+from .force_plates import LOADED, UP, ForcePlates, between, recorded, standing
 from .frames import DataSet, Frames
 from .joined import Joined
 from .tracks import METRES, Tracks
@@ -203,7 +203,7 @@ def plates(table: Storage, unit: str = "m", up: str = "y", loads: ExternalLoads 
     if loads is not None and (unnamed := _unnamed(table, found)):
         note = f"forces that {loads.source} does not name are left out: {', '.join(unnamed)}"
         found = replace(found, notes=(*found.notes, note))
-    return on_the_body(found)
+    return recorded(on_the_body(found))
 
 
 def _unnamed(table: Storage, found: ForcePlates) -> list[str]:
