@@ -293,6 +293,38 @@ def test_spellings_of_units(tmp_path, load, force, moment):
     np.testing.assert_allclose(force_plates.read(tmp_path / "a.c3d").forces[:, 0], push, atol=2e-4)
 
 
+def test_moments_in_another_unit_than_the_file_says(tmp_path, load):
+    """Numbers in N mm that are said to be N m put the centre of pressure a thousand times as far away."""
+    push, offset, free = load
+    corners = c3d_file.plate((0, 0, 0))
+    wrong = in_mm(c3d_file.six(corners, push, where((0, 0, 0), offset), free))
+    plates, units = [(2, corners, wrong), (2, corners, wrong / 1000)], ["N"] * 3 + ["N-m"] * 3
+    (tmp_path / "a.c3d").write_bytes(bytes_of(plates[:1], units=units))
+    told = r"force plate 1: its centre of pressure is \d+(\.\d)? m outside its corners: are its moments, by the file in 'N-m',"
+    with pytest.raises(ValueError, match=f"a.c3d: {told}"):
+        force_plates.read(tmp_path / "a.c3d")
+    (tmp_path / "a.c3d").write_bytes(
+        bytes_of([plates[0], (2, corners, wrong / [1, 1, 1, 1000, 1000, 1000])], units=units * 2)
+    )
+    found = force_plates.read(tmp_path / "a.c3d")
+    assert found.forces.shape[1] == 1
+    assert re.match(f"{told} in another unit.; left out$", found.notes[0])
+    assert any(each.level == "odd" and "outside its corners" in each.what for each in force_plates.check(tmp_path))
+
+
+def test_a_centre_of_pressure_beside_the_plate_and_a_load_of_nobody(tmp_path, load):
+    push, offset, free = load
+    corners = c3d_file.plate((0, 0, 0))
+    values = c3d_file.six(corners, push, where((0, 0, 0), offset + [0.5, 0.0]), free)
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, in_mm(values))]))
+    (note,) = force_plates.read(tmp_path / "a.c3d").notes
+    assert re.match(r"force plate 1: its centre of pressure is 0\.2\d* m outside its corners in the median", note)
+    values = c3d_file.six(corners, 20 * push, where((0, 0, 0), offset), free)
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, in_mm(values))]))
+    (note,) = force_plates.read(tmp_path / "a.c3d").notes
+    assert note.startswith(f"loads of up to {20 * push[:, 2].max():.0f} N, of a person expected up to 10000 N")
+
+
 @pytest.mark.parametrize("reaction", [True, False])
 @pytest.mark.parametrize("units", [["N"] * 6, ["N", "N", "N", "mm", "mm", "Nmm"], [""] * 6])
 def test_a_plate_of_type_1(tmp_path, load, units, reaction):
