@@ -298,14 +298,15 @@ def test_moments_in_another_unit_than_the_file_says(tmp_path, load):
     push, offset, free = load
     corners = c3d_file.plate((0, 0, 0))
     wrong = in_mm(c3d_file.six(corners, push, where((0, 0, 0), offset), free))
-    plates, units = [(2, corners, wrong), (2, corners, wrong / 1000)], ["N"] * 3 + ["N-m"] * 3
-    (tmp_path / "a.c3d").write_bytes(bytes_of(plates[:1], units=units))
-    told = r"force plate 1: its centre of pressure is \d+(\.\d)? m outside its corners: are its moments, by the file in 'N-m',"
+    right, units = wrong / [1, 1, 1, 1000, 1000, 1000], ["N"] * 3 + ["N-m"] * 3
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, wrong)], units=units))
+    told = (
+        r"force plate 1: its centre of pressure is \d+(\.\d)? m outside its corners: "
+        "are its moments, by the file in 'N-m',"
+    )
     with pytest.raises(ValueError, match=f"a.c3d: {told}"):
         force_plates.read(tmp_path / "a.c3d")
-    (tmp_path / "a.c3d").write_bytes(
-        bytes_of([plates[0], (2, corners, wrong / [1, 1, 1, 1000, 1000, 1000])], units=units * 2)
-    )
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, wrong), (2, corners, right)], units=units * 2))
     found = force_plates.read(tmp_path / "a.c3d")
     assert found.forces.shape[1] == 1
     assert re.match(f"{told} in another unit.; left out$", found.notes[0])
