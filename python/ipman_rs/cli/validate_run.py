@@ -232,8 +232,9 @@ def _admitted(path: Path, findings: Iterable[check.Finding], force: bool) -> tup
 def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
     """Raises FileError for plates that cannot be read, or tell nothing of this recording."""
     assert trial.forces is not None
+    said = plan.settings
     try:
-        found = measured.plates(trial.forces, plan.settings.up, plan.force_unit, trial.loads)
+        found = measured.plates(trial.forces, said.up, plan.force_unit, trial.loads, said.units)
     except (ValueError, ImportError) as error:
         raise FileError(trial.forces, str(error)) from error
     centers = found.at(tracks.times).center()
@@ -244,8 +245,9 @@ def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
 
 def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
     assert trial.com is not None
+    said = plan.settings
     try:
-        found = measured.center_of_mass(trial.com, tracks.times, plan.settings.up, plan.settings.subject)
+        found = measured.center_of_mass(trial.com, tracks.times, said.up, said.subject, said.units)
     except ValueError as error:
         raise FileError(trial.com, str(error)) from error
     if not np.isfinite(found).any():

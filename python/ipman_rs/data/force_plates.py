@@ -32,7 +32,7 @@ from .c3d_format import several
 from .check import Finding, demanded, size_of_body
 from .frames import DataSet, Frames
 from .joined import Joined
-from .tracks import METRES, TO_Y_UP, seen_of
+from .tracks import TO_Y_UP, seen_of
 from .units import metres, newton_metres, newtons
 
 NAME = "force-plates"
@@ -206,9 +206,7 @@ def _usable(found: c3d.Recording, used: int) -> tuple[list[_Plate], tuple[str, .
 
 def _plates_unit(found: c3d.Recording) -> tuple[float, tuple[str, ...]]:
     """Metres in the unit of corners and origins: the points', unless only the points, a person's, can be in it."""
-    scale = metres(found.unit)
-    if scale is None:
-        raise ValueError(f"{found.source}: units: expected one of {', '.join(METRES)}, got {found.unit!r}")
+    scale = found.metres
     values = [value for value in found.values("FORCE_PLATFORM", "CORNERS") if isinstance(value, (int, float))]
     corners = np.array(values[: len(values) // 12 * 12], float).reshape(-1, 4, 3)
     sides = np.linalg.norm(corners[:, 0] - corners[:, 1], axis=-1)
