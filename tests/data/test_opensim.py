@@ -385,6 +385,15 @@ def test_forces_on_the_plates(folder):
     np.testing.assert_allclose(data.open("opensim", folder)[:].forces[5, :, 1].sum(), 700, atol=1e-3)
 
 
+def test_suffixes_in_capitals(folder):
+    (folder / "sway.trc").rename(folder / "Walk01.TRC")
+    (folder / "sway_grf.mot").rename(folder / "Walk01_grf.MOT")
+    assert data.open("opensim", folder)[:].names[0] == "Walk01/00000"
+    found = [each.what for each in opensim.check(folder)]
+    assert found[0] == "1 .trc file"
+    assert "Walk01.TRC: forces in Walk01_grf.MOT" in found
+
+
 @pytest.mark.parametrize("plate", [0, 1])
 def test_one_plate_of_two_that_carry_as_much_is_turned(plate):
     """One pushes up, the other down, and both to the left: the median of all says z, of the sizes y."""
