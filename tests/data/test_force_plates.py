@@ -14,6 +14,7 @@ from miniatures import c3d_bytes, c3d_file  # noqa: E402
 import ipman_rs.data as data  # noqa: E402
 from ipman_rs.data import c3d, force_plates, opensim  # noqa: E402
 from ipman_rs.data.tracks import TO_Y_UP  # noqa: E402
+from ipman_rs.validation import measured  # noqa: E402
 
 T, RATE = 25, 100.0
 N = T * c3d_file.SAMPLES
@@ -232,6 +233,32 @@ def test_a_unit_that_is_not_given(tmp_path, load):
     assert c3d.markers(path, unit=1e-3).notes == markers_given.notes
 
 
+def test_the_unit_of_a_recording_is_that_of_all_its_lengths(tmp_path, load):
+    """The file says metres and means millimetres: plates and centre of mass follow what the user says."""
+    push, offset, free = load
+    corners = c3d_file.plate((0.3, 0.2, 0))
+    values = in_mm(c3d_file.six(corners, push, where((0.3, 0.2, 0), offset), free))
+    points = np.stack(list(markers().values()), axis=1)
+    found = {}
+    for unit in ("mm", "m"):
+        path = tmp_path / f"{unit}.c3d"
+        path.write_bytes(
+            bytes_of(
+                [(2, corners, values)], unit=unit, markers_at=points * 1000, names=["head", "CentreOfMass", "heel"]
+            )
+        )
+        length = 0.001 if unit == "m" else None
+        com = measured.center_of_mass(path, np.arange(T) / RATE, length=length)
+        found[unit] = (measured.plates(path, length=length), com)
+    right, mended = found["mm"], found["m"]
+    np.testing.assert_allclose(right[1] @ TO_Y_UP["z"], points[:, 1], atol=1e-6)
+    np.testing.assert_array_equal(mended[1], right[1])
+    for name in ("forces", "points", "moments", "corners"):
+        np.testing.assert_array_equal(getattr(mended[0], name), getattr(right[0], name))
+    with pytest.raises(ValueError, match="CORNERS: .*looks like millimetres"):
+        measured.plates(path)
+
+
 def test_z_up_that_is_said_to_be_y_up(tmp_path, load):
     path = broken(tmp_path, load, up="+Y")
     wrong = [each.what for each in force_plates.check(path) if each.level == "wrong"]
@@ -272,7 +299,7 @@ def test_a_frame_of_nan(tmp_path, load):
     assert np.isfinite(np.delete(frames.joints, 7, axis=0)).all()
 
 
-def bytes_of(plates, *, units=None, unit="mm", up="+Z", extra=(), scale=1000.0, markers_at=None):
+def bytes_of(plates, *, units=None, unit="mm", up="+Z", extra=(), scale=1000.0, markers_at=None, names=None):
     """A file of plates [(type, corners (4, 3) m, channels (N, n) in N and mm)], written byte by byte."""
     channels = np.concatenate([values for _, _, values in plates], axis=1)
     numbers = np.arange(1, channels.shape[1] + 1).reshape(len(plates), -1)
@@ -284,7 +311,7 @@ def bytes_of(plates, *, units=None, unit="mm", up="+Z", extra=(), scale=1000.0, 
     if units:
         more += [c3d_bytes.parameter(2, "UNITS", units)]
     points = np.stack(list(markers().values()), axis=1) * 1000 if markers_at is None else markers_at
-    names = [*markers()]
+    names = names or [*markers()]
     return c3d_bytes.c3d(points, channels, names=names, samples=c3d_file.SAMPLES, unit=unit, up=up, more=more)
 
 
@@ -308,6 +335,39 @@ def test_spellings_of_units(tmp_path, load, force, moment):
     np.testing.assert_allclose(found.moments[loaded, 0, 2], free[loaded], atol=2e-3)
     (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, values / 1000)], units=["kN"] * 3 + ["N m"] * 3))
     np.testing.assert_allclose(force_plates.read(tmp_path / "a.c3d").forces[:, 0], push, atol=2e-4)
+
+
+def test_moments_in_another_unit_than_the_file_says(tmp_path, load):
+    """Numbers in N mm that are said to be N m put the centre of pressure a thousand times as far away."""
+    push, offset, free = load
+    corners = c3d_file.plate((0, 0, 0))
+    wrong = in_mm(c3d_file.six(corners, push, where((0, 0, 0), offset), free))
+    right, units = wrong / [1, 1, 1, 1000, 1000, 1000], ["N"] * 3 + ["N-m"] * 3
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, wrong)], units=units))
+    told = (
+        r"force plate 1: its centre of pressure is \d+(\.\d)? m outside its corners: "
+        "are its moments, by the file in 'N-m',"
+    )
+    with pytest.raises(ValueError, match=f"a.c3d: {told}"):
+        force_plates.read(tmp_path / "a.c3d")
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, wrong), (2, corners, right)], units=units * 2))
+    found = force_plates.read(tmp_path / "a.c3d")
+    assert found.forces.shape[1] == 1
+    assert re.match(f"{told} in another unit.; left out$", found.notes[0])
+    assert any(each.level == "odd" and "outside its corners" in each.what for each in force_plates.check(tmp_path))
+
+
+def test_a_centre_of_pressure_beside_the_plate_and_a_load_of_nobody(tmp_path, load):
+    push, offset, free = load
+    corners = c3d_file.plate((0, 0, 0))
+    values = c3d_file.six(corners, push, where((0, 0, 0), offset + [0.5, 0.0]), free)
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, in_mm(values))]))
+    (note,) = force_plates.read(tmp_path / "a.c3d").notes
+    assert re.match(r"force plate 1: its centre of pressure is 0\.2\d* m outside its corners in the median", note)
+    values = c3d_file.six(corners, 20 * push, where((0, 0, 0), offset), free)
+    (tmp_path / "a.c3d").write_bytes(bytes_of([(2, corners, in_mm(values))]))
+    (note,) = force_plates.read(tmp_path / "a.c3d").notes
+    assert note.startswith(f"loads of up to {20 * push[:, 2].max():.0f} N, of a person expected up to 10000 N")
 
 
 @pytest.mark.parametrize("reaction", [True, False])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 
 import numpy as np
@@ -11,6 +12,7 @@ from miniatures import opensim as miniature
 import ipman_rs.data as data
 from ipman_rs.data import external_loads, opensim
 
+COVERAGE = "sway.trc: no marker on trunk and arms was ever seen: there the body's mean is shown"
 Z_UP = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # turns y up into z up
 
 
@@ -48,7 +50,7 @@ def test_the_miniature_in_the_common_form(folder):
     assert np.isnan(frames.center_of_mass[: begin - 1]).all()
     some = found[np.array([9, 2, 9])]
     assert some.names.tolist() == ["sway/00009", "sway/00002", "sway/00009"]
-    assert [each for each in opensim.check(folder) if each.level != "ok"] == []
+    assert [each.what for each in opensim.check(folder) if each.level != "ok"] == [COVERAGE]
 
 
 def test_forces_on_the_markers_times_exactly(folder):
@@ -183,7 +185,9 @@ def test_markers_in_millimetres_that_are_said_to_be_metres(folder):
     (folder / "sway.trc").write_text(text)
     with pytest.raises(ValueError, match="looks like millimetres: a body spans 1[67][0-9]*, .*; divide by 1000"):
         data.open("opensim", folder / "sway.trc")
-    assert any("looks like millimetres" in each.what for each in opensim.check(folder) if each.level == "wrong")
+    (finding,) = (each for each in opensim.check(folder) if each.level == "wrong")
+    assert finding.option == "--units mm"
+    assert re.match(r"sway.trc: markers: a body spans 1[67]\d\d, expected", finding.what)
 
 
 def test_forces_and_centres_of_mass_in_other_units(folder):
@@ -204,8 +208,33 @@ def test_z_up_instead_of_y_up(folder):
     with pytest.raises(ValueError, match=r"sway_grf.mot: looks like z up: loaded plates push along z"):
         data.open("opensim", folder)
     miniature.trc(folder / "sway.trc", turn=Z_UP)
-    wrong = [each.what for each in opensim.check(folder) if each.level == "wrong"]
-    assert any("sway.trc: looks like z up: markers reach from 0.03 m along z over 1.67 m" in what for what in wrong)
+    (finding,) = (each for each in opensim.check(folder) if each.level == "wrong")
+    assert finding.what.startswith("sway.trc: markers: looks like +z up")
+    assert finding.option == "--up z"
+
+
+@pytest.mark.parametrize(
+    ("change", "level", "what", "option"),
+    [
+        ({"turn": [[1, 0, 0], [0, -1, 0], [0, 0, -1]]}, "wrong", "markers: looks like -y up", "--up -y"),
+        ({"names": ("Top.Head", "a", "b", "c", "d")}, "wrong", "4 of 5 markers have names without a known place", ""),
+        ({"rate": 0.06}, "odd", "0.06 frames a second", "--rate HZ"),
+        ({"names": ("L.Knee.Lat", *miniature.HEAD[1:])}, "odd", "no marker above the pelvis was ever seen", ""),
+        ({"names": ("Top.Head", *miniature.HEAD[1:4], "L.Heel")}, "odd", "more than one marker is called L.Heel", ""),
+    ],
+)
+def test_check_asks_the_judge_of_a_fit(tmp_path, change, level, what, option):
+    miniature.trc(tmp_path / "sway.trc", **change)
+    found = [each for each in opensim.check(tmp_path) if each.what.startswith(f"sway.trc: {what}")]
+    assert [(each.level, each.option) for each in found] == [(level, option)]
+
+
+def test_check_of_markers_of_another_place(tmp_path):
+    """500 m from the origin of the laboratory."""
+    miniature.trc(tmp_path / "sway.trc", unit="m", offset=(500.0, 0.0, 0.0))
+    (finding,) = (each for each in opensim.check(tmp_path) if each.level == "wrong")
+    assert "sway.trc: markers: bodies of a person's size, 500 m from the origin" in finding.what
+    assert "from the origin" in finding.what
 
 
 def test_two_files_of_forces(folder):
@@ -251,7 +280,7 @@ def test_times_rounded_until_they_are_equal(tmp_path):
     assert found.notes == ("some times are equal: they are taken as evenly spaced from the first to the last",)
 
 
-@pytest.mark.parametrize("end", ["0.2\t5", "0.2\t5\t-", "0.2\t5\t1.5e"])
+@pytest.mark.parametrize("end", ["0.2\t5", "0.2\t5\t1.5e"])
 def test_a_last_line_that_is_cut_short(tmp_path, end):
     (tmp_path / "a.mot").write_text(f"x\nendheader\ntime\ta\tb\n0\t1\t2\n0.1\t3\t4\n{end}")
     found = opensim.storage(tmp_path / "a.mot")
@@ -284,6 +313,23 @@ def test_forces_that_are_missing_for_a_while(tmp_path):
     np.testing.assert_array_equal(some.at(times).center()[[0, 2]], whole.at(times).center()[[0, 2]])
     assert np.isnan(some.at(times).forces[1]).all()
     assert np.isnan(some.at(times).center()[1]).all()
+
+
+def test_a_plate_whose_forces_are_no_numbers(folder):
+    """Nobody stood on the third, so its columns are NaN; the second lacks some samples."""
+    right = opensim.plates(opensim.storage(folder / "sway_grf.mot"))
+    table = opensim.storage(folder / "sway_grf.mot")
+    columns = {name: values.copy() for name, values in table.columns.items()}
+    for axis in "xyz":
+        columns[f"1_ground_force_v{axis}"][20:60] = np.nan
+        columns |= {f"2_ground_force_{kind}{axis}": np.full(len(table), np.nan) for kind in "vp"}
+    found = opensim.plates(opensim.Storage(table.times, columns, None, "three.mot"))
+    assert found.notes == (
+        "the forces of plate 3 are no numbers: it is left out",
+        "the forces of plate 2 are no numbers in 40 of 500 samples",
+    )
+    np.testing.assert_array_equal(found.forces[60:], right.forces[60:])
+    np.testing.assert_array_equal(found.forces[:, 0], right.forces[:, 0])
 
 
 def test_many_columns_at_once(tmp_path):
@@ -367,8 +413,33 @@ def test_forces_on_the_plates(folder):
     np.testing.assert_array_equal(found.points, right.points)
     assert found.notes == ("the forces of plate 2 point down, as those on the plates do; they were turned round",)
     odd = [each.what for each in opensim.check(folder) if each.level == "odd"]
-    assert odd == [f"sway_grf.mot: {found.notes[0]}"]
+    assert odd == [COVERAGE, f"sway_grf.mot: {found.notes[0]}"]
     np.testing.assert_allclose(data.open("opensim", folder)[:].forces[5, :, 1].sum(), 700, atol=1e-3)
+
+
+def test_suffixes_in_capitals(folder):
+    (folder / "sway.trc").rename(folder / "Walk01.TRC")
+    (folder / "sway_grf.mot").rename(folder / "Walk01_grf.MOT")
+    assert data.open("opensim", folder)[:].names[0] == "Walk01/00000"
+    found = [each.what for each in opensim.check(folder)]
+    assert found[0] == "1 .trc file"
+    assert "Walk01.TRC: forces in Walk01_grf.MOT" in found
+
+
+@pytest.mark.parametrize("plate", [0, 1])
+def test_one_plate_of_two_that_carry_as_much_is_turned(plate):
+    """One pushes up, the other down, and both to the left: the median of all says z, of the sizes y."""
+    forces = np.tile([[[0.0, 350.0, 30.0], [0.0, 350.0, -30.0]]], (50, 1, 1))
+    forces[:, 1 - plate, 2], forces[:, plate, 2] = 30.0, -30.0
+    places = np.tile([[[0.0, 0.0, -0.1], [0.0, 0.0, 0.1]]], (50, 1, 1))
+    written = forces * np.where(np.arange(2) == plate, -1.0, 1.0)[:, None]
+    kinds = [(kind, vectors[:, k, axis], k, "xyz"[axis])
+             for kind, vectors in (("v", written), ("p", places)) for k in range(2) for axis in range(3)]  # fmt: skip
+    columns = {f"ground_force_{k + 1}_{kind}{axis}": values for kind, values, k, axis in kinds}
+    found = opensim.plates(opensim.Storage(np.arange(50) / 100, columns, None, "turned.mot"))
+    np.testing.assert_array_equal(found.forces, forces)
+    (note,) = found.notes
+    assert note.startswith(f"the forces of plate {plate + 1} point down")
 
 
 def test_the_positions_of_body_kinematics(folder):

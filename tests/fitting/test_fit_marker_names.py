@@ -251,6 +251,31 @@ def test_markers_below_the_floor():
     assert judged.of_floor(tracks(), meanings(NAMES)) == []
 
 
+SWAP = {"L": "R", "R": "L"}
+WITH_FEET = (*NAMES, "LTOE", "RTOE", "LSHO", "RSHO")
+STANDING_FEET = np.vstack([STANDING, [[0.12, 0.05, 0.1], [-0.12, 0.05, 0.1], [0.18, 1.4, 0], [-0.18, 1.4, 0]]])
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), TO_Y_UP["x"], TO_Y_UP["z"], np.diag([-1.0, 1.0, -1.0])])
+def test_left_and_right_exchanged(turn):
+    """Whichever way the person stands or lies."""
+    points = STANDING_FEET @ turn
+    swapped = [SWAP[name[0]] + name[1:] if name[0] in SWAP else name for name in WITH_FEET]
+    assert wrong(tracks(points, WITH_FEET), up_is_said=True) == []
+    (finding,) = wrong(tracks(points, swapped), up_is_said=True)
+    assert finding.what == "left and right look swapped of pelvis and trunk and feet"
+    mirrored = points * [1, 1, -1]
+    assert [each.what for each in wrong(tracks(mirrored, WITH_FEET), up_is_said=True)] == [finding.what]
+
+
+def test_left_and_right_exchanged_in_a_part():
+    """Of the feet alone: names, or crossed legs."""
+    swapped = [SWAP[name[0]] + name[1:] if name[1:] in ("HEE", "TOE") else name for name in WITH_FEET]
+    one = tracks(STANDING_FEET, swapped)
+    (finding,) = (each for each in judged.of_points(one, meanings(one.names)) if each.level != "ok")
+    assert (finding.level, finding.what) == ("odd", "left and right look swapped of feet")
+
+
 def test_what_the_markers_do_not_say():
     legs = [name for name in NAMES if name not in ("C7", "CLAV")]
     (finding,) = judged.coverage(legs, meanings(legs))

@@ -134,6 +134,17 @@ def test_unseen_bodies_do_not_count(lite, standing):
     assert figures(one)["standing"]["distance"] < 0.1
 
 
+def test_forces_that_are_no_numbers_are_no_foot_beside_the_plates(lite, standing):
+    cop = np.tile([0.0, 0, 0.02], (FRAMES, 1))
+    plates = plates_of(cop, np.full(FRAMES, 600.0))
+    plates.forces[60:, 0] = np.nan  # the person stands on it, too
+    one = compared(lite, swaying(standing), plates)
+    assert not one.beside.any()
+    np.testing.assert_array_equal(one.complete, np.arange(FRAMES) < 60)
+    assert one.weight == pytest.approx((600 + 3) / GRAVITY, rel=1e-6)  # 3 N of the third
+    assert figures(one)["flags"] == ["the forces of plate 1 are no numbers in 40 of 100 frames: they are left out"]
+
+
 def test_what_empty_plates_read_is_no_weight(lite, standing):
     upward = np.where(TIMES < 1, 600.0, 0.0)
     plates = plates_of(np.tile([0.05, 0, 0.02], (FRAMES, 1)), upward)

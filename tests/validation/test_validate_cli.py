@@ -15,7 +15,7 @@ from click.testing import CliRunner  # noqa: E402
 
 import ipman_rs as ip  # noqa: E402
 import ipman_rs.torch as ipt  # noqa: E402
-from ipman_rs.cli import main  # noqa: E402
+from ipman_rs.cli import main, validate_run  # noqa: E402
 from ipman_rs.fitting import markers  # noqa: E402
 from ipman_rs.fitting.landmarks import Landmarks  # noqa: E402
 from ipman_rs.fitting.markers.sets import OPENCAP  # noqa: E402
@@ -187,6 +187,25 @@ def test_a_bad_file_is_told_and_the_rest_goes_on(run, folder, tmp_path):
     assert "static could not be compared: the others found their shapes themselves" in said.out
     assert records(tmp_path / "out").keys() == {"lift"}
     assert (tmp_path / "out" / "validation.md").read_text().count("not compared: ") == 2
+
+
+def test_a_recording_that_fails_for_no_known_reason_takes_no_other_with_it(folder, tmp_path, monkeypatch):
+    (tmp_path / "lab").mkdir()
+    plan = validate_run.plan(copied(folder, tmp_path / "lab"), tmp_path / "out", "anny-lite", "none", 10.0, True)
+
+    def compared(_plan, one, *_):
+        if one.trial.name == "static":
+            raise AssertionError
+        return {"name": one.trial.name}
+
+    monkeypatch.setattr(validate_run, "_fitted", lambda *_: {"notes": []})
+    monkeypatch.setattr(validate_run, "_compared", compared)
+    monkeypatch.setattr(validate_run, "_weighs", lambda _: False)
+    found, _, failures = validate_run.run(plan)
+    assert [one["name"] for one in found] == ["lift"]
+    assert [str(each) for each in failures] == [
+        f"{tmp_path / 'lab' / 'static.trc'}: cannot be compared: AssertionError"
+    ]
 
 
 def cut(path):

@@ -43,6 +43,15 @@ def test_whatever_was_measured(lite, bodies, measured):
         assert drawn[:8] == b"\x89PNG\r\n\x1a\n"
 
 
+def test_somebody_who_walks_without_plates(lite, bodies):
+    """A centre of mass was measured, no force: there are no phases, and the middle frame is drawn."""
+    one = Comparison("made up", TIMES, computed(bodies, lite.template), reference=np.full((FRAMES, 3), np.nan))
+    vars(one)["kind"] = "walking"
+    assert one.phases == {}
+    assert pictures.moments(one) == {"all": FRAMES // 2}
+    assert pictures.pressure_map(one, bodies, lite.template)[:8] == b"\x89PNG\r\n\x1a\n"
+
+
 def test_the_floor_as_the_person_faces():
     """Somebody who faces x: forward is x, right is z."""
     floor = Floor(np.array([1.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0]))

@@ -73,7 +73,7 @@ def check(dataset: str, path: Path, as_json: bool) -> None:
     with console.busy(f"looking at {path}"):
         findings = _findings(module, path)
     if as_json:
-        listed = [{"level": each.level, "what": each.what, "advice": each.advice} for each in findings]
+        listed = [vars(each) for each in findings]
         record = {"dataset": dataset, "path": str(path), "complete": _complete(findings), "findings": listed}
         click.echo(json.dumps(record, ensure_ascii=False, indent=1))
     else:
@@ -98,6 +98,12 @@ def _findings(module: ModuleType, path: Path) -> list[Finding]:
         return [Finding("wrong", str(error))]
 
 
+def _mends(finding: Finding) -> str:
+    """The advice, and the option of the commands that take such data."""
+    option = "" if finding.option in finding.advice else f"for ipman fit: {finding.option}"
+    return "; ".join(part for part in (finding.advice, option) if part)
+
+
 def _complete(findings: list[Finding]) -> bool:
     return all(each.level in ("ok", "odd") for each in findings)
 
@@ -115,7 +121,7 @@ def _print(findings: list[Finding], dataset: str) -> None:
     table.add_column("what to do", overflow="fold", ratio=1)
     for each in findings:
         sign, style = SIGNS[each.level]
-        table.add_row(Text(sign, style=style), Text(one_line(each.what)), Text(one_line(each.advice)))
+        table.add_row(Text(sign, style=style), Text(one_line(each.what)), Text(one_line(_mends(each))))
     console = Console(highlight=False)
     if not console.is_terminal:
         console.width = 160

@@ -122,14 +122,14 @@ def _fit_markers(recording: Recording, settings: Settings, pace: Pace, person: P
 
     from ..fitting import config, markers, recorded
     from ..fitting.markers import own
-    from ..fitting.markers.judged import of_skin
+    from ..fitting.markers.judged import of_skin, of_tracks
 
     preset, path = _preset(recording, settings), recording.paths[0]
     chosen = config.load(preset) if preset == "markers" else settings.config
     body = ipt.BodyModel(settings.model)
     names = None if settings.markers is None else own.read(settings.markers, body.body)
     tracks = markers.read(path, settings.up, settings.subject, settings.units, settings.rate)
-    judged = recorded.judged_tracks(tracks, names, settings.up is not None, settings.ground or 0.0)
+    judged = of_tracks(tracks, names, settings.up is not None, settings.ground or 0.0)
     flags = judge.admit(path, judged, settings.force)
     count = len(range(0, len(tracks), pace.every))
     with console.progress(f"fitting {recording.name}", count) as step:

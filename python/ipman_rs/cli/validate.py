@@ -37,7 +37,8 @@ from .options import METRES, RATE, UNIT, UP, force
 )  # fmt: skip
 @click.option(
     "--units", type=UNIT, metavar="UNIT",
-    help=f"Unit of the lengths in marker files: {', '.join(METRES)}, or a number of metres. Default: what they say.",
+    help="Unit of the lengths in marker files, also of plates and centres of mass in a .c3d: "
+    f"{', '.join(METRES)}, or a number of metres. Default: what they say.",
 )  # fmt: skip
 @click.option(
     "--force-units", "force_unit", type=click.Choice(["m", "cm", "mm"]), default="m", show_default=True,

@@ -18,7 +18,7 @@ from ..data.tracks import Tracks
 from ..files import write_whole
 from ..fitting import config, markers
 from ..fitting.markers import own
-from ..fitting.recorded import FEWEST, judged_tracks
+from ..fitting.markers.judged import FEWEST, of_tracks
 from ..validation import Comparison, computed, figures, measured, pictures, report
 from ..validation.figures import SPREAD
 from ..validation.folder import Kinds, Trial, find
@@ -135,8 +135,10 @@ def _person(plan: Plan, recordings: list[Measured], told: Told) -> list[Record]:
             if name == chosen:
                 shape = name
             records.append(_compared(plan, one, fit, weight, told))
-        except FileError as error:
-            told.failures.append(error)
+        except OSError:
+            raise  # the output, which is that of all recordings, cannot be written
+        except Exception as error:  # whatever it is, the other recordings were not the cause
+            told.failures.append(error if isinstance(error, FileError) else _failure(one.trial, error))
             if name == chosen:
                 told.notes.append(f"{name} could not be compared: the others found their shapes themselves")
             continue
@@ -144,6 +146,11 @@ def _person(plan: Plan, recordings: list[Measured], told: Told) -> list[Record]:
         if np.isnan(weight) and _weighs(records[-1]):
             weight = records[-1]["mass"]["plates"]
     return records
+
+
+def _failure(trial: Trial, error: Exception) -> FileError:
+    """Of a recording that could not be compared for a reason that nobody foresaw."""
+    return FileError(trial.markers, f"cannot be compared: {type(error).__name__}{f': {error}' if str(error) else ''}")
 
 
 def _chosen(plan: Plan, recordings: list[Measured], told: Told) -> str | None:
@@ -210,7 +217,7 @@ def _of_markers(plan: Plan, tracks: Tracks) -> list[check.Finding]:
 
     said = plan.settings
     names = None if said.markers is None else own.read(said.markers, ip.load_body(said.model))
-    found = judged_tracks(tracks, names, said.up is not None)
+    found = of_tracks(tracks, names, said.up is not None)
     return [replace(each, option=each.option.replace("--rate", "--recorded-rate")) for each in found]
 
 
@@ -225,8 +232,9 @@ def _admitted(path: Path, findings: Iterable[check.Finding], force: bool) -> tup
 def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
     """Raises FileError for plates that cannot be read, or tell nothing of this recording."""
     assert trial.forces is not None
+    said = plan.settings
     try:
-        found = measured.plates(trial.forces, plan.settings.up, plan.force_unit, trial.loads)
+        found = measured.plates(trial.forces, said.up, plan.force_unit, trial.loads, said.units)
     except (ValueError, ImportError) as error:
         raise FileError(trial.forces, str(error)) from error
     centers = found.at(tracks.times).center()
@@ -237,8 +245,9 @@ def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
 
 def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
     assert trial.com is not None
+    said = plan.settings
     try:
-        found = measured.center_of_mass(trial.com, tracks.times, plan.settings.up, plan.settings.subject)
+        found = measured.center_of_mass(trial.com, tracks.times, said.up, said.subject, said.units)
     except ValueError as error:
         raise FileError(trial.com, str(error)) from error
     if not np.isfinite(found).any():

@@ -38,7 +38,7 @@ class Recording:
     points: Array  # (T, P, 3), in `unit`
     times: Array  # (T,) s
     rate: float  # Hz, of the points; 0 if the file does not say
-    unit: str  # of the points; the likely one, with a note, if the file does not say
+    unit: str | float  # of the points, its name or metres in one; the likely one, with a note, if the file does not say
     up: str  # "x", "y" or "z": its Y_SCREEN; without one the axis that its force plates face, or z
     analogs: Array  # (T * n, A), n samples of the channels to one of the points
     parameters: Parameters  # by group and name
@@ -99,7 +99,7 @@ class Recording:
         for column in self._computed:
             person, _, name = self.names[column].rpartition(":")
             if _plain(name) in CENTER_OF_MASS and subject in (None, person):
-                points = self.points[:, column] * self._metres()
+                points = self.points[:, column] * self.metres
                 return np.where((points == 0).all(axis=-1, keepdims=True), np.nan, points)
         return None
 
@@ -113,10 +113,12 @@ class Recording:
 
     def places(self, columns: Sequence[int]) -> Array:
         """(T, n, 3) m of the points in these columns. ValueError for an unknown unit."""
-        return self.points[:, columns] * self._metres()
+        return self.points[:, columns] * self.metres
 
-    def _metres(self) -> float:
-        scale = metres(self.unit)
+    @property
+    def metres(self) -> float:
+        """In one of the points' lengths. ValueError for an unknown unit."""
+        scale = metres(self.unit) if isinstance(self.unit, str) else self.unit
         if scale is None:
             raise ValueError(f"{self.source}: units: expected one of {', '.join(METRES)}, got {self.unit!r}")
         return scale

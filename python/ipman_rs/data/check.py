@@ -152,7 +152,9 @@ def size_of_body(what: str, points: NDArray[Any]) -> list[Finding]:
         return [Finding("odd", f"{what}: a body spans {extent:.2f} metres: a newborn child?", option="--units UNIT")]
     if not units:
         return [Finding("wrong", f"{what}: no unit of length fits a person: {said}", option="--units UNIT")]
-    return [Finding("wrong", f"{what}: looks like {names}: {said}", f"multiply by {units[0][2]:g}", option)]
+    metres = units[0][2]
+    advice = f"divide by {1 / metres:g}" if metres in (0.1, 0.01, 1e-3) else f"multiply by {metres:g}"
+    return [Finding("wrong", f"{what}: looks like {names}: {said}", advice, option)]
 
 
 def extent_of(points: NDArray[Any]) -> float:

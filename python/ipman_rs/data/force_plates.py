@@ -32,7 +32,7 @@ from .c3d_format import several
 from .check import Finding, demanded, size_of_body
 from .frames import DataSet, Frames
 from .joined import Joined
-from .tracks import METRES, TO_Y_UP, not_given, seen_of
+from .tracks import TO_Y_UP, not_given, seen_of
 from .units import metres, newton_metres, newtons
 
 NAME = "force-plates"
@@ -41,6 +41,8 @@ Array = NDArray[np.float64]
 
 LOADED = 20.0  # N: with less, a plate's centre of pressure is noise
 MOST = 64  # plates
+HEAVY = 200.0  # N: of such a load the centre of pressure is known well
+HEAVIEST = 1e4  # N: all plates together read less, also of somebody who lands
 SHORTEST, LONGEST = 0.05, 4.0  # m: sides of a plate
 LEVEL = 0.7  # cosine: of several plates, one at least lies level; others may be ramps or walls
 UP = {axis: TO_Y_UP[axis].T @ (0.0, 1.0, 0.0) for axis in TO_Y_UP}
@@ -115,6 +117,26 @@ class ForcePlates:
         )  # fmt: skip
 
 
+def recorded(found: ForcePlates) -> ForcePlates:
+    """Without the plates of which no force is a number; notes name them, those that lack some samples, and a load that
+    is nobody's."""
+    known = np.isfinite(found.forces).all(axis=-1)  # (T, P)
+    kept = known.any(axis=0)
+    if not kept.any():
+        return found
+    notes = [f"the forces of plate {plate + 1} are no numbers: it is left out" for plate in np.flatnonzero(~kept)]
+    notes += [
+        f"the forces of plate {plate + 1} are no numbers in {(~known[:, plate]).sum()} of {len(found)} samples"
+        for plate in np.flatnonzero(kept & ~known.all(axis=0))
+    ]
+    most = float(np.abs(np.nansum(found.loads, axis=1)).max())
+    if most > HEAVIEST:
+        notes.append(f"loads of up to {most:.0f} N, of a person expected up to {HEAVIEST:.0f} N: are they in newtons?")
+    parts = {name: getattr(found, name)[:, kept] for name in ("forces", "points", "moments")}
+    corners = None if found.corners is None else found.corners[kept]
+    return replace(found, **parts, corners=corners, notes=(*found.notes, *notes))
+
+
 def between(times: Array, values: Array, wanted: ArrayLike) -> Array:
     """Values (T, ...) at other times (n,), on straight lines between the samples: (n, ...).
 
@@ -162,7 +184,7 @@ def of_recording(found: c3d.Recording, up: str | None = None) -> ForcePlates:
     rate = found.rate * count if found.rate > 0 else float(count)
     times = found.times[0] + np.arange(len(found.analogs)) / rate
     corners = np.stack([plate.corners for plate in plates])
-    return ForcePlates(times, forces, points, moments, vertical, found.source, corners, notes)
+    return recorded(ForcePlates(times, forces, points, moments, vertical, found.source, corners, notes))
 
 
 def _usable(found: c3d.Recording, used: int) -> tuple[list[_Plate], tuple[str, ...]]:
@@ -174,6 +196,7 @@ def _usable(found: c3d.Recording, used: int) -> tuple[list[_Plate], tuple[str, .
         try:
             plate = _Plate.of(found, index, scale)
             _ = plate.axes  # of corners that make a plate
+            notes = (*notes, *plate.astray())
             plates.append(plate)
         except ValueError as error:
             wrong.append(str(error))
@@ -184,9 +207,7 @@ def _usable(found: c3d.Recording, used: int) -> tuple[list[_Plate], tuple[str, .
 
 def _plates_unit(found: c3d.Recording) -> tuple[float, tuple[str, ...]]:
     """Metres in the unit of corners and origins: the points', unless only the points, a person's, can be in it."""
-    scale = metres(found.unit)
-    if scale is None:
-        raise ValueError(f"{found.source}: units: expected one of {', '.join(METRES)}, got {found.unit!r}")
+    scale = found.metres
     values = [value for value in found.values("FORCE_PLATFORM", "CORNERS") if isinstance(value, (int, float))]
     corners = np.array(values[: len(values) // 12 * 12], float).reshape(-1, 4, 3)
     sides = np.linalg.norm(corners[:, 0] - corners[:, 1], axis=-1)
@@ -210,6 +231,7 @@ class _Plate:
     forces: Array  # (T, 3) N
     points: Array  # (T, 2) m, centres of pressure from the middle of the surface; not finite without a load
     free: Array  # (T,) N m about z at the centre of pressure
+    unit: str  # of its moments, of type 1 of its centres of pressure, as the file says; "" if it does not
 
     @classmethod
     def of(cls, found: c3d.Recording, index: int, scale: float) -> _Plate:
@@ -218,9 +240,11 @@ class _Plate:
         kind = _type(found, index, place)
         corners = _numbers_of_plate(found, "CORNERS", index, 12, place).reshape(4, 3) * scale
         origin = _numbers_of_plate(found, "ORIGIN", index, 3, place) * scale
-        signals = _signals(found, index, kind, scale, place)
+        channels = _channels(found, index, kind, place)
+        units = _units(found, channels)
+        signals = _signals(found, index, kind, channels, scale, place)
         if kind == 1:
-            return cls(place, corners, signals[:, :3], signals[:, 3:5], signals[:, 5])
+            return cls(place, corners, signals[:, :3], signals[:, 3:5], signals[:, 5], units[3])
         forces, moments = _kistler(signals, origin) if kind == 3 else (signals[:, :3], signals[:, 3:])
         # The sensors lie under the surface and z points down, but many files have the vector the other way round.
         origin = -origin if origin[2] > 0 else origin
@@ -230,7 +254,26 @@ class _Plate:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             x, y = -moments[:, 1] / forces[:, 2], moments[:, 0] / forces[:, 2]
             free = moments[:, 2] - x * forces[:, 1] + y * forces[:, 0]
-        return cls(place, corners, forces, np.stack([x, y], axis=1), free)
+        return cls(place, corners, forces, np.stack([x, y], axis=1), free, "" if kind == 3 else units[3])
+
+    def astray(self) -> list[str]:
+        """In words that its centre of pressure is mostly beside its corners; ValueError if it is farther from them
+        than the plate is long, as in another unit."""
+        heavy = np.abs(self.forces[:, 2]) > HEAVY
+        first, second, third, fourth = self.corners
+        half = np.linalg.norm([(first + fourth) - (second + third), (first + second) - (third + fourth)], axis=1) / 4
+        with np.errstate(invalid="ignore"):
+            away = np.linalg.norm(np.maximum(np.abs(self.points[heavy]) - half, 0.0), axis=1)
+        away = away[np.isfinite(away)]
+        middle = float(np.median(away)) if len(away) else 0.0
+        if middle == 0:
+            return []
+        unit = f", by the file in {self.unit!r}," if self.unit.strip() else ""
+        said = f"{self.place}: its centre of pressure is {middle:.3g} m outside its corners"
+        if middle > 2 * np.linalg.norm(half):
+            raise ValueError(f"{said}: are its moments{unit} in another unit?")
+        name = said.removeprefix(self.place.rpartition(": ")[0]).removeprefix(": ")
+        return [f"{name} in the median: are its corners and its origin right?"]
 
     def wrench(self, up: Array) -> tuple[Array, Array, Array]:
         """Force on the body, centre of pressure and moment about it, each (T, 3), in the world."""
@@ -289,8 +332,8 @@ def _numbers_of_plate(found: c3d.Recording, name: str, index: int, size: int, pl
     return got
 
 
-def _signals(found: c3d.Recording, index: int, kind: int, length: float, place: str) -> Array:
-    """(T, 6 or 8) forces in N and moments in N m, or forces alone, in the plate's axes."""
+def _channels(found: c3d.Recording, index: int, kind: int, place: str) -> list[int]:
+    """The columns of its signals. ValueError if they are too few, or not there."""
     count = CHANNELS[kind]
     stored = _whole(found, "CHANNEL")
     each = len(stored) // max(len(_whole(found, "TYPE")), 1)
@@ -300,9 +343,18 @@ def _signals(found: c3d.Recording, index: int, kind: int, length: float, place: 
             f"{place}: CHANNEL: expected {count} of the {found.analogs.shape[1]} channels, got "
             f"{', '.join(str(channel + 1) for channel in channels) or 'none'}"
         )
-    signals = found.analogs[:, channels]
+    return channels
+
+
+def _units(found: c3d.Recording, channels: Sequence[int]) -> list[str]:
+    """As the file says; "" where it does not."""
     units = [str(unit) for unit in several(found.parameters.get("ANALOG", {}), "UNITS")]
-    units = ["" if channel >= len(units) else units[channel] for channel in channels]
+    return ["" if channel >= len(units) else units[channel] for channel in channels]
+
+
+def _signals(found: c3d.Recording, index: int, kind: int, channels: Sequence[int], length: float, place: str) -> Array:
+    """(T, 6 or 8) forces in N and moments in N m, or forces alone, in the plate's axes."""
+    signals, units = found.analogs[:, channels], _units(found, channels)
     matrix = found.values("FORCE_PLATFORM", "CAL_MATRIX")
     if kind == 4 and matrix:  # raw channels, turned into forces and moments by a matrix; Cortex leaves it empty
         matrix = _numbers_of_plate(found, "CAL_MATRIX", index, 36, place)

@@ -27,7 +27,7 @@ from ipman_rs.ground import Ground
 from . import external_loads, pairing, sequences, text_file, trc
 from .check import Finding, demand, demanded, size_of_body
 from .external_loads import ExternalLoads, Load
-from .force_plates import LOADED, UP, ForcePlates, between, standing
+from .force_plates import LOADED, UP, ForcePlates, between, recorded, standing
 from .frames import DataSet, Frames
 from .joined import Joined
 from .tracks import METRES, Tracks
@@ -215,7 +215,7 @@ def plates(table: Storage, unit: str = "m", up: str = "y", loads: ExternalLoads 
     if loads is not None and (unnamed := _unnamed(table, found)):
         note = f"forces that {loads.source} does not name are left out: {', '.join(unnamed)}"
         found = replace(found, notes=(*found.notes, note))
-    return on_the_body(found)
+    return recorded(on_the_body(found))
 
 
 def _unnamed(table: Storage, found: ForcePlates) -> list[str]:
@@ -315,8 +315,8 @@ def _plausible(found: ForcePlates, up: str) -> None:
             f"{found.source}: looks like millimetres: centres of pressure {away:.4g} from the origin, expected metres, "
             f"up to {FAR:g}; say unit='mm' if so (--force-units mm)"
         )
-    push = np.median(found.forces[heavy], axis=0)
-    axis = "xyz"[int(np.abs(push).argmax())]
+    push = np.median(np.abs(found.forces[heavy]), axis=0)  # of either sign: `on_the_body` turns each plate by itself
+    axis = "xyz"[int(push.argmax())]
     if axis != up:
         raise ValueError(
             f"{found.source}: looks like {axis} up: loaded plates push along {axis} ({push[0]:.0f}, {push[1]:.0f}, "
@@ -422,13 +422,27 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
                 found.append(Finding("ok", f"{file.name}: {what} in {other.name}"))
         try:
             tracks = trc.read(file)
-            found += standing(file.name, tracks.points, tracks.confidence > 0, "y")
+            of_markers = _of_markers(tracks, file.name)
+            found += of_markers
+            if any(each.level == "wrong" for each in of_markers):
+                continue  # what else can be told of them only repeats it
             found += sequences.told(file.name, _frames(name, tracks, list(tracks.names), forces, loads, com))
             if forces is not None:
                 found += _of_forces(plates(storage(forces), loads=loads), tracks, forces.name)
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
     return found
+
+
+def _of_markers(tracks: Tracks, name: str) -> list[Finding]:
+    """What `ipman fit` says of them, and how they stand where nobody knows the places of their names."""
+    from ipman_rs.fitting.markers import judged
+
+    found = [Finding("odd", note) for note in tracks.notes] + judged.of_tracks(tracks)
+    found = [replace(each, what=f"{name}: {each.what}") for each in found if each.level != "ok"]
+    if any(each.level == "wrong" for each in found):
+        return found
+    return found + standing(name, tracks.points, tracks.confidence > 0, "y")
 
 
 def _of_forces(found: ForcePlates, tracks: Tracks, name: str) -> list[Finding]:

@@ -35,9 +35,13 @@ class OnDemand:
 
 
 def recordings(path: str | os.PathLike[str], suffix: str) -> list[Path]:
-    """The file `path`, or all files with this suffix anywhere below the folder. ValueError where there is none."""
+    """The file `path`, or all files with this suffix, in capitals or not, anywhere below the folder.
+
+    ValueError where there is none.
+    """
     place = Path(path)
-    files = sorted(place.glob(f"**/*{suffix}")) if place.is_dir() else [place]
+    below = place.glob("**/*") if place.is_dir() else [place]
+    files = sorted(each for each in below if each == place or (each.suffix.lower() == suffix and each.is_file()))
     if not files or not files[0].is_file():
         raise ValueError(
             f"{path}: expected a {suffix} file or a folder of them, {'none in it' if not files else 'not there'}"

@@ -19,39 +19,13 @@ from torch import Tensor
 import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel
 
+from .sites import MIDPOINTS, Inner, Point, Site
 from .surface import FINGERTIPS, SIDES, skin_points
 
-MIDPOINTS = {"mid_hip": ("left_hip", "right_hip"), "mid_shoulder": ("left_shoulder", "right_shoulder")}
 # Joints of fingers, their tips, and the knuckles of `surface`.
 HAND_POINTS = frozenset(
     f"{side}_{finger}{end}" for side in SIDES for finger in FINGERTIPS for end in ("", "1", "2", "3", "_tip")
 )
-
-
-@dataclasses.dataclass(frozen=True)
-class Site:
-    """A point at a vertex of the skin, moved by `shift`, m in the frame of the resting mesh (`body.v_template`).
-
-    `spread`: m, how well its place is known, the standard deviation over people.
-    """
-
-    vertex: int
-    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    spread: float = 0.01
-
-
-@dataclasses.dataclass(frozen=True)
-class Inner:
-    """A point inside the body that moves with one joint: `place` (3,) m in the frame of the resting mesh, of the mean
-    shape, and what each of the body's betas adds to it, `by_betas` (b, 3) m; `spread` as of a `Site`."""
-
-    joint: str
-    place: tuple[float, float, float]
-    by_betas: tuple[tuple[float, float, float], ...]
-    spread: float = 0.01
-
-
-Point = Site | Inner | str  # a str: the name of a joint, or of a point of the skin
 
 
 class Landmarks:

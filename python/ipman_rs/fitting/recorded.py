@@ -32,7 +32,6 @@ from .problem import Problem
 from .sequence import fit_sequence
 from .start import at_points
 
-FEWEST = 6  # known markers, without which a body is a guess
 WEIGHED = 8  # bodies
 POSES = 24  # of the recording, spread over it, that say where the markers are
 
@@ -107,11 +106,11 @@ def fit_tracks(
     if every < 1:
         raise ValueError(f"every: expected 1 or more, got {every}")
     config = load("markers") if config is None else config
-    seen, unseen = seen_names(tracks)
+    seen, unseen = judged.seen_names(tracks)
     sites = markers.sites(body.body, seen, own=own)
-    if len(sites) < FEWEST:
+    if len(sites) < judged.FEWEST:
         raise ValueError(
-            f"{tracks.source}: expected at least {FEWEST} markers with known places, got {len(sites)} of "
+            f"{tracks.source}: expected at least {judged.FEWEST} markers with known places, got {len(sites)} of "
             f"{', '.join(seen)}"
         )
     unknown = tuple(name for name in seen if name not in sites)
@@ -133,26 +132,6 @@ def fit_tracks(
     return Recorded(found, tracks, sites, unknown, unseen, markers.meanings(tracks.names, own))
 
 
-def judged_tracks(
-    tracks: markers.Tracks,
-    own: Mapping[str, Meaning | None] | None = None,
-    up_is_said: bool = False,
-    ground: float | None = None,
-) -> list[Finding]:
-    """What the judge of all doors says of a recording before its fit: names, coverage, size, place, stance, rate; and
-    where the floor is said to be at y = `ground` m, whether the markers are above it."""
-    seen, _ = seen_names(tracks)
-    meant = markers.meanings(seen, own)
-    unknown = [name for name in seen if name not in meant]
-    found = judge.known_markers([*meant], unknown, FEWEST) + judged.of_rate(tracks)
-    if not meant:
-        return found
-    placed = judged.of_points(tracks, meant, up_is_said)
-    if ground is not None and not any(each.level == "wrong" for each in placed):
-        placed += judged.of_floor(tracks, meant, ground)
-    return found + judged.coverage([*meant], meant) + placed
-
-
 def judged_fit(recorded: Recorded) -> list[Finding]:
     """What it says of the fit: the markers' mean distance from their places, and the person's mass."""
     with torch.no_grad():
@@ -162,12 +141,6 @@ def judged_fit(recorded: Recorded) -> list[Finding]:
     known = errors[np.isfinite(errors)]
     found = judge.marker_error(float(known.mean())) if len(known) else []
     return found + judge.masses(np.atleast_1d(mass), vertices.numpy())
-
-
-def seen_names(tracks: markers.Tracks) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The markers that were ever seen, and those that are only in the file."""
-    seen = tracks.confidence.any(axis=0)
-    return tuple(np.array(tracks.names)[seen].tolist()), tuple(np.array(tracks.names)[~seen].tolist())
 
 
 def _shape_kept(config: Config) -> Config:

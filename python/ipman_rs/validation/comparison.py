@@ -118,23 +118,35 @@ class Comparison:
         return np.stack([(vectors * self.forward).sum(axis=1), (vectors * left).sum(axis=1), vectors[:, 1]], axis=1)
 
     @cached_property
+    def lacking(self) -> Mask:
+        """(T, P): plates whose force is no number while another's is: nobody knows what is on them."""
+        if self.plates is None:
+            return np.zeros((len(self.times), 0), bool)
+        known = np.isfinite(self.plates.forces).all(axis=-1)
+        return ~known & known.any(axis=1, keepdims=True)
+
+    @cached_property
+    def loaded(self) -> Mask:
+        """(T,): some plate carries a load, and the forces of all are known."""
+        if self.measured is None:
+            return np.zeros(len(self.times), bool)
+        return np.isfinite(self.measured[:, 0]) & ~self.lacking.any(axis=1)
+
+    @cached_property
     def beside(self) -> Mask:
-        """(T,): something is loaded, and a foot is on the floor beside the plates: by their outlines, or, where those
+        """(T,): `loaded`, and a foot is on the floor beside the plates: by their outlines, or, where those
         are not known, by their centres of pressure."""
         if self.plates is None or self.measured is None:
             return np.zeros(len(self.times), bool)
-        loaded = np.isfinite(self.measured[:, 0])
         if self.plates.corners is not None:
-            return loaded & beside_plates(self.computed.soles, self.rate, self.floor, self.plates.corners)
-        return loaded & beside_centers(self.computed, self.rate, self.floor, self.plates)
+            return self.loaded & beside_plates(self.computed.soles, self.rate, self.floor, self.plates.corners)
+        return self.loaded & beside_centers(self.computed, self.rate, self.floor, self.plates)
 
     @cached_property
     def complete(self) -> Mask:
-        """(T,): the body was seen, something is loaded, and no foot is on the floor beside the plates."""
-        if self.plates is None or self.measured is None:
-            return np.zeros(len(self.times), bool)
-        loaded = np.isfinite(self.measured[:, 0])
-        loaded = loaded if self.seen is None else loaded & self.seen
+        """(T,): the body was seen, something is loaded, all forces are known, and no foot is on the floor beside the
+        plates."""
+        loaded = self.loaded if self.seen is None else self.loaded & self.seen
         return loaded & ~self.beside
 
     @cached_property
@@ -148,10 +160,11 @@ class Comparison:
 
     @cached_property
     def phases(self) -> Mapping[str, Mask]:
-        """The complete frames; of walking, those on one plate and those on two apart."""
+        """The complete frames; of walking, those on one plate and those on two apart; none without plates."""
+        if self.plates is None:
+            return {}
         if self.kind != "walking":
             return {"all": self.complete}
-        assert self.plates is not None
         count = (carried(self.plates) > 0).sum(axis=1)
         return {"single support": self.complete & (count == 1), "double support": self.complete & (count == 2)}
 

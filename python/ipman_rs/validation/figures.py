@@ -54,9 +54,13 @@ def figures(one: Comparison) -> dict[str, Any]:
 
 
 def flags(one: Comparison) -> list[str]:
-    """What is odd about the plates: a weight that changes, or is not that of standing still, a foot beside them, and a
-    force that the movement does not explain."""
-    said = []
+    """What is odd about the plates: forces that are no numbers, a weight that changes, or is not that of standing
+    still, a foot beside them, and a force that the movement does not explain."""
+    said = [
+        f"the forces of plate {plate + 1} are no numbers in {count} of {len(one.times)} frames: they are left out"
+        for plate, count in enumerate(one.lacking.sum(axis=0).tolist())
+        if count
+    ]
     spread, loaded = _std(one.weights), int(one.beside.sum() + one.complete.sum())
     if one.beside.any():
         which = f"{one.beside.sum()} of {loaded} loaded frames"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -52,27 +53,31 @@ def has_center_of_mass(path: Path) -> bool:
         return False
 
 
-def plates(path: Path, up: Up = None, unit: str = "m", loads: ExternalLoads | None = None) -> ForcePlates:
+def plates(
+    path: Path, up: Up = None, unit: str = "m", loads: ExternalLoads | None = None, length: float | None = None
+) -> ForcePlates:
     """The force plates of a `.c3d`, `.mot` or `.sto` file, y up. ValueError, naming the file, for what is not right.
 
     `up`: what points up in the file, if that is not what it says, or y; `unit`: of the points of a `.mot` or `.sto`;
-    `loads`: in which of its columns the forces are.
+    `loads`: in which of its columns the forces are; `length`: metres in one of a `.c3d`'s, if it says that wrongly.
     """
     if path.suffix.lower() == ".c3d":
-        found = c3d.read(path)
+        found = _recording(path, length)
         axis = _axis(up, found.up, path)
         return force_plates.of_recording(found, axis).turned(TO_Y_UP[axis])
     axis = _axis(up, "y", path)
     return opensim.plates(opensim.storage(path), unit, axis, loads).turned(TO_Y_UP[axis])
 
 
-def center_of_mass(path: Path, times: Array, up: Up = None, subject: str | None = None) -> Array:
+def center_of_mass(
+    path: Path, times: Array, up: Up = None, subject: str | None = None, length: float | None = None
+) -> Array:
     """A measured centre of mass (n, 3) m at these times, y up, NaN outside the file's. ValueError, naming the file.
 
-    `up` as in `plates`; `subject`: whose, where a `.c3d` has several people.
+    `up` and `length` as in `plates`; `subject`: whose, where a `.c3d` has several people.
     """
     if path.suffix.lower() == ".c3d":
-        found = c3d.read(path)
+        found = _recording(path, length)
         points = found.center_of_mass(subject)
         if points is None:
             raise ValueError(f"{path}: expected a centre of mass by a model such as Plug-in Gait, it has none")
@@ -83,6 +88,11 @@ def center_of_mass(path: Path, times: Array, up: Up = None, subject: str | None 
         table = opensim.storage(path)
         own, points = table.times, opensim.center_of_mass(table)
     return between(own, points @ TO_Y_UP[_axis(up, "y", path)].T, times)
+
+
+def _recording(path: Path, length: float | None) -> c3d.Recording:
+    found = c3d.read(path)
+    return found if length is None else replace(found, unit=length)
 
 
 def _axis(up: Up, usual: str, path: Path) -> str:

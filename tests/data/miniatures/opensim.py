@@ -13,13 +13,13 @@ def sway(times):
     return np.stack([0.02 * np.sin(times), np.zeros_like(times), 0.01 * np.cos(2 * times)], axis=1)
 
 
-def trc(path, frames=30, rate=60.0, unit="mm", turn=None, cut=None, names=HEAD, missing=()):
+def trc(path, frames=30, rate=60.0, unit="mm", turn=None, cut=None, names=HEAD, missing=(), offset=(0, 0, 0)):
     """The markers, in `unit`; `turn` (3, 3) turns the axes; `missing` (frame, marker) are empty. Gives (T, M, 3) m.
 
     `cut` lines are written only.
     """
     times = np.arange(frames) / rate
-    points = PLACES[None, : len(names)] + sway(times)[:, None]
+    points = PLACES[None, : len(names)] + sway(times)[:, None] + offset
     written = (points if turn is None else points @ np.asarray(turn).T) * {"mm": 1000.0, "m": 1.0}[unit]
     head = "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames"
     axes = [f"{axis}{number + 1}" for number in range(len(names)) for axis in "XYZ"]

@@ -16,7 +16,7 @@ from ipman_rs.body import BodyModel
 from ipman_rs.data import c3d, trc
 from ipman_rs.data.tracks import Tracks, turned
 
-from ..landmarks import Inner, Point, Site
+from ..sites import Inner, Point, Site
 from ..surface import SIDES
 from .anatomy import HIP_CENTRE, MIDDLE, RADIUS, SIDED, SPREAD, Anatomy
 from .names import meanings

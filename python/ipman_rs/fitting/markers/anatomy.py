@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ipman_rs.body import BodyModel
 
-from ..landmarks import MIDPOINTS, Inner, Site
+from ..sites import MIDPOINTS, Inner, Site
 from ..surface import SIDES, Skin
 
 Array = NDArray[np.float64]

@@ -14,6 +14,7 @@ from ipman_rs.data.tracks import TO_Y_UP, Tracks
 from ipman_rs.ground import Ground
 
 from .anatomy import ANYWHERE, MIDDLE, SIDED, SPREAD
+from .names import meanings as meanings_of
 from .sets import Meaning
 
 Array = NDArray[np.float64]
@@ -29,6 +30,23 @@ ARMS = ("upper_arm", "biceps", "elbow", "elbow_lateral", "elbow_medial", "forear
 FEET = re.compile(r"heel|toe|malleolus|metatarsal|midfoot|ankle|foot")
 
 BELOW = 0.15  # m: farther below the floor is no marker of a foot
+FEWEST = 6  # known markers, without which a body is a guess
+# Which sites are in front, behind, and on the sides of a part of the body.
+FACING = {
+    "pelvis": ("asis", "psis|sacrum", "asis|psis|iliac_crest|hip_centre|hip|trochanter"),
+    "trunk": (
+        "clavicle|sternum|lower_sternum|sternoclavicular",
+        r"c7|[tl]\d+|scapula|spine\d",
+        "acromion|shoulder|shoulder_front|shoulder_back|sternoclavicular|scapula",
+    ),
+    "feet": (
+        r"toe_tip|metatarsal_\d|big_toe|small_toe",
+        "heel_marker|heel",
+        r"toe_tip|metatarsal_\d|big_toe|heel_marker|heel|malleolus_lateral|ankle",
+    ),
+}
+SLANT = 0.1  # volume of front × left × up, as unit vectors: with less, a part does not say where its left is
+MOST = 0.8  # of the frames that say it, less those that say the opposite
 SKIN = (-0.015, 0.04)  # m from the skin to a marker's middle; 7 to 15 mm are usual
 
 
@@ -53,6 +71,32 @@ def _without_side(name: str) -> str:
     return name.removeprefix("left_").removeprefix("right_")
 
 
+def of_tracks(
+    tracks: Tracks,
+    own: Mapping[str, Meaning | None] | None = None,
+    up_is_said: bool = False,
+    ground: float | None = None,
+) -> list[Finding]:
+    """What the judge of all doors says of a recording before its fit: names, coverage, size, place, stance, rate; and
+    where the floor is said to be at y = `ground` m, whether the markers are above it."""
+    seen, _ = seen_names(tracks)
+    meant = meanings_of(seen, own)
+    unknown = [name for name in seen if name not in meant]
+    found = judge.known_markers([*meant], unknown, FEWEST) + of_rate(tracks)
+    if not meant:
+        return found
+    placed = of_points(tracks, meant, up_is_said)
+    if ground is not None and not any(each.level == "wrong" for each in placed):
+        placed += of_floor(tracks, meant, ground)
+    return found + coverage([*meant], meant) + placed
+
+
+def seen_names(tracks: Tracks) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The markers that were ever seen, and those that are only in the file."""
+    seen = tracks.confidence.any(axis=0)
+    return tuple(np.array(tracks.names)[seen].tolist()), tuple(np.array(tracks.names)[~seen].tolist())
+
+
 def of_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool = False) -> list[Finding]:
     """Size, place and stance of the markers whose places are known; `up_is_said`: by the user, who knows.
 
@@ -70,6 +114,7 @@ def of_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool 
         found += judge.far("markers", points[np.isfinite(points).all(axis=-1)])
     rotation = TO_Y_UP[tracks.up]
     up = ways(points @ rotation, known, meanings)
+    found += sides(points, known, meanings)
     return found + ([] if up_is_said else check.upright("markers", up, Ground(rotation[1])))
 
 
@@ -124,6 +169,39 @@ def ways(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> Arra
     if not upper.any() or not lower.any() or (upper & lower).any():
         return np.full((len(points), 3), np.nan)
     return _mean(points[:, upper]) - _mean(points[:, lower])
+
+
+def sides(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> list[Finding]:
+    """Whether what is called left in points (T, M, 3) is on the left of those who face as their front and back say.
+
+    In their own axes, so whichever way they stand or lie.
+    """
+    places = [place if isinstance(place, str) else "" for place in (meanings[name] for name in tracks.names)]
+    up = ways(points, tracks, meanings)
+    turned = {part: _handedness(points, places, up, *words) for part, words in FACING.items()}
+    known = {part: sign for part, sign in turned.items() if sign}
+    swapped = [part for part, sign in known.items() if sign < 0]
+    if not swapped:
+        return []
+    sure = len(swapped) == len(known) and (len(swapped) > 1 or "pelvis" in swapped)
+    advice = "are names exchanged (--markers FILE gives others), or axes mirrored?"
+    return [Finding("wrong" if sure else "odd", f"left and right look swapped of {' and '.join(swapped)}", advice)]
+
+
+def _handedness(points: Array, places: Sequence[str], up: Array, front: str, back: str, sided: str) -> int:
+    """1 where left is on the left in most frames, -1 where it is on the right; 0 where nobody can tell."""
+
+    def middle(words: str, side: str = "(left_|right_)?") -> Array:
+        return _mean(points[:, [re.fullmatch(f"{side}({words})", place) is not None for place in places]])
+
+    ahead, left = middle(front) - middle(back), middle(sided, "left_") - middle(sided, "right_")
+    with np.errstate(invalid="ignore", divide="ignore"):
+        lengths = np.prod([np.linalg.norm(way, axis=1) for way in (ahead, left, up)], axis=0)
+        volume = (np.cross(ahead, left) * up).sum(axis=1) / lengths
+    sure = volume[np.abs(volume) > SLANT]
+    if not len(sure) or abs(np.mean(np.sign(sure))) < MOST:
+        return 0
+    return int(np.sign(np.mean(np.sign(sure))))
 
 
 def _mean(points: Array) -> Array:
