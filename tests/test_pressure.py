@@ -64,8 +64,10 @@ def test_hovering_bodies_keep_their_centre(lift, dtype, blob):
 @pytest.mark.parametrize("lift", [0.5, 1000.0])
 @pytest.mark.parametrize("size", [4.0, 100.0, 300.0])
 def test_a_tall_hovering_body_keeps_its_centre(size, lift, blob):
-    """On its tip: the lowest of its few samples lies metres above its lowest vertex. Single precision rounds numbers
-    to 6e-8 of them, which moves an exponent by γ times as much; three roundings of the size and the height are allowed.
+    """On its tip: the lowest of its few samples lies metres above its lowest vertex.
+
+    Single precision rounds coordinates to 6e-8 of them, which moves an exponent by γ times as much; three roundings of
+    the size and the height are allowed.
     """
     points = size * np.array([[0.0, 0, 0], [0.4, 1, 0.1], [-0.3, 1, 0.4], [-0.1, 1.1, -0.3]])
     faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]

@@ -91,7 +91,7 @@ def calls() -> dict[str, Callable[[], Callable[[], Any]]]:
 
     return {
         "template of 1e6 faces": lambda: template(1000, 500),
-        "template of 1e6 faces in 500 parts": lambda: template(1000, 500, 500),
+        "template of 1e6 faces in 100 parts": lambda: template(1000, 500, 100),
         "template of 1e7 samples": lambda: template(40, 40, 4, num_samples=10_000_000),
         "samples' arrays": lambda: samples(5_000_000),
         "pressure": lambda: bodies(ip.pressure, 4_000),

@@ -296,9 +296,9 @@ impl MassProperties {
     pub fn check_densities(&self, num_parts: usize) -> Result<()> {
         if ![1, num_parts].contains(&self.densities.len()) {
             let (expected, got) = (format!("1 or {num_parts} numbers"), self.densities.len().to_string());
-            return Err(Error::Argument { name: "density", expected, got });
+            return Err(Error::Argument { name: "densities", expected, got });
         }
-        self.densities.iter().try_for_each(|&density| positive("density", density))
+        self.densities.iter().try_for_each(|&density| positive("densities", density))
     }
 
     #[inline(always)]

@@ -199,7 +199,7 @@ fn options_and_weights_out_of_range_are_named() {
     let contact = Contact { rule: ContactRule::Paper, threshold: f64::NAN };
     assert_eq!(named(batch.status(&contact).err()), "threshold");
     let dense = MassProperties { densities: vec![-985.0] };
-    assert_eq!(named(batch.solids(&dense, 0.1).err()), "density");
+    assert_eq!(named(batch.solids(&dense, 0.1).err()), "densities");
     let pool = Pool { valid: None, reduction: Reduction::Mean };
     for weights in [[1.0, f64::NAN, 1.0], [f64::INFINITY, 1.0, 1.0]] {
         let mut gradient = vec![0.0; data.len()];

@@ -49,7 +49,7 @@ fn run<'py, T: Data + Element>(
     Ok((rows.into_any(), corners, counts))
 }
 
-type PolygonArrays<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<i64>>);
+pub type PolygonArrays<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<i64>>);
 
 /// The corners (N, 3) of all polygons one after the other, and how many each has.
 pub fn polygon_arrays<'a, 'py>(

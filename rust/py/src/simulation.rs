@@ -1,6 +1,6 @@
 //! Stiff bodies: how firmly they stand, and what becomes of them when they are let go.
 
-use crate::analysis::polygon_arrays;
+use crate::analysis::{PolygonArrays, polygon_arrays};
 use crate::array::{Vertices, written};
 use crate::bodies::{Grounds, on_batch};
 use crate::error::python_error;
@@ -89,7 +89,7 @@ pub fn touching<'py>(
     vertices: Vertices<'py>,
     normal: PyReadonlyArray2<'py, f64>,
     height: PyReadonlyArray1<'py, f64>,
-) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<i64>>)> {
+) -> PyResult<PolygonArrays<'py>> {
     let shape = shape(template, shape_name, resolution)?;
     let found = on_either!(py, template, vertices, Grounds::new(normal, height), |batch| batch.touching(&shape))?;
     polygon_arrays(py, found.iter())

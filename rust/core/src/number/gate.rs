@@ -155,9 +155,10 @@ impl Gates for f64 {
 #[inline(always)]
 pub(super) fn apart_at_current_level<F: Room<A>, A>(arguments: A) -> F::Output {
     #[cfg(target_arch = "x86_64")]
-    // SAFETY: the level has been asked of the CPU.
     match Level::current() {
+        // SAFETY: the level has been asked of the CPU.
         Ok(Level::Avx512) => return unsafe { super::simd::apart512::<F, A>(arguments) },
+        // SAFETY: the level has been asked of the CPU.
         Ok(Level::Avx2) => return unsafe { super::simd::apart256::<F, A>(arguments) },
         _ => {}
     }

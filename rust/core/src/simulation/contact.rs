@@ -18,6 +18,11 @@ pub enum Shape {
     Decomposition { resolution: u32, faces: Vec<[u32; 3]> },
 }
 
+/// Bytes that the engine takes: for a vertex, where all of them are corners, about 4,000 were measured; a voxel of the grid is
+/// one, and those inside are listed besides.
+const VERTEX_BYTES: usize = 6_000;
+const VOXEL_BYTES: usize = 4;
+
 impl Shape {
     pub fn check(&self) -> Result<()> {
         match self {
@@ -29,13 +34,22 @@ impl Shape {
         }
     }
 
+    /// Asks for what the engine takes for bodies of so many vertices on all threads, for it does not do so itself. Before
+    /// they start: a thread that asks would take from the others meanwhile.
+    pub(super) fn ask(&self, num_vertices: usize) {
+        let voxels = match self {
+            Shape::Hull => 0,
+            Shape::Decomposition { resolution, .. } => (*resolution as usize).pow(3),
+        };
+        memory::ask(num_threads() * (VERTEX_BYTES * num_vertices + VOXEL_BYTES * voxels));
+    }
+
     /// The points that can touch a plane. None where there is no hull.
     pub fn touching(&self, points: &[Vec3<f64>]) -> Option<Vec<Vec3<f64>>> {
         let points = memory::collect(points.iter().map(|&[x, y, z]| Vector::new(x, y, z)));
         let corners = match self {
             Shape::Hull => corners(&points)?,
             Shape::Decomposition { resolution, faces } => {
-                memory::ask(VOXEL_BYTES * (*resolution as usize).pow(3) * num_threads());
                 let parameters = VHACDParameters { resolution: *resolution, ..VHACDParameters::default() };
                 let parts = VHACD::decompose(&parameters, &points, faces, false);
                 let hulls = parts.compute_convex_hulls(parameters.convex_hull_downsampling);
@@ -47,11 +61,6 @@ impl Shape {
     }
 }
 
-/// What the engine's voxels and hulls take at most, bytes each: it does not ask for them, and every thread may be there.
-const VOXEL_BYTES: usize = 32;
-const HULL_BYTES: usize = 512;
-
 fn corners(points: &[Vector]) -> Option<Vec<Vector>> {
-    memory::ask(HULL_BYTES * points.len() * num_threads());
     try_convex_hull(points).ok().map(|(corners, _)| corners).filter(|corners| corners.len() >= 4)
 }

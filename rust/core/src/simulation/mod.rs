@@ -108,6 +108,7 @@ impl<T: Data> Batch<'_, T> {
             let mut motions = memory::collect(solids.iter().map(|solid| simulation.unknown(solid.status)));
             let starts = |solid: &Solid| solid.is_grounded() || (solid.is_solid() && !simulation.snap);
             let bodies = solids.iter().zip(&mut motions).enumerate().filter(|(_, (solid, _))| starts(solid));
+            simulation.shape.ask(self.template().mesh.num_vertices);
             threads::each(memory::collect(bodies), true, self.interrupted(), &|(body, (solid, motion))| {
                 let ground = self.ground_of(body);
                 let offset = |vertex: &[T; 3]| std::array::from_fn(|k| vertex[k].value() - solid.centre[k]);
@@ -124,6 +125,7 @@ impl<T: Data> Batch<'_, T> {
         memory::guarded(|| {
             let mut found = memory::filled(Vec::new(), self.len());
             let bodies = memory::collect(found.iter_mut().enumerate());
+            shape.ask(self.template().mesh.num_vertices);
             threads::each(bodies, true, self.interrupted(), &|(body, found)| {
                 if all_finite(self.vertices_of(body)) {
                     let point = |vertex: &[T; 3]| std::array::from_fn(|k| vertex[k].value());

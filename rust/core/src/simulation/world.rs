@@ -4,15 +4,10 @@ use super::Place;
 use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, scale};
 use crate::solid::{GRAVITY, Solid};
-use crate::threads::num_threads;
 use rapier3d_f64::prelude::*;
 
 /// Of the balls at the corners, m. They touch where their corner would, for the half-space lies lower by as much.
 const RADIUS: f64 = 1e-4;
-
-/// What the engine takes at most for a corner, bytes; about 4,000 were measured. It does not ask for them, and every thread
-/// may be there.
-const CORNER_BYTES: usize = 8 << 10;
 
 pub struct Fall<'a> {
     pub solid: &'a Solid,
@@ -29,7 +24,6 @@ pub struct Fall<'a> {
 impl Fall<'_> {
     /// Where the body is after so many steps, ascending; None if the engine loses it.
     pub fn run(&self, centre: Vec3<f64>, looks: &[usize]) -> Option<Vec<Place>> {
-        memory::ask(CORNER_BYTES * self.points.len() * num_threads());
         let mut world = PhysicsWorld::new();
         world.gravity = vector(scale(-GRAVITY, self.normal));
         self.set_accuracy(&mut world.integration_parameters);

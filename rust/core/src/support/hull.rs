@@ -8,7 +8,8 @@ use robust::{Coord, orient2d};
 /// One distinct point gives one corner, collinear points give their two ends. Of equal points the first is the corner.
 pub fn convex_hull(points: &[[f64; 2]]) -> Vec<usize> {
     let mut order = memory::collect(0..points.len());
-    let along = |i: usize, j: usize, k: usize| points[i][k].total_cmp(&points[j][k]);
+    // −0 + 0 is 0: a total order has the two apart, and the chain then goes astray.
+    let along = |i: usize, j: usize, k: usize| (points[i][k] + 0.0).total_cmp(&(points[j][k] + 0.0));
     order.sort_unstable_by(|&i, &j| along(i, j, 0).then(along(i, j, 1)).then(i.cmp(&j)));
     order.dedup_by_key(|i| points[*i]);
     if order.len() < 3 {
@@ -65,6 +66,12 @@ mod tests {
         let ends = convex_hull(&line);
         assert_eq!(ends.len(), 2);
         assert_eq!(area(&[line[ends[0]], line[ends[1]]]), 0.0);
+    }
+
+    #[test]
+    fn both_zeros_are_one() {
+        let points = [[0.0, -0.0], [-0.0, 1.0], [-1.0, 0.0], [0.0, 0.5], [-0.0, -0.0]];
+        assert_eq!(convex_hull(&points), [2, 0, 1]);
     }
 
     #[test]

@@ -108,7 +108,7 @@ impl TipTest {
             return Err(Error::Argument { name: "tolerance", expected, got: self.tolerance.to_string() });
         }
         not_negative("nudge", self.nudge)?;
-        positive("fallen", self.fallen)
+        not_negative("fallen", self.fallen)
     }
 
     /// What the lanes know of each body.
