@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from .aliases import KEYPOINTS
 from .sets import MARKERS, Meaning
@@ -84,6 +84,13 @@ def _found(
                 break
     meant = {name: given.get(key, known.get(key)) for key, (_, name) in taken.items()}
     return {name: meaning for name in names if (meaning := meant.get(name)) is not None}
+
+
+def unmatched(names: Sequence[str], own: Iterable[str]) -> list[str]:
+    """Which of a user's `own` names are those of no marker of a file, as `meanings` compares them."""
+    ends = _shared_ends(names)
+    known = {plain(variant) for name in names for variant in _variants(name, ends)}
+    return [name for name in own if plain(name) not in known]
 
 
 def _variants(name: str, ends: tuple[Sequence[str], Sequence[str]]) -> list[str]:
