@@ -77,6 +77,14 @@ def test_beginnings_and_ends_that_all_share_say_nothing():
     assert meanings([f"{name}_jc" for name in ("LASI", "RASI", "C7")]) == {}
 
 
+@pytest.mark.parametrize("beginning", ["S01", "Sub12"])
+def test_a_subject_without_a_mark_behind_it(beginning):
+    names = ["LASI", "RASI", "LKNE", "RKNE", "C7", "LANK"]
+    found = meanings([beginning + name for name in names])
+    assert {name.removeprefix(beginning): meaning for name, meaning in found.items()} == meanings(names)
+    assert len(found) == 6
+
+
 def test_of_two_markers_of_one_name_the_plain_one_counts():
     found = meanings(["LASI_filt", "LASI", "RASI_filt", "RASI", "C7_filt", "C7"])
     assert list(found) == ["LASI", "RASI", "C7"]

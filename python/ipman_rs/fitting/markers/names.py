@@ -2,7 +2,7 @@
 
 Names are compared free of case and punctuation, the side first: `L_ASIS`, `L.ASIS`, `lasis`, `ASIS_L` and `Left ASIS`
 are one. What stands before a colon is the subject; a beginning or an end that most names of a file share ("Subject_",
-"_study") is left out where the name is known without it.
+"S01", "_study") is left out where the name is known without it.
 """
 
 from __future__ import annotations
@@ -111,6 +111,7 @@ def _shared_ends(names: Sequence[str]) -> tuple[list[str], list[str]]:
     enough = max(FEWEST, SHARED * len(names))
     words = r"(?:[^\W_]+[\W_]+){%d}(?=\w)"
     first = Counter(match[0] for n in (3, 2, 1) for name in names if (match := re.match(words % n, name)))
+    first += Counter(match[0] for name in names if (match := re.match(r"[A-Za-z]+\d+(?=[A-Za-z])", name)))  # S01LASI
     last = Counter(match[0] for name in names if (match := re.search(r"(?<=\w)[\W_]+[^\W_]+$", name)))
     beginnings = [text for text, count in first.items() if count >= enough and not _telling(text)]
     endings = [
