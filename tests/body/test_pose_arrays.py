@@ -71,6 +71,8 @@ def test_three_frames_of_vectors_stay_vectors():
 def test_what_does_not_tell_is_refused():
     with pytest.raises(ValueError, match=r"global_orient has shape \(3, 3\): it may be one rotation matrix or three"):
         pieces(global_orient=np.eye(3), body_pose=np.zeros((3, 69)))
+    with pytest.raises(ValueError, match=r"has shape \(3, 3\) and is nearly a rotation matrix, off by 0.02"):
+        pieces(global_orient=1.01 * np.eye(3), body_pose=np.zeros((1, 69)))
     with pytest.raises(ValueError, match="global_orient: has the shape of rotation matrices, but they are none"):
         pieces(global_orient=np.diag([1.0, 1.0, -1.0])[None], body_pose=np.zeros((1, 69)))
     with pytest.raises(ValueError, match="whether w is first or last: call the array poses_wxyz or poses_xyzw"):

@@ -77,7 +77,16 @@ BAD = {
     "other.npz": (npz_bytes(something=np.zeros(3)), "holds something; expected vertices and faces"),
     "flat.npz": (npz_bytes(vertices=np.zeros((8, 2)), faces=FACES), "shape (8, 2)"),
     "none.npz": (npz_bytes(vertices=np.zeros((0, 3)), faces=FACES), "shape (0, 3)"),
-    "outside.npz": (npz_bytes(vertices=BOX.vertices, faces=FACES + 1), "vertex 8"),
+    "outside.npz": (
+        npz_bytes(vertices=BOX.vertices, faces=FACES + 1),
+        "8 vertices, counted from 0 to 7; do they count from 1?",
+    ),
+    "before.npz": (npz_bytes(vertices=BOX.vertices, faces=FACES - 1), "faces name vertex -1, but there are 8 vertices"),
+    "digits.npz": (npz_claiming(f"({'9' * 400}, 3)"), "its header claims a shape that no array can have"),
+    "many.npz": (
+        npz_bytes(pred_vertices=BOX.vertices, **{f"another_array_{k:02d}": np.zeros(3) for k in range(60)}),
+        "holds pred_vertices, another_array_00, ",
+    ),
     "nofaces.npz": (npz_bytes(vertices=BOX.vertices), "no faces"),
     "nan.npz": (npz_bytes(vertices=BOX.vertices * np.nan, faces=FACES), "finite"),
     "inward.npz": (npz_bytes(vertices=BOX.vertices, faces=FACES[:, ::-1]), "inside out"),

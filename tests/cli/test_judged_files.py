@@ -185,7 +185,7 @@ def test_places_in_centimetres_are_marked(run, tmp_path):
     flags = analyze(run, tmp_path / "cm.npz", "--body", "anny-lite")["flags"]
     fast, high = flags
     assert fast.startswith("trans: moves at 114.3 m/s in the median, expected up to 15; is its unit (--units) or its")
-    assert high == "vertices: 89.09 m above the origin of their world; --units cm if so"
+    assert high.startswith("vertices: 89.09 m above the origin of their world; is the unit of their places another")
 
 
 def test_rates(run, tmp_path):
@@ -198,6 +198,15 @@ def test_rates(run, tmp_path):
     assert [frame["seconds"] for frame in body["frames"]] == [number / 50 for number in range(8)]
     np.savez(tmp_path / "fast.npz", **{**stored, "trans": 0 * stored["trans"], "mocap_framerate": 20_000.0})
     assert analyze(run, tmp_path / "fast.npz")["flags"] == ["2e+04 frames a second; --rate HZ says otherwise"]
+
+
+def test_a_rate_for_each_frame(run, tmp_path):
+    np.savez(tmp_path / "same.npz", **{**walk_parameters(), "mocap_framerate": np.full(8, 25.0)})
+    body = analyze(run, tmp_path / "same.npz", "--body", "anny-lite")
+    assert [frame["seconds"] for frame in body["frames"]] == [number / 25 for number in range(8)]
+    np.savez(tmp_path / "other.npz", **{**walk_parameters(), "mocap_framerate": np.arange(8.0)})
+    line = refused(run, "analyze", tmp_path / "other.npz", "--body", "anny-lite")
+    assert "mocap_framerate holds 8 different numbers, expected one; --rate HZ says otherwise" in line
 
 
 def test_a_root_that_is_one_matrix_is_one_body(run, tmp_path):

@@ -229,7 +229,7 @@ def test_subjects(read):
     np.testing.assert_array_equal(alone.confidence, 1)
     ball = read(raw.c3d(names=["Ann:C7", "Ann:LASI", "Ball:top"]))
     assert ball.names == ("C7", "LASI", "top")
-    assert ball.notes == ()
+    assert ball.notes == ("the markers of Ann, Ball are taken as one person's (subject, --subject: those of one)",)
     with pytest.raises(ValueError, match="subject: expected none, for no marker has one, got 'Ann'"):
         read(raw.c3d(), subject="Ann")
 

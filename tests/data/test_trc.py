@@ -159,6 +159,20 @@ def test_names_with_their_persons(read):
     same(read(text(ROWS, names=names), subject="S2"), ("C7", "L.ASIS"), ROWS[:, 1:])
 
 
+def test_two_people_who_share_no_name(read):
+    """Each was recorded with markers of their own: half a person each would be nobody."""
+    rows = np.arange(1.0, 1 + 2 * 12 * 3).reshape(2, 12, 3)
+    names = [f"{('Al', 'Bob')[number % 2]}:M{number}" for number in range(12)]
+    with pytest.raises(ValueError, match=r"two people in it, Al \(6 markers\) and Bob \(6 markers\): say which one"):
+        read(text(rows, names=names, markers=12))
+    same(read(text(rows, names=names, markers=12), subject="Al"), [f"M{k}" for k in range(0, 12, 2)], rows[:, ::2])
+    wand = read(
+        text(rows[:, :11], names=[*[f"Al:M{k}" for k in range(6)], *[f"Wand:{k}" for k in range(5)]], markers=11)
+    )
+    assert wand.names[-1] == "4"
+    assert wand.notes == ("the markers of Al, Wand are taken as one person's (subject, --subject: those of one)",)
+
+
 def test_two_people_of_whom_one_has_no_name(read):
     points = np.concatenate([ROWS, ROWS + 700], axis=1)
     content = text(points, names=[*NAMES, *(f"B:{name}" for name in NAMES)])
@@ -183,17 +197,41 @@ def test_five_thousand_subjects_at_once(read):
     "gap",
     ["9999.99", "-9999.99", "9999.990000", "999999", "99999.9", "9999999", "9.999999e+06",
      "999999.99", "99999.999999", "-3.697314e28", "-3.69731E+28", "1e20", "NaN",
-     "nan(snan)", "-nan(ind)", "-1.#IND00", "1.#QNAN0", "0", "0.000"],
+     "nan(snan)", "-nan(ind)", "-1.#IND00", "1.#QNAN0", "-", "null", "0", "0.000"],
 )  # fmt: skip
 def test_what_stands_for_a_gap(read, gap):
     rows = [f"1\t0\t1\t2\t3\t{gap}\t{gap}\t{gap}\t7\t8\t9", "2\t0.01\t1\t2\t3\t4\t5\t6\t7\t8\t9"]
     found = read(text(rows))
     np.testing.assert_array_equal(found.confidence, [[1, 0, 1], [1, 1, 1]])
     np.testing.assert_array_equal(found.points[0, 1], 0)
-    if gap.strip("-0123456789.e+E") == "" and float(gap):
+    if gap != "-" and gap.strip("-0123456789.e+E") == "" and float(gap):
         assert found.notes == (f"{float(gap):.7g} is taken as not seen (L.ASIS)",)
+    elif gap.strip("0.") == "":
+        assert found.notes == ("0, 0, 0 is taken as not seen (L.ASIS)",)
     else:
         assert found.notes == ()
+
+
+@pytest.mark.parametrize("place", [(-1, -1, -1), (-500, -500, 2)])
+def test_one_place_again_and_again_is_a_gap(read, place):
+    points = 1000 + 10 * np.random.default_rng(0).normal(size=(20, 3, 3))
+    points[[3, 4, 9], 0] = points[[6, 7, 8], 2] = place
+    found = read(text(points))
+    lost = (points == place).all(-1)
+    np.testing.assert_array_equal(found.confidence, ~lost)
+    said = ", ".join(map(str, place))
+    assert found.notes == (f"{said} is taken as not seen (C7, R.ASIS)",)
+
+
+def test_places_that_are_held_are_no_gap(read):
+    """All markers stand still, one of them at a round place; one is held for a while; one has two names."""
+    still = np.repeat(ROWS[:1], 20, axis=0)
+    still[:, 1] = 500
+    assert read(text(still)).confidence.all()
+    points = 1000 + 10 * np.random.default_rng(0).normal(size=(20, 3, 3))
+    points[5:12, 0] = points[5, 0]
+    points[:, 2] = points[:, 0]
+    assert read(text(points)).confidence.all()
 
 
 def test_what_stands_for_no_gap(read):
@@ -275,7 +313,8 @@ FULL = "1\t0\t1\t2\t3\t4\t5\t6\t7\t8\t9"
         (["1\t0\t1\t2\t3\t4\t5\t6"], "line 7: expected 14 columns for 4 markers, got 8"),
         (["1 0 1 2 3 4 5 6 7"], "line 7: expected 11 columns for 3 markers, got 9"),
         ([FULL, f"{FULL}\t1\t2\t3"], "line 7: expected 11 columns for 3 markers, got 11"),
-        (["1\t0\t1\t2\t3\t4\t5\t6\t7\t8\tx"], "line 7: expected numbers: .*'x'"),
+        (["1\t0\t1\t2\t3\t4\t5\t6\t7\t8\tx"], "line 7: expected numbers: 'x' is none"),
+        (["1\t0\t1\t2\t3\t4\t5\t6\t7\t8\t9,5"], "line 7: expected numbers: '9,5' is none; decimals need a point"),
     ],
 )  # fmt: skip
 def test_rows_that_cannot_be(read, rows, message):

@@ -125,6 +125,15 @@ def test_damaged_yaml_is_refused(tmp_path, damage):
         config.load(path)
 
 
+def test_yaml_in_other_encodings(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_bytes("a: é".encode("utf-16"))
+    assert read_yaml(path) == {"a": "é"}
+    path.write_bytes("a: é".encode("latin-1"))
+    with pytest.raises(ValueError, match=r"a\.yaml: is no YAML: it is no text in UTF-8; save it as UTF-8"):
+        read_yaml(path)
+
+
 def npy(array: np.ndarray) -> bytes:
     stream = io.BytesIO()
     np.save(stream, array)
@@ -150,6 +159,9 @@ def test_damaged_npy_is_refused_by_name(tmp_path):
             read_parts(path, FACES, None)
         with pytest.raises(ValueError, match=r"labels\.npy: "):
             joint_regressors.read(path)
+    path.write_bytes(good.replace(b"}", b" ", 1))
+    with pytest.raises(FileError, match=r"is no readable \.npy file \(its header is damaged"):
+        read_parts(path, FACES, None)
 
 
 def test_text_of_characters_that_are_none(tmp_path):

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 import ipman_rs as ip
 from ipman_rs.cli import main
-from ipman_rs.fitting import camera_file
+from ipman_rs.fitting import camera_file, detected, keypoints
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def fit(tmp_path):
             raise result.exception
         page = out / "report.json"
         report = json.loads(page.read_text()) if page.is_file() else {"bodies": [], "failures": []}
-        flags = {body["name"]: body["fit"]["flags"] for body in report["bodies"] if "fit" in body}
+        flags = {body["name"]: body["flags"] for body in report["bodies"] if "fit" in body}
         return SimpleNamespace(
             code=result.exit_code, out=result.stdout, err=result.stderr, folder=out, report=report, flags=flags
         )
@@ -57,7 +57,7 @@ def test_a_standing_body(fit, tmp_path, standing):
     (body,) = said.report["bodies"]
     # The points are the body's own, but priors pull at them.
     assert body["fit"]["reprojection"]["median_percent"] < 1.0
-    assert body["fit"]["flags"] == []
+    assert body["flags"] == body["fit"]["flags"] == []
     assert [stage["name"] for stage in body["fit"]["stages"]] == ["pose", "physics", "settle"]
     frame = body["frames"][0]
     assert frame["inside"]
@@ -162,6 +162,20 @@ def test_left_and_right_swapped(fit, tmp_path, standing):
     swapped[[11, 12]] = standing[[12, 11]]  # the shoulders alone
     said = fit(files.write(tmp_path / "swapped.json", swapped))
     assert any("swapped" in flag for flag in said.flags["swapped"])
+
+
+def test_x_and_y_swapped(standing):
+    """What stands in an image lies in it with its coordinates swapped."""
+    names = keypoints.mediapipe.NAMES
+    known = [column for column, name in enumerate(names) if name]
+    points, size = standing[known, :2] * [1920, 1080], np.array([1920, 1080])
+    seen = [str(names[column]) for column in known], standing[known, 3]
+    right, swapped = (
+        detected.oddities(seen[0], each, seen[1], size[::way]) for each, way in ((points, 1), (points[:, ::-1], -1))
+    )
+    said = "lies across the image, head beside feet: are x and y of the keypoints swapped?"
+    assert said not in right
+    assert said in swapped
 
 
 def test_half_of_the_points(fit, tmp_path, standing):

@@ -231,7 +231,6 @@ BAD = {
     "too few": body_25()[:60],
     "no numbers": ["x"] * 75,
     "infinite": [float("inf")] * 75,
-    "too large": [10**400] * 75,
     "null": None,
 }
 
@@ -310,6 +309,14 @@ def test_yolo(read):
     assert said(found) == ["points at 0, 0 taken as not seen"]
 
 
+def test_points_at_minus_one_were_not_seen(read):
+    points = COCO.copy()
+    points[7] = -1
+    found = read([instance(keypoints=points.tolist())])
+    assert seen(found, "left_elbow") == 0
+    assert said(found) == ["points at -1, -1 taken as not seen"]
+
+
 def test_points_without_numbers_were_not_seen(read):
     gap = [[None, None] if n == 7 else point for n, point in enumerate(COCO.tolist())]
     found = read([instance(keypoints=gap)])
@@ -359,7 +366,7 @@ def test_as_windows_writes_text(tmp_path, coding):
 
 def test_a_number_of_too_many_digits(tmp_path):
     (tmp_path / "some.json").write_text('{"keypoints": [' + "9" * 10_000 + "]}")
-    with pytest.raises(ValueError, match="some.json: expected JSON"):
+    with pytest.raises(ValueError, match="some.json: is no JSON: a number of 10000 digits"):
         keypoints.read(tmp_path / "some.json")
 
 

@@ -262,6 +262,14 @@ def test_units_are_refused_and_mended():
     assert finding.option == "--units cm"
 
 
+def test_markers_below_the_floor():
+    (finding,) = judged.of_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES))
+    assert finding.what == "the lowest markers are 0.95 m below the floor in the median"
+    assert finding.option == "--ground HEIGHT"
+    assert judged.of_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES), ground=-1.0) == []
+    assert judged.of_floor(tracks(), meanings(NAMES)) == []
+
+
 def test_what_the_markers_do_not_say():
     legs = [name for name in NAMES if name not in ("C7", "CLAV")]
     (finding,) = judged.coverage(legs, meanings(legs))

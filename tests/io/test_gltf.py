@@ -250,7 +250,6 @@ def test_what_is_joined_and_left_out_is_named(read):
         "1 primitive of points or lines left out",
         "outside of the scene and left out: spare",
         "the pose of the nodes is read; animations left out: walk",
-        "2 large separate pieces are measured as one body (several people, or clothes over one?)",
     )
 
 
@@ -332,6 +331,36 @@ def test_damaged_accessors(read, change, said):
     file.json["accessors"][0].update(change)
     with pytest.raises(ValueError, match=said):
         read(file)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        (("meshes", 0, "primitives"), None, "the primitives of its meshes: expected a list"),
+        (("meshes", 0, "primitives", 0, "attributes"), [], "the attributes of its primitives: expected an object"),
+        (("meshes", 0, "primitives", 0, "targets"), [[]], "its targets are no list of objects"),
+        (("nodes", 0, "children"), None, "the children of its nodes: expected a list"),
+        (("nodes", 0, "mesh"), [], "names .* of 1 meshes"),
+        (("scenes", 0, "nodes"), 0, "the nodes of its scenes: expected a list"),
+        (("accessors", 0, "componentType"), [], "an entry of it is of another kind than such a file has"),
+        (("buffers",), [{"uri": 1}], "the uri of its buffers: expected text"),
+    ],
+)  # fmt: skip
+def test_entries_of_another_kind(read, place, value, said):
+    file = gltf_files.of(POINTS, FACES)
+    inner = file.json
+    for step in place[:-1]:
+        inner = inner[step]
+    inner[place[-1]] = value
+    with pytest.raises(ValueError, match=said):
+        read(file)
+
+
+def test_names_of_targets_may_be_anything(read):
+    file = gltf_files.of(POINTS, FACES)
+    file.json["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": file.array(0 * POINTS)}]
+    file.json["meshes"][0] |= {"weights": [0.5], "extras": {"targetNames": {"a": 0}}}
+    assert "morph targets applied: target 0 0.5" in read(file).notes
 
 
 def test_an_array_of_zeros_is_no_larger_than_the_file(read):

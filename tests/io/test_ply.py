@@ -119,6 +119,7 @@ def test_every_cut_is_told(read, order):
         (b"4 0 1 3 2", b"4 0 1 3 1.5", "expected whole numbers"),
         (b"4 0 1 3 2", b"4 0 1 3 nan", "expected whole numbers"),
         (b"4 0 1 3 2", b"4 0 1 3 x", "row 0 of face: expected numbers, got '4 0 1 3 x'"),
+        (b"element face", b"element tristrips", "its triangles are in strips (tristrips), which are not read"),
         (b"vertex_indices", b"corners", "its faces have corners; expected vertex_indices"),
     ],
 )

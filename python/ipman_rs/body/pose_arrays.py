@@ -42,6 +42,7 @@ _VECTORS, _MATRICES, COLUMNS, _QUATERNIONS = "rotation vectors", "rotation matri
 _WIDTHS = {_VECTORS: 3, _MATRICES: 9, COLUMNS: 6, _QUATERNIONS: 4}
 _ORDERS = {"_wxyz": (1, 2, 3, 0), "_xyzw": (0, 1, 2, 3)}  # where x, y, z and w of a quaternion are
 _ORTHONORMAL = 1e-3  # how far rounded rotation matrices are off
+_NEARLY = 0.2  # so near to orthonormal are three frames of rotation vectors by no chance
 NAMES = tuple(
     f"{name}{more}" for name in (*WHOLE_POSES, *PIECES) for more in ("", *_ORDERS, *(f"_quat{end}" for end in _ORDERS))
 )
@@ -185,6 +186,12 @@ def _square(name: str, array: Array, choices: Sequence[tuple[str, ...]], frames:
     """An array (3, 3): one matrix, if it is a rotation and the other pieces have not three `frames`, else vectors."""
     single = [joints for joints in choices if len(joints) == 1]
     if not single or not _are_rotations(array[None]):
+        off = _off_orthonormal(array[None])
+        if single and 3 not in frames and off < _NEARLY:
+            raise ValueError(
+                f"{name} has shape (3, 3) and is nearly a rotation matrix, off by {off:.2g}: is it one? Save it "
+                "exactly, or as a rotation vector (1, 3)"
+            )
         return _piece(name, array, choices)
     if 3 in frames:
         raise ValueError(
@@ -253,5 +260,10 @@ def _from_columns(name: str, rows: Array) -> Array:
 
 def _are_rotations(matrices: Array) -> bool:
     matrices = matrices.astype(np.float64)
-    off = np.abs(np.matmul(matrices, matrices.swapaxes(-1, -2)) - np.eye(3)).max(initial=0)
-    return bool(off < _ORTHONORMAL and np.all(np.linalg.det(matrices) > 0))
+    return bool(_off_orthonormal(matrices) < _ORTHONORMAL and np.all(np.linalg.det(matrices) > 0))
+
+
+def _off_orthonormal(matrices: Array) -> float:
+    """By how much M Mᵀ of matrices (n, 3, 3) is off the identity at most."""
+    matrices = matrices.astype(np.float64)
+    return float(np.abs(np.matmul(matrices, matrices.swapaxes(-1, -2)) - np.eye(3)).max(initial=0))

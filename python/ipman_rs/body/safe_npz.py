@@ -7,6 +7,7 @@ import os
 import struct
 import sys
 import zipfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import IO, Any, Literal
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from ipman_rs.files import read_bytes, regular
 
 MAX_BYTES = 1 << 30  # of one array, unpacked
+LISTED = 40  # names of arrays in a message
 
 
 def names(path: Path) -> set[str]:
@@ -30,6 +32,13 @@ def names(path: Path) -> set[str]:
         return found
     except Exception as error:  # damaged bytes can fail in any way
         raise ValueError(f"{path}: not a .npz file ({error}); is the download complete?") from error
+
+
+def listed(names: Iterable[str]) -> str:
+    """The names of a file's arrays for a message, those of vertices first."""
+    ordered = sorted(names, key=lambda name: ("vert" not in name.lower(), name))
+    more = f", … ({len(ordered)} arrays)" if len(ordered) > LISTED else ""
+    return ", ".join(name[:40] for name in ordered[:LISTED]) + more or "nothing"
 
 
 def read(path: Path, name: str) -> NDArray[Any]:
@@ -121,11 +130,28 @@ def _data_offset(stream: IO[bytes], start: int) -> int:
 
 def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], Literal["C", "F"], np.dtype[Any]]:
     """Shape, order and type of a `.npy` array of numbers or text, from its first bytes."""
-    reader = npy.read_array_header_1_0 if npy.read_magic(stream)[0] == 1 else npy.read_array_header_2_0
-    shape, fortran, dtype = reader(stream)
+    shape, fortran, dtype = header(stream)
     if dtype.hasobject:
         raise ValueError("holds Python objects, which are not loaded; save it again as plain numbers")
     return shape, "F" if fortran else "C", dtype
+
+
+def header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, whether it lies column by column, and type of a `.npy` array, from its first bytes.
+
+    Raises:
+        ValueError: the header is damaged, or claims a shape that no array can have.
+    """
+    reader = npy.read_array_header_1_0 if npy.read_magic(stream)[0] == 1 else npy.read_array_header_2_0
+    try:
+        shape, fortran, dtype = reader(stream)
+    except ValueError as error:
+        raise ValueError(str(error)[:160]) from None
+    except Exception as error:  # numpy reads it as Python text, which fails in any way
+        raise ValueError("its header is damaged; is the download complete?") from error
+    if not all(0 <= size < 1 << 63 for size in shape):
+        raise ValueError("its header claims a shape that no array can have")
+    return shape, fortran, dtype
 
 
 def _fits(shape: tuple[int, ...], dtype: np.dtype[Any], size: int) -> None:

@@ -126,13 +126,13 @@ class Stranger(Record):
 def _array(data: Any, dtype: np.dtype, shape: Any, order: str) -> NDArray[Any]:
     """The array if its claimed shape is what the data fill exactly."""
     if not isinstance(shape, tuple) or not all(isinstance(size, int) and size >= 0 for size in shape):
-        raise ValueError(f"array with the impossible shape {shape!r}")
+        raise ValueError(f"array with the impossible shape {shape!r:.80}")
     if dtype.hasobject:
         raise ValueError("array of Python objects where numbers are expected")
     if isinstance(data, str):
         data = data.encode("latin1")  # how Python 2 wrote bytes
     if math.prod(shape) * dtype.itemsize != len(data):
-        raise ValueError(f"array claims shape {shape} of {dtype}, but {len(data)} bytes came with it")
+        raise ValueError(f"array claims shape {str(shape):.80} of {dtype}, but {len(data)} bytes came with it")
     return np.frombuffer(data, dtype).reshape(shape, order=order)  # type: ignore[call-overload]
 
 

@@ -156,7 +156,7 @@ def _fit_row(study: Study, record: Mapping[str, Any]) -> list[Text]:
         _number(errors["median_percent"], 1, 1),
         _number(value["com_cop_distance"], 1e3, 0),
         _number(value["margin"] if value["has_contact"] else np.inf, 1e3, 0),
-        "; ".join(one_line(text) for text in (*record["flags"], *record["notes"])),
+        "; ".join(one_line(text) for text in (*study.flags, *record["notes"])),
     ]
     return [Text(one_line(study.name)), Text(said, style="green" if record["converged"] else "red"), *map(Text, cells)]
 

@@ -105,6 +105,7 @@ def study_of(
         record={key: value for key, value in record.items() if key not in ("name", "source")},
     )
     study = view.study(item.name, vertices, body.template, ground, source=item.source, notes=notes(record))
+    study = replace(study, flags=tuple(record["flags"]))
     return replace(study, fitted=fitted)
 
 
@@ -119,7 +120,7 @@ def notes(record: dict[str, Any]) -> list[str]:
     for stage in record["stages"]:
         terms = ", ".join(f"{name} {cost:.4g}" for name, cost in stage["terms"].items() if cost is not None)
         lines.append(f"stage {stage['name']}, {stage['iterations']} iterations: {terms}")
-    return [*lines, *(f"look: {flag}" for flag in record["flags"]), *record["notes"]]
+    return [*lines, *record["notes"]]
 
 
 def _presented(shown: dict[str, Any]) -> str:

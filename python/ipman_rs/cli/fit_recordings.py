@@ -129,7 +129,8 @@ def _fit_markers(recording: Recording, settings: Settings, pace: Pace, person: P
     body = ipt.BodyModel(settings.model)
     names = None if settings.markers is None else own.read(settings.markers, body.body)
     tracks = markers.read(path, settings.up, settings.subject, settings.units, settings.rate)
-    flags = judge.admit(path, recorded.judged_tracks(tracks, names, settings.up is not None), settings.force)
+    judged = recorded.judged_tracks(tracks, names, settings.up is not None, settings.ground or 0.0)
+    flags = judge.admit(path, judged, settings.force)
     count = len(range(0, len(tracks), pace.every))
     with console.progress(f"fitting {recording.name}", count) as step:
         told = {"every": pace.every, "ground": settings.ground or 0.0, "person": person, "own": names}

@@ -103,7 +103,7 @@ def _no_bodies(stored: _Npz) -> str:
         except ValueError as error:
             if "Python objects" in str(error):
                 return f"{name} holds Python objects, which are not loaded; save what is in it as plain arrays"
-    return f"holds {', '.join(sorted(stored.names))[:120] or 'nothing'}; {_EXPECTED}"
+    return f"holds {safe_npz.listed(stored.names)}; {_EXPECTED}"
 
 
 def _are_of_another_body(stored: _Npz, model: str) -> bool:
@@ -135,7 +135,11 @@ def _read_vertices(stored: _Npz, model: str, unit: float, rate: float | None) ->
         raise FileError(stored.path, f"faces are {faces.dtype} {faces.shape}; expected whole numbers (F, 3)")
     faces = faces.astype(np.int64)
     if faces.min() < 0 or faces.max() >= vertices.shape[1]:
-        raise FileError(stored.path, f"faces name vertex {faces.max()}, but there are {vertices.shape[1]} vertices")
+        count, bad = vertices.shape[1], int(faces.min() if faces.min() < 0 else faces.max())
+        one = "; do they count from 1?" if faces.min() > 0 and bad == count else ""
+        raise FileError(
+            stored.path, f"faces name vertex {bad}, but there are {count} vertices, counted from 0 to {count - 1}{one}"
+        )
     mesh = repair.Mesh(vertices[0], faces)
     if match_body(faces, vertices.shape[1], model) is None:
         mesh = repair.without_unused(repair.welded(mesh) if len(vertices) == 1 else mesh)
@@ -300,7 +304,14 @@ def _seconds(stored: _Npz, frames: int, rate: float | None) -> tuple[np.ndarray 
     given = stored.first(*_FRAME_RATES)
     if frames < 2 or (given is None and rate is None):
         return None, []
-    hertz = rate if rate is not None else float(given.reshape(())) if given is not None and given.size == 1 else np.nan
+    hertz = rate
+    if hertz is None and given is not None:
+        same = np.unique(given)  # some files have it for each frame
+        if len(same) != 1:
+            said = f"{stored.name(*_FRAME_RATES)} holds {len(same)} different numbers, expected one"
+            return None, [Finding("wrong", said, option="--rate HZ")]
+        hertz = float(same[0])
+    assert hertz is not None
     findings = judge.rate(hertz)
     usable = np.isfinite(hertz) and hertz > 0
     return np.arange(frames) / hertz if usable else None, findings

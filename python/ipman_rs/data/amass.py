@@ -130,7 +130,7 @@ def _header(file: Path) -> tuple[int, int, float]:
     name = next((name for name in RATES if name in there), None)
     if name is None:
         raise ValueError(f"{file}: expected {' or '.join(RATES)}, found neither")
-    rate = safe_npz.read(file, name)
+    rate = np.unique(safe_npz.read(file, name))  # some files have it for each frame
     if rate.size != 1 or rate.dtype.kind not in "fiu" or not 0 < float(rate.reshape(())) < 1e4:
         raise ValueError(f"{file}: {name}: expected Hz, got {rate!r:.60}")
     return poses[1], poses[0], float(rate.reshape(()))

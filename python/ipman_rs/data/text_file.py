@@ -14,7 +14,10 @@ from ipman_rs.files import read_bytes
 
 MAX_BYTES = 1 << 31  # an hour of sixty markers at 250 Hz has a third of that
 UNEVEN = 0.02  # of a recording's length: that far equal times may be from evenly spaced ones
-NOT_A_NUMBER = re.compile(r"[-+]?(?:s|q)?nan(?:\(\w*\))?|[-+]?1\.#(?:ind|qnan|snan|nan)\d*|n/?a", re.IGNORECASE)
+NOT_A_NUMBER = re.compile(
+    r"[-+]?(?:s|q)?nan(?:\(\w*\))?|[-+]?1\.#(?:ind|qnan|snan|nan)\d*|n/?a|-+|null|none|missing", re.IGNORECASE
+)
+COMMA = re.compile(r"[-+]?\d*,\d+(?:e[-+]?\d+)?", re.IGNORECASE)
 INFINITY = re.compile(r"([-+]?)(?:1\.#inf\d*|inf(?:inity)?)", re.IGNORECASE)
 
 
@@ -26,7 +29,8 @@ def lines(path: str | os.PathLike[str]) -> list[str]:
 
 
 def number(text: str) -> float:
-    """A number, NaN for each of its spellings: "nan", "-nan(ind)", "1.#QNAN". ValueError for anything else."""
+    """A number, NaN for each of its spellings, and for words and dashes that stand for none: "nan", "-nan(ind)",
+    "1.#QNAN", "null", "-". ValueError for anything else."""
     try:
         return float(text)
     except ValueError:
@@ -36,7 +40,8 @@ def number(text: str) -> float:
         infinite = INFINITY.fullmatch(text)
         if infinite:
             return float(f"{infinite[1]}inf")
-        raise
+        advice = "; decimals need a point, not a comma" if COMMA.fullmatch(text) else ""
+        raise ValueError(f"'{text:.40}' is none{advice}") from None
 
 
 def table(rows: Sequence[Sequence[str]], places: Sequence[str]) -> NDArray[np.float64]:

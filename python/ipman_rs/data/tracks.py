@@ -28,6 +28,10 @@ FARTHEST = 1e7  # in any unit: programs write a number beyond it for what was no
 NINES = np.array([10.0**whole - 10.0**-part for whole in range(3, 8) for part in range(8 - whole)])
 MORE_NINES = np.array([float("9" * whole + "." + "9" * part) for whole in range(3, 8) for part in range(8 - whole, 9)])
 WORDS = 32767.0, 32768.0, 2147483648.0  # the last integers, which mean the same
+OFTEN = 3  # samples in which a place stands for what was not seen
+MOST = 200_000  # repeated places that are compared
+CANDIDATES = 3  # of them that occur the most
+FEWEST_OF_A_PERSON = 6  # markers of one name before the colon: a ball, a bat or a wand has fewer
 NAMELESS = re.compile(r"\*\d*|(?:unlabell?ed|unnamed|uname)[ _*-]*\d*", re.IGNORECASE)
 
 
@@ -144,7 +148,8 @@ def turned(tracks: Tracks, normal: Sequence[float]) -> Tracks:
 
 def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], list[str]]:
     """Where markers (T, M, 3) were seen (T, M); and in words which numbers stand for one that was not."""
-    there = ~np.isnan(points).any(-1) & (points != 0).any(-1)
+    origin = (points == 0).all(-1)
+    there = ~np.isnan(points).any(-1) & ~origin
     with np.errstate(invalid="ignore"):
         size = np.abs(points)
         nines = (size >= 999) & (size < FARTHEST)
@@ -154,12 +159,52 @@ def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], lis
         alike = (size == size[..., :1]).all(-1)
     stands = far | (nines & (size >= 9999)).any(-1) | (alike & (nines.all(-1) | np.isin(size[..., 0], WORDS)))
     stands &= there
-    if not stands.any():
-        return there, []
-    which = [names[int(column)] or "one without a name" for column in np.flatnonzero(stands.any(axis=0)).tolist()]
-    first = points[stands][0]
-    value = first[int(np.abs(first).argmax())]
-    return there & ~stands, [f"{value:.7g} is taken as not seen ({_some(which)})"]
+    said = []
+    if origin.any():
+        said.append(_not_seen("0, 0, 0", origin, names))
+    if stands.any():
+        first = points[stands][0]
+        said.append(_not_seen(f"{first[int(np.abs(first).argmax())]:.7g}", stands, names))
+    again, place = _repeated(points, there & ~stands)
+    if place is not None:
+        said.append(_not_seen(", ".join(f"{number:.7g}" for number in place), again, names))
+    return there & ~stands & ~again, said
+
+
+def _not_seen(value: str, where: NDArray[np.bool_], names: Sequence[str]) -> str:
+    which = [names[int(column)] or "one without a name" for column in np.flatnonzero(where.any(axis=0)).tolist()]
+    return f"{value} is taken as not seen ({_some(which)})"
+
+
+def _repeated(points: Array, seen: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Array | None]:
+    """Where one exact place stands for what was not seen, such as -1, -1, -1; and that place, None if none does.
+
+    It is where two markers that move apart were said to be, again and again; or thrice the same whole number, off the
+    path of a marker.
+    """
+    nowhere = np.zeros_like(seen)
+    alike = seen & (points == points[..., :1]).all(-1)
+    again = seen.copy()
+    again[1:] &= (points[1:] == points[:-1]).all(-1)
+    again[:1] = False
+    places, counts = np.unique(points[alike | again][:MOST], axis=0, return_counts=True)
+    for place in places[np.argsort(-counts, kind="stable")[:CANDIDATES]]:
+        here = seen & (points == place).all(-1)
+        moving = np.flatnonzero(here.any(axis=0) & (seen & ~here).any(axis=0))
+        if here.sum() >= OFTEN and _is_nowhere(points, here, seen, moving.tolist(), place):
+            return here, place
+    return nowhere, None
+
+
+def _is_nowhere(
+    points: Array, here: NDArray[np.bool_], seen: NDArray[np.bool_], moving: Sequence[int], place: Array
+) -> bool:
+    if any(not np.array_equal(points[:, moving[0]], points[:, column], equal_nan=True) for column in moving[1:]):
+        return True
+    if not moving or len(set(place.tolist())) > 1 or place[0] != np.round(place[0]):
+        return False
+    others = points[(seen & ~here)[:, moving[0]], moving[0]]
+    return bool(((place < others.min(axis=0)) | (place > others.max(axis=0))).any())
 
 
 @dataclass(frozen=True)
@@ -175,7 +220,8 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     """The markers by name, without the subject that stands before a colon ("S01:LASI").
 
     Left out, and named: points without a name, the shorter of two markers of one name, other people than `subject`.
-    `subject` "" is who has none.
+    Two subjects are two people where both have a marker of one name, or both have FEWEST markers. `subject` "" is who
+    has none.
     ValueError for two people of whom none is chosen, and for an unknown one.
     """
     notes = []
@@ -185,6 +231,9 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     split = {column: names[column].rpartition(":") for column in known}
     people = dict.fromkeys(split[column][0].strip() for column in known)
     chosen = _person([*people], split, seen, source, subject)
+    joined = [*dict.fromkeys(w for c, (who, _, _) in split.items() if (w := who.strip()) and seen[:, c].any())]
+    if chosen is None and len(joined) > 1:
+        notes.append(f"the markers of {_some(joined)} are taken as one person's (subject, --subject: those of one)")
     if chosen is not None:
         own = {split[column][2].strip() for column in known if split[column][0].strip() == chosen}
         nobodys = {split[column][2].strip() for column in known if not split[column][0].strip()}
@@ -235,6 +284,9 @@ def _person(
         shown[person] |= bool(there[column])
     shared = [[person for person in each if shown[person]] for each in of_marker.values() if len(each) > 1]
     rivals = {person for each in shared if len(each) > 1 for person in each}
+    if not rivals:
+        large = {p for p in people if p and shown[p] and len(markers[p]) >= FEWEST_OF_A_PERSON}
+        rivals = large if len(large) > 1 else rivals
     if not rivals:
         hidden = {person for each in of_marker.values() if not all(map(shown.get, each)) for person in each}
         return next((person for person in people if person and shown[person] and person in hidden), None)

@@ -53,6 +53,6 @@ def parse_json(data: bytes, pairs: Pairs | None = None) -> Any:
 
 def _whole(digits: str) -> int:
     """A whole number, if a float can hold it."""
-    if not abs(number := int(digits)) <= sys.float_info.max:
+    if len(digits) > 310 or not abs(number := int(digits)) <= sys.float_info.max:
         raise ValueError(f"a number of {len(digits)} digits, more than any float has")
     return number

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import sys
 from typing import Any
@@ -21,10 +22,19 @@ def read_yaml(path: str | os.PathLike[str]) -> Any:
             too deep; the message begins with the path.
     """
     try:
-        return parse_yaml(read_bytes(path, MAX_BYTES).decode("utf-8-sig"))
+        return parse_yaml(_text(read_bytes(path, MAX_BYTES)))
     except ValueError as error:
         text = str(error)
         raise ValueError(text if text.startswith(f"{path}: ") else f"{path}: is no YAML: {text}") from None
+
+
+def _text(data: bytes) -> str:
+    """In UTF-8, or in UTF-16 with its byte order mark, as YAML may be."""
+    wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    try:
+        return data.decode("utf-16" if wide else "utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError("it is no text in UTF-8; save it as UTF-8") from None
 
 
 def parse_yaml(text: str) -> Any:

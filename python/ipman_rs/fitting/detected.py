@@ -25,6 +25,7 @@ CENTER = 0.2  # of the image's size: how far a camera's center is from its middl
 MIRRORED = (
     "the face is seen, yet left and right are as from behind: are the points mirrored, or is the person turned away?"
 )
+ACROSS = 1.5  # of its height in the image: how broad a person is at least who lies across it
 FEET = (
     "left_ankle",
     "right_ankle",
@@ -140,6 +141,8 @@ def oddities(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, s
         down = (hips[0] + hips[1] - shoulders[0] - shoulders[1]) / 2
         if down[1] < -abs(down[0]):
             flags.append("upside-down: the shoulders are below the hips; y of a keypoint points down")
+        if _across(down) and _across(_feet(where, hips) - (shoulders[0] + shoulders[1]) / 2):
+            flags.append("lies across the image, head beside feet: are x and y of the keypoints swapped?")
         turns = [np.sign(left[0] - right[0]) for left, right in (hips, shoulders)]
         crossed = min(abs(left[0] - right[0]) for left, right in (hips, shoulders)) > 0.1 * np.linalg.norm(down)
         if crossed and turns[0] != turns[1]:
@@ -154,6 +157,17 @@ def oddities(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, s
     if outside:
         flags.append(f"{outside} points lie outside the image")
     return flags
+
+
+def _across(way: np.ndarray) -> bool:
+    """Whether a way (2,) in the image is nearer to its rows than to its columns."""
+    return bool(abs(way[0]) > ACROSS * abs(way[1]))
+
+
+def _feet(where: dict[str, np.ndarray], hips: list[np.ndarray]) -> np.ndarray:
+    """Where a person ends: in the middle of the ankles, or else of the knees or hips, that were seen."""
+    pair = _pair(where, "ankle") or _pair(where, "knee") or hips
+    return (pair[0] + pair[1]) / 2
 
 
 def _mirrored(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, turn: float) -> bool:

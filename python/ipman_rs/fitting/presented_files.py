@@ -61,7 +61,7 @@ def read(path: Path, body: BodyModel, frame: int | None = None, up: Axis | None 
     stored = _Stored.open(path)
     pieces = _hands_turned(stored, body)
     if not pieces:
-        listed = ", ".join(sorted(stored.names))[:120] or "nothing"
+        listed = safe_npz.listed(stored.names)
         raise ValueError(
             f"{stored.path}: holds {listed}; expected a pose such as global_orient with body_pose, or pose"
         )
@@ -102,8 +102,7 @@ def read_contact(path: Path, body: BodyModel) -> NDArray[np.int64]:
         stored = _Stored.open(path)
         found = stored.first("contact")
         if found is None:
-            listed = ", ".join(sorted(stored.names))[:120]
-            raise ValueError(f"{path}: expected an array contact, it has {listed or 'nothing'}")
+            raise ValueError(f"{path}: expected an array contact, it has {safe_npz.listed(stored.names)}")
         return _indices(found, f"{path}: contact", body)
     content = read_json(path)
     try:

@@ -134,16 +134,23 @@ def fit_tracks(
 
 
 def judged_tracks(
-    tracks: markers.Tracks, own: Mapping[str, Meaning | None] | None = None, up_is_said: bool = False
+    tracks: markers.Tracks,
+    own: Mapping[str, Meaning | None] | None = None,
+    up_is_said: bool = False,
+    ground: float | None = None,
 ) -> list[Finding]:
-    """What the judge of all doors says of a recording before its fit: names, coverage, size, place, stance, rate."""
+    """What the judge of all doors says of a recording before its fit: names, coverage, size, place, stance, rate; and
+    where the floor is said to be at y = `ground` m, whether the markers are above it."""
     seen, _ = seen_names(tracks)
     meant = markers.meanings(seen, own)
     unknown = [name for name in seen if name not in meant]
     found = judge.known_markers([*meant], unknown, FEWEST) + judged.of_rate(tracks)
     if not meant:
         return found
-    return found + judged.coverage([*meant], meant) + judged.of_points(tracks, meant, up_is_said)
+    placed = judged.of_points(tracks, meant, up_is_said)
+    if ground is not None and not any(each.level == "wrong" for each in placed):
+        placed += judged.of_floor(tracks, meant, ground)
+    return found + judged.coverage([*meant], meant) + placed
 
 
 def judged_fit(recorded: Recorded) -> list[Finding]:
@@ -154,7 +161,7 @@ def judged_fit(recorded: Recorded) -> list[Finding]:
     errors = recorded.errors
     known = errors[np.isfinite(errors)]
     found = judge.marker_error(float(known.mean())) if len(known) else []
-    return found + judge.mass(float(np.median(mass)))
+    return found + judge.masses(np.atleast_1d(mass), vertices.numpy())
 
 
 def seen_names(tracks: markers.Tracks) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -22,6 +22,7 @@ TYPES = {
 }  # fmt: skip
 ORDERS = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
 CORNERS = ("vertex_indices", "vertex_index")
+STRIPS = ("tristrips", "tristrip")
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,9 @@ def parse(content: bytes) -> Mesh:
             break  # what follows is not needed
     if not {"x", "y", "z"} <= stored.get("vertex", {}).keys():
         raise ValueError("it has no vertices with x, y and z")
+    strips = next((one.name for one in elements if one.name in STRIPS and one.count), None)
+    if strips and not any(one.name == "face" and one.count for one in elements):
+        raise ValueError(f"its triangles are in strips ({strips}), which are not read; export faces")
     vertices = np.stack([_numbers(stored["vertex"], axis) for axis in "xyz"], axis=1)
     left_out = [one.name for one in elements if one.name not in ("vertex", "face", "material") and one.count]
     notes = (f"not used: {text.listed(left_out)}",) if left_out else ()

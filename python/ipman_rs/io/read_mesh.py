@@ -53,9 +53,11 @@ def _parsed(path: Path) -> Mesh:
     except ValueError as error:
         raise _unreadable(path, str(error)) from error
     except KeyError as error:
-        raise _unreadable(path, f"it lacks {error}") from error
+        raise _unreadable(path, f"it lacks {str(error)[:80]}") from error
+    except OverflowError as error:
+        raise _unreadable(path, "it holds a number larger than any that is counted with") from error
     except Exception as error:  # damaged bytes fail in any way
-        raise _unreadable(path, f"{type(error).__name__}: {str(error)[:160]}") from error
+        raise _unreadable(path, "an entry of it is of another kind than such a file has") from error
 
 
 def _unreadable(path: Path, reason: str) -> ValueError:

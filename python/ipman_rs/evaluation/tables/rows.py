@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ipman_rs.body import safe_npz
@@ -102,8 +101,7 @@ def _header(path: Path, start: int, size: int) -> RowsOnDisk:
     """What the header of an array says that starts at a byte and has `size` bytes with it."""
     with path.open("rb") as file:
         file.seek(start)
-        reader = npy.read_array_header_1_0 if npy.read_magic(file)[0] == 1 else npy.read_array_header_2_0
-        shape, fortran, dtype = reader(file)
+        shape, fortran, dtype = safe_npz.header(file)
         offset = file.tell()
     if dtype.hasobject:
         raise ValueError(

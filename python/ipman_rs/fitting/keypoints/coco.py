@@ -18,7 +18,21 @@ import numpy as np
 from . import layouts
 from .layouts import COCO_17 as NAMES
 from .layouts import Layout
-from .people import Array, Image, Person, array, counts, each, finite, numbers, plain, scored, size_of, track_of
+from .people import (
+    Array,
+    Image,
+    Person,
+    array,
+    counts,
+    each,
+    finite,
+    not_found,
+    numbers,
+    plain,
+    scored,
+    size_of,
+    track_of,
+)
 
 LAYOUTS: dict[int, tuple[str, Layout]] = {
     17: ("COCO", NAMES),
@@ -104,10 +118,8 @@ def person(entry: Any, place: str) -> Person:
     else:
         points, notes = _points(entry, f"{place}: keypoints")
     names = LAYOUTS[len(points)][1]
-    corner = (points[:, :2] == 0).all(axis=1) & (points[:, 2] > 0)
-    if corner.any():  # where trackers put what they did not find
-        points[corner, 2] = 0.0
-        notes = (*notes, "points at 0, 0 taken as not seen")
+    points, nowhere = not_found(points)
+    notes = (*notes, *nowhere)
     unused = [key for key in ELSE if entry.get(key) and not (key in PARTS and "foot_kpts" in entry)]
     unused += [FACE] if len(points) in (133, 136) else []
     track = next((track_of(entry[key]) for key in TRACKS if key in entry), None)

@@ -13,11 +13,26 @@ from typing import Any
 
 import numpy as np
 
+from ...data.judge import RELATIVE
 from . import layouts
 from .hand import hand
 from .layouts import BODY_25 as BODY_25
 from .layouts import Layout
-from .people import Array, Image, Person, array, counts, each, finite, numbers, scored, size_of, track_of
+from .people import (
+    NOWHERE,
+    Array,
+    Image,
+    Person,
+    array,
+    counts,
+    each,
+    finite,
+    not_found,
+    numbers,
+    scored,
+    size_of,
+    track_of,
+)
 
 NAMES = (*BODY_25, *hand("left"), *hand("right"))
 LAYOUTS: dict[int, tuple[str, Layout]] = {
@@ -83,8 +98,11 @@ def _person(person: Any, place: str) -> Person:
         parts.append(np.zeros((21, 3)) if given is None else numbers(given, 21, 3, f"{place}: {field}"))
     read = (*BODY, *(name for fields in HANDS for name in fields))
     unused = tuple(name for name in person if "keypoints" in name and name not in read and person[name])
-    points = scored(np.concatenate(parts), place)
-    return Person((*names, *NAMES[25:]), points, track=track_of(person.get("person_id")), unused=unused)
+    whole = np.concatenate(parts)
+    of_pixels = bool((abs(whole[:, :2]) > RELATIVE).any())  # 0, 0 is the middle of an image from -1 to 1
+    points, notes = not_found(whole, NOWHERE if of_pixels else NOWHERE[1:])
+    points = scored(points, place)
+    return Person((*names, *NAMES[25:]), points, track=track_of(person.get("person_id")), notes=notes, unused=unused)
 
 
 def _body(given: Any, place: str) -> tuple[Layout, Array]:

@@ -14,6 +14,7 @@ from .layouts import Layout
 Array = NDArray[np.float64]
 
 SURELY_NO_SCORE = (-0.5, 20.0)  # detectors of the SimCC kind (RTMPose, RTMW) and AlphaPose give scores up to about 10
+NOWHERE = (0.0, -1.0)  # x and y of what was not found
 CLIPPED = 2.0  # scores of heatmaps exceed 1 a little; a file with larger ones has another scale
 SIZES = (
     ("width", "height"),
@@ -101,6 +102,18 @@ def finite(points: Array, place: str) -> Array:
         raise ValueError(f"{place}: expected pixels, got numbers up to {largest:g}")
     points[missing] = np.nan
     return points
+
+
+def not_found(points: Array, places: Sequence[float] = NOWHERE) -> tuple[Array, tuple[str, ...]]:
+    """Points (K, 3), those with the score 0 that lie exactly where programs put what they did not find; and a note of
+    each such place."""
+    points, notes = points.copy(), []
+    for place in places:
+        there = (points[:, :2] == place).all(axis=1) & (points[:, 2] > 0)
+        if there.any():
+            points[there, 2] = 0.0
+            notes.append(f"points at {place:g}, {place:g} taken as not seen")
+    return points, tuple(notes)
 
 
 def scored(points: Array, place: str) -> Array:

@@ -28,6 +28,7 @@ ARMS = ("upper_arm", "biceps", "elbow", "elbow_lateral", "elbow_medial", "forear
         "wrist_back", "hand", "hand_back", "hand_back_5", "index", "pinky", "thumb")  # fmt: skip
 FEET = re.compile(r"heel|toe|malleolus|metatarsal|midfoot|ankle|foot")
 
+BELOW = 0.15  # m: farther below the floor is no marker of a foot
 SKIN = (-0.015, 0.04)  # m from the skin to a marker's middle; 7 to 15 mm are usual
 
 
@@ -66,7 +67,7 @@ def of_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool 
     if any(each.level == "wrong" for each in found):
         return found
     with np.errstate(invalid="ignore"):
-        found += check.place("markers", points[np.isfinite(points).all(axis=-1)])
+        found += judge.far("markers", points[np.isfinite(points).all(axis=-1)])
     rotation = TO_Y_UP[tracks.up]
     up = ways(points @ rotation, known, meanings)
     return found + ([] if up_is_said else check.upright("markers", up, Ground(rotation[1])))
@@ -77,15 +78,27 @@ def of_size(points: Array, unit: float) -> list[Finding]:
     found = check.size_of_body("markers", points)
     if not any(each.level == "wrong" for each in found):
         return found
-    fits = [
-        name
-        for name, metres in (("m", 1.0), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254))
-        if check.size_of_body("markers", points / unit * metres)[0].level == "ok"
-    ]
+    fits = [each for each in check.units_of(check.extent_of(points) / unit) if each[2] != unit]
     if not fits:
-        return found
+        return [Finding("wrong", found[0].what, option="--units UNIT")]
     said = found[0].what.rpartition(": ")[2]
-    return [Finding("wrong", f"markers: {said}, if the file's unit is right", option=f"--units {fits[0]}")]
+    option = " or ".join(f"--units {option}" for _, option, _ in fits)
+    return [Finding("wrong", f"markers: {said}, if the file's unit is right", option=option)]
+
+
+def of_floor(tracks: Tracks, meanings: Mapping[str, Meaning], ground: float = 0.0) -> list[Finding]:
+    """Whether the lowest marker of each frame is not below a floor at y = `ground` m."""
+    known = tracks.select([name for name in tracks.names if name in meanings])
+    rows = rows_to_judge(known)
+    if not len(rows):
+        return []
+    heights = np.where(known.confidence[rows] > 0, known.points[rows, :, 1], np.inf).min(axis=1) - ground
+    heights = heights[np.isfinite(heights)]
+    middle = float(np.median(heights)) if len(heights) else 0.0
+    if middle >= -BELOW:
+        return []
+    said = f"the lowest markers are {-middle:.2f} m below the floor in the median"
+    return [Finding("odd", said, option="--ground HEIGHT")]
 
 
 def of_rate(tracks: Tracks) -> list[Finding]:

@@ -22,6 +22,18 @@ DRACO = "KHR_draco_mesh_compression"
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 # Required extensions that are read or refused where a mesh uses them, and those that leave the surface as it is.
 SURFACE = ("KHR_mesh_quantization", DRACO, *MESHOPT)
+# What entries of these names are in the lists of a file.
+OBJECT, LIST, TEXT = (dict, "an object"), (list, "a list"), (str, "text")
+ENTRIES = {
+    "nodes": {"children": LIST, "weights": LIST, "extensions": OBJECT},
+    "meshes": {"primitives": LIST, "weights": LIST},
+    "primitives": {"attributes": OBJECT, "targets": LIST, "extensions": OBJECT},
+    "skins": {"joints": LIST},
+    "scenes": {"nodes": LIST},
+    "accessors": {"type": TEXT, "sparse": OBJECT},
+    "bufferViews": {"extensions": OBJECT},
+    "buffers": {"uri": TEXT, "extensions": OBJECT},
+}
 LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_xmp")
 
 
@@ -44,10 +56,7 @@ class Document:
 
     def all(self, kind: str) -> list[dict[str, Any]]:
         if kind not in self._lists:
-            listed = self.json.get(kind, [])
-            if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
-                raise ValueError(f"its {kind} are no list of objects")
-            self._lists[kind] = listed
+            self._lists[kind] = checked(kind, self.json.get(kind, []))
         return self._lists[kind]
 
     def one(self, kind: str, index: Any) -> dict[str, Any]:
@@ -143,6 +152,16 @@ class Document:
     def _counted(self, content: bytes) -> bytes:
         self.size += len(content)
         return content
+
+
+def checked(kind: str, listed: Any) -> list[dict[str, Any]]:
+    """A list of objects whose entries are what glTF has there. ValueError where they are not."""
+    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
+        raise ValueError(f"its {kind} are no list of objects")
+    for name, (expected, said) in ENTRIES.get(kind, {}).items():
+        if any(name in one and not isinstance(one[name], expected) for one in listed):
+            raise ValueError(f"the {name} of its {kind}: expected {said}")
+    return listed
 
 
 def _chunks(content: bytes) -> tuple[dict[str, Any], bytes | None]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import text
 from ..repair import Mesh
 from . import nodes
-from .document import DRACO, Document
+from .document import DRACO, Document, checked
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -57,7 +57,7 @@ class _Scene:
         self.names.append(name)
         weights = node.get("weights", mesh.get("weights", []))
         starts: dict[str, int] = {}  # primitives may share their vertices
-        for primitive in mesh["primitives"]:
+        for primitive in checked("primitives", mesh["primitives"]):
             mode = primitive.get("mode", TRIANGLES)
             if mode not in (TRIANGLES, STRIP, FAN):
                 self.lines += 1
@@ -98,10 +98,12 @@ class _Scene:
 
     def _morphed(self, points: Array, primitive: dict[str, Any], weights: list[float], mesh: dict[str, Any]) -> Array:
         """With the morph targets added by their weights."""
-        targets = primitive.get("targets", [])
+        targets = checked("targets", primitive.get("targets", []))
         if targets and len(weights) not in (0, len(targets)):
             raise ValueError(f"it has {len(weights)} weights for {len(targets)} morph targets")
-        names = mesh.get("extras", {}).get("targetNames", []) if isinstance(mesh.get("extras"), dict) else []
+        extras = mesh.get("extras")
+        names = extras.get("targetNames") if isinstance(extras, dict) else None
+        names = names if isinstance(names, list) else []  # free text of programs, which is no reason to refuse a mesh
         for k, target in enumerate(targets):
             weight = float(weights[k]) if weights else 0.0
             if not np.isfinite(weight):
