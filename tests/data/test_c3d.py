@@ -249,6 +249,13 @@ def test_points_without_a_name_and_two_of_one(read):
     assert fewer.notes == ("2 points without a name left out",)
 
 
+def test_an_axis_that_is_none(read, tmp_path):
+    found = read(raw.c3d(up="QQ"))
+    assert found.up == "z"
+    assert found.notes == ("its Y_SCREEN is 'QQ', which is no axis: taken as z up (--up)",)
+    assert not any("substring" in each.what for each in force_plates.check(tmp_path / "a.c3d"))
+
+
 def test_what_a_model_computed(tmp_path):
     names = ["C7", "LASI", "Q1", "LKneeAngles", "CentreOfMass", "LFEO", "LFEA", "LFEL", "LFEP", "LHJC", "PELO"]
     points = raw.points_of(11)

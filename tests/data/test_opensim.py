@@ -192,11 +192,14 @@ def test_markers_in_millimetres_that_are_said_to_be_metres(folder):
 
 def test_forces_and_centres_of_mass_in_other_units(folder):
     miniature.forces(folder / "sway_grf.mot", scale=1000.0)
-    with pytest.raises(ValueError, match=r"sway_grf.mot: looks like millimetres: centres of pressure"):
+    with pytest.raises(ValueError, match=r"sway_grf.mot: looks like millimetres: .* or unit='cm' for"):
         data.open("opensim", folder)
     miniature.forces(folder / "sway_grf.mot")
     miniature.center_of_mass(folder / "sway_com.sto", scale=1000.0)
     with pytest.raises(ValueError, match=r"sway_com.sto: looks like millimetres: a centre of mass 9[0-9]+ from"):
+        data.open("opensim", folder)
+    miniature.center_of_mass(folder / "sway_com.sto", scale=100.0)
+    with pytest.raises(ValueError, match=r"sway_com.sto: looks like centimetres: a centre of mass 9[0-9]+"):
         data.open("opensim", folder)
     miniature.center_of_mass(folder / "sway_com.sto", scale=3.0)
     with pytest.raises(ValueError, match=r"sway_com.sto: the centre of mass is 1.15 m outside the markers of"):

@@ -61,6 +61,18 @@ def test_whatever_parts_the_columns(read, tab, blank):
     same(read(text(ROWS, tab=tab, blank=blank)))
 
 
+@pytest.mark.parametrize("mark", [",", ";"])
+def test_columns_of_spreadsheets(read, mark):
+    same(read(text(ROWS).replace("\t", mark)))
+    gap = read(text(["1\t0\t\t\t\t10\t20\t30\t1\t2\t3"]).replace("\t", mark))
+    np.testing.assert_array_equal(gap.confidence, [[0, 1, 1]])
+
+
+def test_no_marker_has_a_name(read):
+    with pytest.raises(ValueError, match="expected markers with names, none of its 3 points has one: label them"):
+        read(text(ROWS, names=("*1", "*2", "*3")))
+
+
 def test_doubled_tabs_in_the_values_alone(read):
     """As OpenSim's example markers_walk.trc."""
     lines = text(ROWS).split("\n")

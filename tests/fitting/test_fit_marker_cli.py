@@ -64,7 +64,7 @@ def test_a_file_that_says_nothing_rightly(points, tmp_path):
     own = [f"M{number}" for number in range(len(NAMES))]
     turned = points @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]) * 1000  # (x, y, z) -> (x, -z, y)
     other = write(tmp_path / "other.trc", turned, own)
-    (tmp_path / "names.json").write_text(json.dumps(dict(zip(own, NAMES, strict=True))))
+    (tmp_path / "names.json").write_text(json.dumps({**dict(zip(own, NAMES, strict=True)), "M999": "LASI"}))
     options = []
     for option, value in (("--markers", tmp_path / "names.json"), ("--units", "mm"), ("--up", "z")):
         said = fit(other, "-o", tmp_path / "out", *options)
@@ -83,6 +83,7 @@ def test_a_file_that_says_nothing_rightly(points, tmp_path):
     assert found["mean_marker_error_m"] < 0.003
     assert found["unknown"] == []
     assert "up: (0, 0, 1) of the file's axes, turned to y: the bodies are y up" in found["notes"]
+    assert f"no marker is called M999, as {tmp_path / 'names.json'} has it (--markers)" in found["notes"]
     assert set(found["skin_distances_m"]) == set(own)
     assert 0.005 < np.median(list(found["skin_distances_m"].values())) < 0.015  # they were put 10 mm off the skin
 

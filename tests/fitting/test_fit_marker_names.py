@@ -13,7 +13,7 @@ import ipman_rs as ip
 from ipman_rs.data.tracks import TO_Y_UP, Tracks, turned
 from ipman_rs.fitting.markers import judged, meanings, own
 from ipman_rs.fitting.markers.anatomy import Anatomy, harrington
-from ipman_rs.fitting.markers.names import plain
+from ipman_rs.fitting.markers.names import plain, unmatched
 from ipman_rs.fitting.markers.skin_distance import mean_distances, signed_distance
 
 
@@ -77,6 +77,14 @@ def test_beginnings_and_ends_that_all_share_say_nothing():
     assert meanings([f"{name}_jc" for name in ("LASI", "RASI", "C7")]) == {}
 
 
+@pytest.mark.parametrize("beginning", ["S01", "Sub12"])
+def test_a_subject_without_a_mark_behind_it(beginning):
+    names = ["LASI", "RASI", "LKNE", "RKNE", "C7", "LANK"]
+    found = meanings([beginning + name for name in names])
+    assert {name.removeprefix(beginning): meaning for name, meaning in found.items()} == meanings(names)
+    assert len(found) == 6
+
+
 def test_of_two_markers_of_one_name_the_plain_one_counts():
     found = meanings(["LASI_filt", "LASI", "RASI_filt", "RASI", "C7_filt", "C7"])
     assert list(found) == ["LASI", "RASI", "C7"]
@@ -107,6 +115,14 @@ def test_own_names(tmp_path):
         "hip_bone_1": "left_asis", "C7": "c7", "p7": "left_knee_lateral"
     }  # fmt: skip
     assert meanings(["C7"], {"C7": None}) == {}
+    assert unmatched(["S1:hip_bone_1", "C7"], expected) == ["P7", "Box", "K"]
+    for mark in ";\t":
+        commas = "marker,place\nHip bone 1,left_asis\nP7,LKNE\nBox,\nK,right knee\n"
+        (tmp_path / "a.csv").write_text(commas.replace(",", mark))
+        assert own.read(tmp_path / "a.csv", body) == expected
+    for name, text in (("a.json", '{"A": "LASI", "A": "LASI"}'), ("a.csv", "A;LASI\na;LASI\n")):
+        (tmp_path / name).write_text(text)
+        assert set(own.read(tmp_path / name, body).values()) == {"left_asis"}  # twice the same
 
 
 @pytest.mark.parametrize(
@@ -117,6 +133,9 @@ def test_own_names(tmp_path):
             '{"A": "left_nose"}',
             "'A': expected a place on the body, such as left_asis or LASI, got",
         ),
+        ("a.json", '{"A": "LASI", "A": "RASI"}', "'A': expected one place, got 'LASI' for 'A' and 'RASI'"),
+        ("a.csv", "L_A,LASI\nA,LKNE\nl.a,RASI\n", "'l.a': expected one place, got 'LASI' for 'L_A' and 'RASI'"),
+        ("a.yaml", "A: LASI\nA: RASI\n", "'A': expected one place, got the name twice"),
         ("a.json", "[1, 2]", "expected an object of marker names and places, got list"),
         ("a.json", "{", "is no JSON"),
         ("a.yaml", "a: [", "is no YAML"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -144,10 +144,22 @@ def _fit_markers(recording: Recording, settings: Settings, pace: Pace, person: P
     sites = {name: site if isinstance(site, str) else asdict(site) for name, site in found.sites.items()}
     record = {"mean_marker_error_m": _mean(errors), "marker_errors_m": each, "skin_distances_m": distances}
     record |= {"unknown": [*found.unknown], "unseen": [*found.unseen], "flags": [*flags]}
-    record |= {"notes": [*tracks.notes, *_marker_notes(found, settings)], "sites": sites}
+    notes = [*tracks.notes, *_own_notes(names, tracks.names, settings), *_marker_notes(found, settings)]
+    record |= {"notes": notes, "sites": sites}
     if any(finding.level == "wrong" for finding in findings):
         record["converged"] = False
     return found.fit, {"times": found.tracks.times}, record, found.tracks.rate or 1.0
+
+
+def _own_notes(own: Mapping[str, object] | None, names: Sequence[str], settings: Settings) -> list[str]:
+    """Which of the user's names of markers no marker of the recording has."""
+    from ..fitting.markers.names import unmatched
+
+    none = unmatched(names, own or {})
+    if not none:
+        return []
+    more = f" and {len(none) - 8} more" if len(none) > 8 else ""
+    return [f"no marker is called {', '.join(none[:8])}{more}, as {settings.markers} has it (--markers)"]
 
 
 def _marker_notes(found: Recorded, settings: Settings) -> list[str]:

@@ -15,7 +15,7 @@ from ipman_rs.files import read_bytes
 
 from . import c3d_format
 from .c3d_format import Parameters, several
-from .tracks import METRES, Named, Tracks, likely_unit, named, not_given, seen_of, tracks
+from .tracks import METRES, TO_Y_UP, Named, Tracks, likely_unit, named, not_given, seen_of, tracks
 from .units import metres
 
 Array = NDArray[np.float64]
@@ -136,18 +136,23 @@ def read(path: str | os.PathLike[str]) -> Recording:
     names = [str(name) for name in several(about, "LABELS")][:count]
     names += [""] * (count - len(names))
     rate = _number(about, "RATE")
+    screen = "".join(str(value) for value in about.get("Y_SCREEN", []))
+    axis = screen.strip()[-1:].lower()
     found = Recording(
         names=tuple(names),
         points=content.points,
         times=(content.first + np.arange(len(content.points))) / (rate if rate > 0 else 1.0),
         rate=rate,
         unit="".join(str(value) for value in about.get("UNITS", [])[:1]),
-        up="".join(str(value) for value in about.get("Y_SCREEN", []))[-1:].lower() or _faced(content.parameters),
+        up=axis if axis in TO_Y_UP else _faced(content.parameters),
         analogs=content.analogs,
         parameters=content.parameters,
         source=str(path),
         notes=content.notes,
     )
+    if screen.strip() and axis not in TO_Y_UP:
+        note = f"its Y_SCREEN is {screen!r}, which is no axis: taken as {found.up} up (--up)"
+        found = replace(found, notes=(*found.notes, note))
     if found.unit.strip():
         return found
     unit = _likely_unit(found)

@@ -38,6 +38,7 @@ Array = NDArray[np.float64]
 
 COM = "center_of_mass"  # begins the columns of the whole body's centre of mass
 FAR = 20.0  # m: no plate or person is farther from the origin of a laboratory
+CENTIMETRES = 500  # a centre of mass no farther from the origin is so many centimetres, for it is a metre high
 LONGER = 100  # times as long as the markers, without as many more samples: forces whose times are in another unit
 BESIDE = 0.5  # m: a centre of mass farther than that outside the markers is in other units or axes
 # ground_force_vx beside ground_torque_x; ground_force_1_vx beside ground_force_1_mx; f1_1 beside p1_1 and m1_1.
@@ -311,9 +312,10 @@ def _plausible(found: ForcePlates, up: str) -> None:
         return
     away = float(np.nanmedian(np.abs(found.points[heavy]).max(axis=-1)))
     if away > FAR:
+        other = "" if away > 100 * FAR else ", or unit='cm' for centimetres (--force-units cm)"
         raise ValueError(
             f"{found.source}: looks like millimetres: centres of pressure {away:.4g} from the origin, expected metres, "
-            f"up to {FAR:g}; say unit='mm' if so (--force-units mm)"
+            f"up to {FAR:g}; say unit='mm' if so (--force-units mm){other}"
         )
     push = np.median(np.abs(found.forces[heavy]), axis=0)  # of either sign: `on_the_body` turns each plate by itself
     axis = "xyz"[int(push.argmax())]
@@ -329,9 +331,8 @@ def center_of_mass(table: Storage) -> Array:
     points = table.vectors((f"{COM}_X", f"{COM}_Y", f"{COM}_Z"))
     away = float(np.median(np.abs(points).max(axis=1)))
     if away > FAR:
-        raise ValueError(
-            f"{table.source}: looks like millimetres: a centre of mass {away:.4g} from the origin, in metres"
-        )
+        word = "millimetres" if away > CENTIMETRES else "centimetres"
+        raise ValueError(f"{table.source}: looks like {word}: a centre of mass {away:.4g} from the origin, in metres")
     return points
 
 

@@ -114,6 +114,8 @@ def tracks(
         raise ValueError(f"{source}: sample {sample}, marker {names[marker]!r}: expected numbers, got infinity")
     seen, said = seen_of(points, names)
     chosen = named(names, seen, source, subject)
+    if not chosen.names:
+        raise ValueError(f"{source}: expected markers with names, none of its {len(names)} points has one: label them")
     points, seen = points[:, chosen.columns], seen[:, chosen.columns]
     if not seen.any():
         raise ValueError(f"{source}: expected coordinates, all are missing")

@@ -2,6 +2,7 @@
 
 They do not say which axis is up; OpenSim's is y. Frame, time, then x, y and z of each marker; an empty column between
 two tabs is a coordinate that was not measured, but tabs that are doubled throughout part columns as single ones do.
+Spreadsheets part the columns by semicolons or commas.
 """
 
 from __future__ import annotations
@@ -43,6 +44,8 @@ def read(
     if len(lines) < HEADER:
         raise ValueError(f"{source}: expected a header of {HEADER} lines, got {len(lines)}")
     head = next((row for row, line in enumerate(lines[:20]) if line.strip().lower().startswith("frame")), 3)
+    if mark := _mark(lines[head]):
+        lines = [line.replace(mark, "\t") for line in lines]
     header, notes = _header(lines[1:head]), []
     rows = [(number, line) for number, line in enumerate(lines[head + 1 :], head + 2) if line.strip()]
     axes = rows.pop(0)[1] if rows and not _is_number(rows[0][1].split()[0]) else ""  # X1, Y1, Z1, …
@@ -61,6 +64,11 @@ def read(
     _compare(header, times, notes)
     said = header.get("units", "") if unit is None else unit
     return tracks(names, points, times, said, up or "y", source, subject=subject, notes=notes)
+
+
+def _mark(names: str) -> str:
+    """What parts the columns instead of tabs and blanks, as spreadsheets write it: a semicolon or a comma; or ""."""
+    return next((mark for mark in ";," if "\t" not in names and names.count(mark) > 2), "")
 
 
 def _header(lines: Sequence[str]) -> dict[str, str]:

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import sys
+from collections.abc import Callable
 from typing import Any
 
 from .regular import read_bytes
@@ -15,25 +16,28 @@ _LONG = re.compile(r"\d{300}")
 _SURROGATE = re.compile(r"\\[uU][dD][89a-fA-F]")
 
 
-def read_json(path: str | os.PathLike[str]) -> Any:
-    """The content of a JSON file.
+Pairs = Callable[[list[tuple[str, Any]]], Any]  # what an object becomes, given its names and values
+
+
+def read_json(path: str | os.PathLike[str], pairs: Pairs | None = None) -> Any:
+    """The content of a JSON file; objects as dictionaries, or what `pairs` makes of them.
 
     Raises:
         ValueError: there is no such file or no ordinary one, it is no JSON, is nested too deep for Python, or holds a
             whole number that no float can hold or text that is none; the message begins with the path.
     """
     try:
-        return parse_json(read_bytes(path, MAX_BYTES))
+        return parse_json(read_bytes(path, MAX_BYTES), pairs)
     except ValueError as error:
         text = str(error)
         raise ValueError(text if text.startswith(f"{path}: ") else f"{path}: is no JSON: {text}") from None
 
 
-def parse_json(data: bytes) -> Any:
+def parse_json(data: bytes, pairs: Pairs | None = None) -> Any:
     """The content of JSON. ValueError as `read_json`, without a path."""
     try:
         text = data.decode("utf-8-sig" if data.startswith(b"\xef\xbb\xbf") else json.detect_encoding(data))
-        content = json.loads(text, parse_int=_whole if _LONG.search(text) else None)
+        content = json.loads(text, parse_int=_whole if _LONG.search(text) else None, object_pairs_hook=pairs)
         if _SURROGATE.search(text):
             json.dumps(content, ensure_ascii=False).encode()  # half a character cannot be written anywhere
         return content

@@ -18,7 +18,7 @@ from ..files import regular
 Array = NDArray[np.float64]
 Up = tuple[float, float, float] | None  # a direction in a file's own axes; None: as it says
 
-NEITHER = "it has neither forces nor a centre of mass"
+NEITHER = "it has neither forces (ground_force_vx beside ground_force_px) nor a centre of mass (center_of_mass_X)"
 CSV_COLUMNS = ("time_s", "com_x_m", "com_y_m", "com_z_m")
 
 

@@ -2,14 +2,14 @@
 
 Names are compared free of case and punctuation, the side first: `L_ASIS`, `L.ASIS`, `lasis`, `ASIS_L` and `Left ASIS`
 are one. What stands before a colon is the subject; a beginning or an end that most names of a file share ("Subject_",
-"_study") is left out where the name is known without it.
+"S01", "_study") is left out where the name is known without it.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from .aliases import KEYPOINTS
 from .sets import MARKERS, Meaning
@@ -86,6 +86,13 @@ def _found(
     return {name: meaning for name in names if (meaning := meant.get(name)) is not None}
 
 
+def unmatched(names: Sequence[str], own: Iterable[str]) -> list[str]:
+    """Which of a user's `own` names are those of no marker of a file, as `meanings` compares them."""
+    ends = _shared_ends(names)
+    known = {plain(variant) for name in names for variant in _variants(name, ends)}
+    return [name for name in own if plain(name) not in known]
+
+
 def _variants(name: str, ends: tuple[Sequence[str], Sequence[str]]) -> list[str]:
     """A name, and what is left of it without a shared beginning, end, or both."""
     beginnings, endings = ends
@@ -104,6 +111,7 @@ def _shared_ends(names: Sequence[str]) -> tuple[list[str], list[str]]:
     enough = max(FEWEST, SHARED * len(names))
     words = r"(?:[^\W_]+[\W_]+){%d}(?=\w)"
     first = Counter(match[0] for n in (3, 2, 1) for name in names if (match := re.match(words % n, name)))
+    first += Counter(match[0] for name in names if (match := re.match(r"[A-Za-z]+\d+(?=[A-Za-z])", name)))  # S01LASI
     last = Counter(match[0] for name in names if (match := re.search(r"(?<=\w)[\W_]+[^\W_]+$", name)))
     beginnings = [text for text, count in first.items() if count >= enough and not _telling(text)]
     endings = [

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 from ipman_rs.body import BodyModel
 from ipman_rs.files import read_bytes, read_json, read_yaml
 
-from .names import meanings
+from .names import meanings, plain
 from .sets import Meaning
 
 LARGEST = 1_000_000  # bytes
@@ -50,29 +51,50 @@ def _pairs(path: Path) -> dict[str, Any]:
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         raise ValueError(f"{path}: expected a file of marker names ({', '.join(ENDINGS)})")
-    if ending == ".csv":
-        pairs = _rows(path, read_bytes(path, LARGEST))
-    else:
-        content = read_json(path) if ending == ".json" else read_yaml(path)
-        if content is not None and not isinstance(content, dict):
-            what = type(content).__name__
-            raise ValueError(f"{path}: expected an object of marker names and places, got {what}")
-        pairs = {str(name): place for name, place in (content or {}).items()}
+    pairs = {".csv": _of_csv, ".json": _of_json}.get(ending, _of_yaml)(path)
     if not pairs:
         raise ValueError(f"{path}: expected names of markers and their places, got none")
-    return pairs
+    earlier: dict[str, tuple[str, Any]] = {}
+    for name, place in pairs:
+        other, meant = earlier.setdefault(plain(name), (name, place))
+        if meant != place:
+            raise ValueError(f"{path}: {name!r}: expected one place, got {meant!r} for {other!r} and {place!r}")
+    return dict(pairs)
 
 
-def _rows(path: Path, data: bytes) -> dict[str, Any]:
+def _of_json(path: Path) -> list[tuple[str, Any]]:
+    content = read_json(path, pairs=tuple)
+    if not isinstance(content, tuple):
+        raise ValueError(f"{path}: expected an object of marker names and places, got {type(content).__name__}")
+    return list(content)
+
+
+def _of_yaml(path: Path) -> list[tuple[str, Any]]:
+    import yaml
+
+    content = read_yaml(path)
+    if content is not None and not isinstance(content, dict):
+        raise ValueError(f"{path}: expected an object of marker names and places, got {type(content).__name__}")
+    names = [key.value for key, _ in getattr(yaml.compose(read_bytes(path, LARGEST)), "value", [])]
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise ValueError(f"{path}: {twice[0]!r}: expected one place, got the name twice")
+    return [(str(name), place) for name, place in (content or {}).items()]
+
+
+def _of_csv(path: Path) -> list[tuple[str, Any]]:
+    """Two columns, which commas, semicolons or tabs part: the first of them that parts every row."""
     try:
-        text = data.decode("utf-8-sig")
+        text = read_bytes(path, LARGEST).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise ValueError(f"{path}: expected text in UTF-8") from None
-    rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines())]
+    lines = [line for line in text.splitlines() if line.strip()]
+    mark = next((mark for mark in ",;\t" if all(mark in line for line in lines)), ",")
+    rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=mark)]
     rows = [row for row in rows if any(row)]
     if rows and rows[0][0].lower() in ("marker", "name") and rows[0][-1].lower() in ("place", "site"):
         rows = rows[1:]
     for number, row in enumerate(rows, 1):
         if len(row) != 2:
             raise ValueError(f"{path}: row {number}: expected a marker's name and its place, got {len(row)} columns")
-    return {row[0]: row[1] for row in rows}
+    return [(row[0], row[1]) for row in rows]
