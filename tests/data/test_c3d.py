@@ -91,6 +91,8 @@ def test_frames_that_are_not_there():
     more = c3d_format.content(raw.c3d(raw.points_of(frames=5), header={5: 4}))
     assert len(more.points) == 5
     assert more.notes == ("it says 4 and 5 frames; 5 are read",)
+    longer = c3d_format.content(raw.c3d() + bytes(1024))
+    assert longer.notes == (f"the last {512 - 4 * 3 * 16 + 1024} bytes, behind its 4 frames, are not read",)
     with pytest.raises(ValueError, match="does not say how many frames it has"):
         c3d_format.content(raw.c3d(header={4: 0, 5: 0}, point={"FRAMES": None}))
 
@@ -103,6 +105,43 @@ def test_header_and_parameters_that_disagree():
         c3d_format.content(raw.c3d(header={2: 2}))  # a block can be both
     with pytest.raises(ValueError, match="POINT:SCALE is 0, so its integers are no lengths"):
         c3d_format.content(raw.c3d(reals=False, scale=0.0))
+
+
+@pytest.mark.parametrize(
+    ("header", "used", "rate"),
+    [({3: 30}, 6, 1000.0), ({3: 30, 10: 5}, 6, 1000.0), ({}, 3, 1000.0), ({}, 12, 1000.0), ({}, 6, 500.0)],
+)
+def test_analogue_samples_that_disagree(header, used, rate):
+    """One wrong number of samples, of channels or of the rate: the file's size and the other two tell which it is."""
+    analogs = np.arange(40 * 10 * 6).reshape(400, 6) % 997
+    data = raw.c3d(raw.points_of(5, 40), analogs, samples=10, header=header)
+    for name, usual, other in (("USED", 6, used), ("RATE", 1000.0, rate)):
+        old = raw.parameter(2, name, usual)
+        assert data.count(old) == 1
+        data = data.replace(old, raw.parameter(2, name, other))
+    found = c3d_format.content(data)
+    np.testing.assert_array_equal(found.points, raw.points_of(5, 40))
+    np.testing.assert_array_equal(found.analogs, analogs)
+    assert "header and parameters disagree; it is read with 5 points and 60 samples" in found.notes
+
+
+def test_analogue_samples_that_cannot_be():
+    with pytest.raises(ValueError, match="its header has 3 points and 3 analogue samples .* have 3 and 3 or 6 from"):
+        c3d_format.content(raw.c3d(analogs=np.ones((8, 3)), header={3: 3}))  # both end in the same block
+    more = raw.c3d(raw.points_of(5, 40), np.ones((400, 6)), samples=10, header={10: 5})
+    more = more.replace(raw.parameter(2, "USED", 6), raw.parameter(2, "USED", 7))
+    with pytest.raises(ValueError, match="7 channels of 5 or 10 samples a frame cannot be 60 numbers a frame"):
+        c3d_format.content(more)
+
+
+def test_a_rate_that_the_header_says_otherwise():
+    right = raw.c3d(raw.points_of(5, 40), np.ones((400, 6)), samples=10)
+    assert c3d_format.content(right).notes == ()
+    found = c3d_format.content(right.replace(raw.parameter(1, "RATE", 100.0), raw.parameter(1, "RATE", 50.0)))
+    assert "its header says 100 Hz, POINT:RATE says 50 Hz, which is believed (--rate)" in found.notes
+    assert "ANALOG:RATE and 10 samples a frame say 100 Hz, POINT:RATE says 50 Hz, which is believed (--rate)" in (
+        found.notes
+    )
 
 
 def test_an_offset_that_is_wrong():
@@ -190,7 +229,7 @@ def test_subjects(read):
     np.testing.assert_array_equal(alone.confidence, 1)
     ball = read(raw.c3d(names=["Ann:C7", "Ann:LASI", "Ball:top"]))
     assert ball.names == ("C7", "LASI", "top")
-    assert ball.notes == ()
+    assert ball.notes == ("the markers of Ann, Ball are taken as one person's (subject, --subject: those of one)",)
     with pytest.raises(ValueError, match="subject: expected none, for no marker has one, got 'Ann'"):
         read(raw.c3d(), subject="Ann")
 

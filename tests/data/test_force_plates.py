@@ -215,6 +215,23 @@ def test_millimetres_that_are_said_to_be_metres(tmp_path, load):
         data.open("force-plates", path)
 
 
+def test_a_unit_that_is_not_given(tmp_path, load):
+    """The markers and the plates of a file without one are taken alike, and both say so."""
+    path = broken(tmp_path, load)
+    given, markers_given = force_plates.read(path), c3d.markers(path)
+    content = ezc3d.c3d(str(path))
+    content["parameters"]["POINT"]["UNITS"]["value"] = [""]
+    content.write(str(path))
+    found, of_markers = force_plates.read(path), c3d.markers(path)
+    np.testing.assert_array_equal(found.points, given.points)
+    np.testing.assert_array_equal(of_markers.points, markers_given.points)
+    note = "its unit of length is not given: taken as mm (--units)"
+    assert note in found.notes
+    assert note in of_markers.notes
+    assert [each.what for each in force_plates.check(path)].count(f"a.c3d: {note}") == 1
+    assert c3d.markers(path, unit=1e-3).notes == markers_given.notes
+
+
 def test_z_up_that_is_said_to_be_y_up(tmp_path, load):
     path = broken(tmp_path, load, up="+Y")
     wrong = [each.what for each in force_plates.check(path) if each.level == "wrong"]

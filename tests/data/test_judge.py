@@ -12,7 +12,11 @@ from ipman_rs.data import judge
 from ipman_rs.data.check import Finding, place
 
 UPRIGHT = tuple(name for name in ip.body.poses.NAMES if name != "lying")
-ON_FEET = ("standing", "t_pose", "a_pose", "walking", "one_leg", "warrior", "lunge", "chair", "squat")
+ON_FEET = ("standing", "t_pose", "a_pose", "walking", "one_leg", "warrior", "lunge", "chair", "squat", "kneeling")
+TURNS = {  # what became of the axes: (x, −z, y), cyclic both ways, on the side
+    "z": ([0, 2, 1], [1, -1, 1]), "-z": ([0, 2, 1], [1, 1, -1]), "cyclic z": ([2, 0, 1], [1, 1, 1]),
+    "cyclic x": ([1, 2, 0], [1, 1, 1]), "x": ([1, 0, 2], [1, 1, -1]),
+}  # fmt: skip
 
 
 def levels(name, up=(0, 1, 0), scale=1.0, parts=True, **said):
@@ -25,6 +29,19 @@ def levels(name, up=(0, 1, 0), scale=1.0, parts=True, **said):
 @pytest.mark.parametrize("name", UPRIGHT)
 def test_people_on_their_ground_pass(name):
     assert levels(name) == []
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("name", [*ON_FEET, "sitting"])
+@pytest.mark.parametrize("body", ["anny-lite", "anny"])
+def test_no_turned_body_passes(body, name, turn):
+    order, signs = TURNS[turn]
+    body = ip.load_body(body)
+    vertices = ip.body.posed(body, name)[:, order] * signs
+    found = judge.bodies(vertices[None], body.template, np.array([0.0, 1.0, 0.0]))
+    odd = [each for each in found if each.level != "ok"]
+    assert odd
+    assert odd[0].option.removeprefix("--up ").lstrip("-") == turn[-1]
 
 
 def test_who_lies_is_odd_unless_up_is_said():
@@ -43,7 +60,7 @@ def test_who_stands_on_the_head_is_refused(name):
     assert levels(name, up=(0, -1, 0), up_is_said=True) == []
 
 
-@pytest.mark.parametrize("name", ["standing", "walking", "chair", "one_leg"])
+@pytest.mark.parametrize("name", ["standing", "walking", "lunge", "one_leg"])
 def test_another_axis_is_odd_in_one_body_and_wrong_in_many(name):
     body = ip.load_body("anny-lite")
     vertices = np.repeat(ip.body.posed(body, name)[None], 3, axis=0)
@@ -61,17 +78,38 @@ def test_a_mesh_without_known_parts_is_judged_by_its_shape(name):
     assert (found.level, found.option) == ("odd", "--up y")
 
 
-@pytest.mark.parametrize(("scale", "option"), [(1e3, "--units mm"), (1e2, "--units cm"), (1e-3, "--units UNIT")])
+@pytest.mark.parametrize(
+    ("scale", "option"),
+    [
+        (1e3, "--units mm"),
+        (1e2, "--units cm"),
+        (10, "--units dm"),
+        (1 / 0.0254, "--units in"),
+        (60, "--units in or --units cm"),
+        (1 / 0.3048, "--units ft"),
+        (1e-3, "--units km"),
+        (1e-5, "--units UNIT"),
+    ],
+)
 def test_other_units_are_refused(scale, option):
     (found,) = levels("standing", scale=scale)
     assert (found.level, found.option) == ("wrong", option)
 
 
 @pytest.mark.parametrize(
-    ("kilograms", "level"), [(70, None), (3.5, None), (1.5, "odd"), (300, "odd"), (0.6, "wrong"), (5.9e10, "wrong")]
+    ("kilograms", "level"), [(70, None), (2.1, None), (1.5, "odd"), (300, "odd"), (0.6, "wrong"), (5.9e10, "wrong")]
 )
 def test_mass(kilograms, level):
     assert [each.level for each in judge.mass(kilograms)] == ([level] if level else [])
+
+
+@pytest.mark.parametrize(
+    ("kilograms", "span", "level"),
+    [(65, 1.8, None), (65, 2.4, None), (65, 0.95, None), (13, 0.95, None), (2.1, 0.55, None), (200, 1.8, None),
+     (11, 1.8, "odd"), (3.8, 1.8, "wrong"), (4.6, 1.8, "wrong"), (4.4, 0.2, "wrong"), (200, 1.0, "odd")],
+)  # fmt: skip
+def test_mass_against_size(kilograms, span, level):
+    assert [each.level for each in judge.mass(kilograms, span)] == ([level] if level else [])
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -65,7 +67,9 @@ def test_doubled_tabs_in_the_values_alone(read):
     lines[2] = "  100.0\t\t  100.0\t\t    3\t\t     3\t\t mm\t  100.0\t      1\t    3"
     same(read("\n".join(lines)))
     lines[2] = lines[2].replace("mm", "  ")
-    same(read("\n".join(lines)))  # nobody is 250 m long
+    found = read("\n".join(lines))
+    same(found)  # nobody is 250 m long
+    assert found.notes == ("its unit of length is not given: taken as mm (--units)",)
 
 
 def test_doubled_tabs_in_the_rows_alone(read):
@@ -80,6 +84,21 @@ def test_an_empty_column_is_a_gap_where_tabs_are_single(read):
     np.testing.assert_allclose(found.points[0, 1], [0.01, 0.02, 0.03])
     np.testing.assert_allclose(found.points[1, 2], [0.004, 0.005, 0.006])
     assert found.notes == ()
+
+
+@pytest.mark.parametrize("gap", [[""] * 3, ["5", "", "6"]])
+@pytest.mark.parametrize("marker", [0, 1, 2])
+def test_an_empty_column_is_a_gap_where_tabs_are_doubled(read, gap, marker):
+    """Eleven columns have ten pairs of tabs between them, whatever is in them."""
+    cells = ["1", "2", "3", "4", "5", "6", "7", "8", "9"]
+    cells[3 * marker : 3 * marker + 3] = gap
+    whole = "2\t\t0.01\t\t" + "\t\t".join("987654321")
+    found = read(text(["\t\t".join(["1", "0", *cells]), whole], tab="\t\t"))
+    expected = np.ones((2, 3))
+    expected[0, marker] = 0
+    np.testing.assert_array_equal(found.confidence, expected)
+    np.testing.assert_allclose(found.points[1], np.arange(9, 0, -1).reshape(3, 3) / 1000)
+    np.testing.assert_allclose(found.points[0, marker - 1], np.arange(1, 10).reshape(3, 3)[marker - 1] / 1000)
 
 
 def test_gaps_never_shift_columns_where_markers_without_a_name_follow(read):
@@ -106,22 +125,66 @@ def test_markers_without_a_name(read):
     assert "more than one marker is called C7" in twice.notes[0]
 
 
+@pytest.mark.parametrize("headings", ["\tTime", "Frame#\t", "\t", "Frame No.\tTime (s)", "Bild\tZeit"])
+def test_headings_that_are_missing_or_called_otherwise(read, headings):
+    """Each marker keeps its own coordinates, also without a name for frames and times."""
+    content = text(ROWS)
+    same(read(content.replace("Frame#\tTime", headings)))
+    if headings.strip():
+        same(read(text(ROWS, axes=False).replace("Frame#\tTime", headings)))
+    if headings != "\t":
+        same(read(content.replace("Frame#\tTime", headings.strip())))  # its tab is missing as well
+        if "Zeit" not in headings:
+            same(read(text(ROWS, tab=" ").replace("Frame# Time", headings.replace("\t", " "))))
+    same(read(content.replace("Frame#\tTime", headings).replace("\tC7\t", "\t\t")), NAMES[1:], ROWS[:, 1:])
+
+
 def test_names_with_their_persons(read):
     same(read(text(ROWS, names=[f"S01:{name}" for name in NAMES])))
     names = ("S1:C7", "S2:C7", "S2:L.ASIS")
     with pytest.raises(ValueError, match=r"two people in it, S1 \(1 marker\) and S2 \(2 markers\): say which one"):
         read(text(ROWS, names=names))
-    points = np.arange(1, 55).reshape(3, 6, 3) * 10.0
-    names_of_two = ("Al:C7", "Bob:LKNE", "Al:L.ASIS", "Bob:RKNE", "Al:R.ASIS", "Bob:LANK")
-    with pytest.raises(ValueError, match=r"two people in it, Al \(3 markers\) and Bob \(3 markers\): say which one"):
-        read(text(points, names=names_of_two))
-    same(read(text(points, names=names_of_two), subject="Al"), NAMES, points[:, ::2])
     same(read(text(ROWS, names=names), subject="S2"), ("C7", "L.ASIS"), ROWS[:, 1:])
+
+
+def test_two_people_who_share_no_name(read):
+    """Each was recorded with markers of their own: half a person each would be nobody."""
+    rows = np.arange(1.0, 1 + 2 * 12 * 3).reshape(2, 12, 3)
+    names = [f"{('Al', 'Bob')[number % 2]}:M{number}" for number in range(12)]
+    with pytest.raises(ValueError, match=r"two people in it, Al \(6 markers\) and Bob \(6 markers\): say which one"):
+        read(text(rows, names=names, markers=12))
+    same(read(text(rows, names=names, markers=12), subject="Al"), [f"M{k}" for k in range(0, 12, 2)], rows[:, ::2])
+    wand = read(
+        text(rows[:, :11], names=[*[f"Al:M{k}" for k in range(6)], *[f"Wand:{k}" for k in range(5)]], markers=11)
+    )
+    assert wand.names[-1] == "4"
+    assert wand.notes == ("the markers of Al, Wand are taken as one person's (subject, --subject: those of one)",)
+
+
+def test_two_people_of_whom_one_has_no_name(read):
+    points = np.concatenate([ROWS, ROWS + 700], axis=1)
+    content = text(points, names=[*NAMES, *(f"B:{name}" for name in NAMES)])
+    with pytest.raises(ValueError, match=r'two people in it, "" \(without.*\) \(3 markers\) and B .*--subject B\)'):
+        read(content)
+    same(read(content, subject="b"), NAMES, points[:, 3:])
+    same(read(content, subject=""), NAMES, ROWS)
+    alone = read(text(ROWS, names=("C7", "B:L.ASIS", "B:R.ASIS")))
+    same(alone)  # nothing of one is twice there
+    same(read(text(ROWS, names=("C7", "B:L.ASIS", "B:R.ASIS")), subject="B"))
+
+
+def test_five_thousand_subjects_at_once(read):
+    begun = time.perf_counter()
+    with pytest.raises(ValueError, match="two people in it"):
+        read(text(np.ones((1, 5000, 3)), names=[f"S{number}:C7" for number in range(5000)]))
+    read(text(np.ones((1, 5000, 3)), names=[f"S{number}:C{number}" for number in range(5000)]))
+    assert time.perf_counter() - begun < 4
 
 
 @pytest.mark.parametrize(
     "gap",
-    ["9999.99", "-9999.99", "9999.990000", "999999", "99999.9", "-3.697314e28", "-3.69731E+28", "1e20", "NaN",
+    ["9999.99", "-9999.99", "9999.990000", "999999", "99999.9", "9999999", "9.999999e+06",
+     "999999.99", "99999.999999", "-3.697314e28", "-3.69731E+28", "1e20", "NaN",
      "nan(snan)", "-nan(ind)", "-1.#IND00", "1.#QNAN0", "-", "null", "0", "0.000"],
 )  # fmt: skip
 def test_what_stands_for_a_gap(read, gap):
@@ -192,6 +255,17 @@ def test_times(read):
     assert coarse.rate == pytest.approx(240)
     np.testing.assert_allclose(coarse.times, np.arange(241) / 240, atol=1e-12)
     assert coarse.notes == ("some times are equal: they are taken as evenly spaced from the first to the last",)
+
+
+def test_times_with_a_gap(read):
+    """The rate is that of the frames on both sides of it."""
+    row = "\t1\t2\t3\t4\t5\t6\t7\t8\t9"
+    found = read(text([f"{n}\t{n / 100 + 5 * (n > 20):g}{row}" for n in range(50)]))
+    assert found.rate == pytest.approx(100)
+    said = "its times have a gap, at t = 0.2 s (of 5.01 s): the frames before and after are taken as neighbours"
+    assert found.notes == (said,)
+    lost = read(text([f"{n}\t{n / 100:g}{row}" for n in range(50) if n != 20]))
+    assert lost.rate == pytest.approx(100, rel=0.03)
 
 
 def test_a_header_that_says_otherwise(read):

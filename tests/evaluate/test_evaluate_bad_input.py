@@ -243,3 +243,45 @@ def test_names_that_a_spreadsheet_would_run(tmp_path):
     assert {row["sequence"] for row in rows} == {f"'{name}" for name in names.tolist()}
     assert {row["method"] for row in rows} == {"'=cmd"}
     assert all(np.isfinite(float(row["mean"])) and int(row["frames"]) in range(1, 11) for row in rows)
+
+
+@pytest.mark.parametrize(("turn", "said"), [(np.pi, "180 degrees"), (np.pi / 2, "90 degrees")])
+def test_people_turned_against_a_truth_without_ground(tmp_path, turn, said):
+    """Upside down or on their backs: PA-MPJPE is 0 all the same, and nothing says where up is."""
+    draw = np.random.default_rng(0)
+    true = {"names": np.array([f"f{k}" for k in range(12)]), "body": "anny-lite", "betas": np.zeros((12, 10))}
+    true |= {"pose": 0.05 * draw.standard_normal((12, 24, 3)), "transl": np.zeros((12, 3))}
+    true["pose"][:, 0] = 0.0
+    guess = dict(true, pose=true["pose"].copy())
+    guess["pose"][:, 0] = [turn, 0.0, 0.0]
+    (flag,) = job_of(tmp_path, true, guess).flags
+    found = f"predicted people are the true ones turned by {said} in the median, about (1, 0, 0)"
+    assert flag == f"{found}; turn them back if their axes are other ones than the data set's"
+    guess["pose"][:, 0] = [0.7, 0.0, 0.0]
+    assert job_of(tmp_path / "less", true, guess).flags == ()
+
+
+@pytest.mark.parametrize("kind", ["npz", "parquet"])
+def test_what_no_figure_is_made_of_is_named(tmp_path, guessed, kind):
+    few = {name: value[:12] if np.ndim(value) else value for name, value in guessed.items()}
+    more = few | {"expression": np.zeros((12, 5)), "foo": np.arange(12)}
+    if kind == "parquet":
+        pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+        columns = {name: np.reshape(value, (12, -1)).tolist() for name, value in more.items() if name != "body"}
+        columns |= {"names": more["names"].tolist(), "body": ["anny-lite"] * 12, "foo": list(range(12))}
+        path = tmp_path / "guess.parquet"
+        parquet.write_table(pyarrow.table(columns), path)
+    else:
+        path = files.save(tmp_path / "guess.npz", more)
+    truth = files.save(tmp_path / "truth.npz", few | {"weights": np.ones(12)})
+    job = files.job(tmp_path / "out", path, truth)
+    assert job.flags == ("not used: expression, foo", f"the truth, {truth}: not used: weights")
+
+
+def test_of_two_forms_of_a_body_one_is_compared(tmp_path, guessed):
+    few = {name: value[:12] if np.ndim(value) else value for name, value in guessed.items()}
+    posed = ip.load_body("anny-lite")(few["pose"], few["betas"], few["transl"]).vertices
+    job = job_of(tmp_path, few, few | {"vertices": posed})
+    assert job.flags == (
+        "vertices are compared, not the bodies of pose, betas, transl beside them; leave one of the two out",
+    )

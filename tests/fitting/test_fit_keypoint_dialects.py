@@ -231,7 +231,6 @@ BAD = {
     "too few": body_25()[:60],
     "no numbers": ["x"] * 75,
     "infinite": [float("inf")] * 75,
-    "too large": [10**400] * 75,
     "null": None,
 }
 
@@ -367,7 +366,7 @@ def test_as_windows_writes_text(tmp_path, coding):
 
 def test_a_number_of_too_many_digits(tmp_path):
     (tmp_path / "some.json").write_text('{"keypoints": [' + "9" * 10_000 + "]}")
-    with pytest.raises(ValueError, match="some.json: is no JSON: a number of 10000 digits, more than any float has"):
+    with pytest.raises(ValueError, match="some.json: is no JSON: a number of 10000 digits"):
         keypoints.read(tmp_path / "some.json")
 
 

@@ -80,7 +80,7 @@ def test_boxes_of_several_images(pose, shared, tmp_path):
         (lambda path: Image.new("L", (1, 1)).save(path), "expected an image of at least 32 × 32 pixels, got 1 × 1"),
         (lambda path: path.write_bytes(b"no image"), "expected an image: "),
         (lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), "expected an image: "),
-        (lambda path: path.mkdir(), "no such file"),
+        (lambda path: path.mkdir(), "is a folder"),
     ],
 )
 def test_images_that_are_none(tmp_path, make, message):

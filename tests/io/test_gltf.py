@@ -250,7 +250,6 @@ def test_what_is_joined_and_left_out_is_named(read):
         "1 primitive of points or lines left out",
         "outside of the scene and left out: spare",
         "the pose of the nodes is read; animations left out: walk",
-        "2 large separate pieces are measured as one body (several people, or clothes over one?)",
     )
 
 

@@ -152,17 +152,6 @@ def test_flat_and_repeated_faces_are_left_out():
     assert mesh.notes == ("1 face without area (a vertex twice) left out", "3 repeated faces left out")
 
 
-def test_large_pieces_are_counted_and_eyes_are_not(body):
-    eye = trimesh.creation.icosphere(1, 0.012)
-    two = trimesh.util.concatenate([body, body.copy().apply_translation([1, 0, 0]), eye])
-    mesh = repair.repaired(repair.Mesh(np.asarray(two.vertices), np.asarray(two.faces)))
-    assert [note for note in mesh.notes if "pieces" in note] == [
-        "2 large separate pieces are measured as one body (several people, or clothes over one?)"
-    ]
-    one = trimesh.util.concatenate([body, eye])
-    assert repair.repaired(repair.Mesh(np.asarray(one.vertices), np.asarray(one.faces))).notes == ()
-
-
 def test_a_loose_vertex_far_away_does_not_widen_the_tolerance(read, body):
     """1 km away: a tolerance of its distance would be 1 cm, and merge a body's fingers."""
     soup = body.triangles.reshape(-1, 3)

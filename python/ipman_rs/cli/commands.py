@@ -24,6 +24,8 @@ from .validate import validate
 if TYPE_CHECKING:
     from ..view import Study
 
+_LEAST = 400_000_000  # bytes of address space: with less, NumPy and SciPy take minutes to load, or fail in C
+
 _CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
 _preset = click.option(
@@ -39,6 +41,19 @@ def _version(context: click.Context, _parameter: click.Parameter, wanted: bool) 
         context.exit()
 
 
+def _limit() -> str:
+    """What is wrong with the limit of this process's address space; nothing on systems that do not hold to it."""
+    if sys.platform != "linux":
+        return ""
+    import resource
+
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit == resource.RLIM_INFINITY or limit >= _LEAST:
+        return ""
+    given = f"memory is limited to {limit / 1e6:.0f} MB (ulimit -v), but NumPy and SciPy need {_LEAST / 1e6:.0f}"
+    return f"{given}; raise the limit"
+
+
 class _Commands(click.Group):
     """What no command can do anything about ends in one line: a name that no file can have, a full disk, no memory."""
 
@@ -46,8 +61,10 @@ class _Commands(click.Group):
         for stream in (sys.stdout, sys.stderr):  # names of files need not be text, and terminals not know all letters
             if hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+        said = _limit()
         try:
-            return super().invoke(ctx)
+            if not said:
+                return super().invoke(ctx)
         except MemoryError:
             said = "needs more memory than there is"
         except OSError as error:

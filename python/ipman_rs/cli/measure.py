@@ -16,7 +16,7 @@ import ipman_rs as ip
 from .. import view
 from ..analysis import PIECE
 from ..body.sequence import pieces
-from ..data import check, judge
+from ..data import check, judge, separate_pieces
 from ..data.check import Finding
 from ..files import regular
 from . import console
@@ -134,9 +134,12 @@ def _judged(recording: Recording, template: Any, normal: np.ndarray, up_is_said:
     count, size = recording.vertices.shape[:2]
     few = np.asarray(recording.vertices[judge.evenly(count, max(1, min(check.SAMPLE, SAMPLED_VERTICES // size)))])
     findings = judge.bodies(few, template, normal, up_is_said=up_is_said)
+    whole = few[np.isfinite(few).all(axis=(1, 2))]
+    if recording.template is None and len(whole):  # a body model's own pieces are known
+        findings += separate_pieces.judged(whole[0], recording.faces, normal)
     if not any(each.level == "wrong" for each in findings):
-        masses = ip.mass_properties(few[judge.evenly(len(few), WEIGHED)], template).mass
-        findings += judge.mass(float(np.median(masses[np.isfinite(masses)]))) if np.isfinite(masses).any() else []
+        weighed = few[judge.evenly(len(few), WEIGHED)]
+        findings += judge.masses(ip.mass_properties(weighed, template).mass, weighed)
     return findings
 
 

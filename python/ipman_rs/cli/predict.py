@@ -215,6 +215,6 @@ def _flags(path: Path, vertices: Any, template: Any, normal: Any) -> tuple[str, 
 
     from ..data import judge
 
-    mass = float(ip.mass_properties(vertices, template).mass)
-    found = [*judge.bodies(np.asarray(vertices)[None], template, normal), *judge.mass(mass)]
+    one = np.asarray(vertices)[None]
+    found = [*judge.bodies(one, template, normal), *judge.masses(ip.mass_properties(one, template).mass, one)]
     return judge.admit(path, [replace(each, option="", advice="") for each in found], force=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from ipman_rs.files import read_bytes
 
 from . import c3d_format
 from .c3d_format import Parameters, several
-from .tracks import METRES, Named, Tracks, named, seen_of, tracks
+from .tracks import METRES, Named, Tracks, likely_unit, named, not_given, seen_of, tracks
 from .units import metres
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ class Recording:
     points: Array  # (T, P, 3), in `unit`
     times: Array  # (T,) s
     rate: float  # Hz, of the points; 0 if the file does not say
-    unit: str  # of the points; "" if the file does not say
+    unit: str  # of the points; the likely one, with a note, if the file does not say
     up: str  # "x", "y" or "z": its Y_SCREEN; without one the axis that its force plates face, or z
     analogs: Array  # (T * n, A), n samples of the channels to one of the points
     parameters: Parameters  # by group and name
@@ -105,10 +105,11 @@ class Recording:
 
     def positions(self, names: Sequence[str]) -> Array:
         """(T, n, 3) m of these points; ValueError if one is missing, or in an unknown unit."""
-        missing = [name for name in names if name not in self.names]
+        column = {name: index for index, name in reversed([*enumerate(self.names)])}  # of a name twice the first
+        missing = [name for name in names if name not in column]
         if missing:
             raise ValueError(f"{self.source}: no point {missing[0]!r}; it has {', '.join(self.names) or 'none'}")
-        return self.places([self.names.index(name) for name in names])
+        return self.places([column[name] for name in names])
 
     def places(self, columns: Sequence[int]) -> Array:
         """(T, n, 3) m of the points in these columns. ValueError for an unknown unit."""
@@ -133,7 +134,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
     names = [str(name) for name in several(about, "LABELS")][:count]
     names += [""] * (count - len(names))
     rate = _number(about, "RATE")
-    return Recording(
+    found = Recording(
         names=tuple(names),
         points=content.points,
         times=(content.first + np.arange(len(content.points))) / (rate if rate > 0 else 1.0),
@@ -145,6 +146,19 @@ def read(path: str | os.PathLike[str]) -> Recording:
         source=str(path),
         notes=content.notes,
     )
+    if found.unit.strip():
+        return found
+    unit = _likely_unit(found)
+    return replace(found, unit=unit, notes=(*found.notes, not_given(unit)))
+
+
+def _likely_unit(found: Recording) -> str:
+    """The unit of a file that does not say it: the one in which its markers, or else its plates, are not too large."""
+    rest = [column for column in range(len(found.names)) if column not in set(found._computed)]
+    seen, _ = seen_of(found.points[:, rest], [found.names[column] for column in rest])
+    corners = [each for each in found.values("FORCE_PLATFORM", "CORNERS") if isinstance(each, (int, float))]
+    places = found.points[:, rest][seen] if seen.any() else np.array(corners[: len(corners) // 3 * 3]).reshape(-1, 3)
+    return likely_unit(places) if len(places) else "mm"
 
 
 def markers(
@@ -164,7 +178,7 @@ def markers(
         raise ValueError(f"{path}: expected markers, it has rotations of segments only, as Theia writes them")
     computed = set(found._computed)
     rest = [column for column in range(len(found.names)) if column not in computed]
-    notes = list(found.notes)
+    notes = [note for note in found.notes if unit is None or note != not_given(found.unit)]
     if computed:
         notes.append(f"{len(computed)} outputs of a model are no markers: {_some(list(found.outputs))}")
     names = [found.names[column] for column in rest]

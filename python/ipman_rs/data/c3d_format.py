@@ -23,6 +23,8 @@ DEC, MIPS = 85, 86  # processors whose numbers are written otherwise than 84, In
 WIDTHS = {-1: 1, 1: 1, 2: 2, 4: 4}  # bytes of a character, byte, integer or real number
 MOST_DIMENSIONS = 7
 MOST_RECORDS = 20_000  # of parameters; files have hundreds
+NEARLY = 1e-3  # of a rate: that far the analogue one may be from a multiple of the points'
+UNLIKE = 0.01  # of a rate: that far two that mean the same may be from each other
 LARGEST_COUNT = 0xFFFF  # of two bytes: files with as many frames or more say elsewhere how many
 
 
@@ -62,13 +64,14 @@ def content(data: bytes) -> Content:
     notes: list[str] = []
     parameters = _parameters(numbers, begin, header[8], notes)
     start, layout = _layout(numbers, header, parameters, notes)
+    _compare_rates(float(numbers.reals(20, 1)[0]), header, parameters, notes)
     frames = _frames(len(data) - start, layout, header, parameters, notes)
     count = frames * layout.size // (4 if layout.real else 2)
     stored = numbers.reals(start, count) if layout.real else numbers.integers(start, count)
     rows = stored.reshape(frames, 4 * layout.points + layout.analogs)
     return Content(
         _points(rows[:, : 4 * layout.points], layout, _scale(numbers, parameters)),
-        _analogs(rows[:, 4 * layout.points :], layout, header, parameters),
+        _analogs(rows[:, 4 * layout.points :], layout, header, parameters, notes),
         max(header[3], 1) - 1,
         parameters,
         tuple(notes),
@@ -189,29 +192,70 @@ def _layout(numbers: _Numbers, header: list[int], parameters: Parameters, notes:
     starts = [(block - 1) * BLOCK for block in dict.fromkeys(blocks)]
     if not starts or min(starts) < BLOCK or min(starts) > len(numbers.data):
         raise ValueError("expected a C3D file: it ends before its frames; is the download complete?")
-    points, analogs = header[1], header[2]
     scale, real = _first(parameters, "POINT", "SCALE"), bool(np.signbit(numbers.reals(12, 1)[0]))
-    channels, used = _count(parameters, "ANALOG", "USED"), _count(parameters, "POINT", "USED")
-    said = _Layout(
-        points if used is None else used,
-        analogs if channels is None or (channels and analogs % channels == 0) else channels * header[9],
-        real if scale is None else scale < 0,
-    )
-    possible = [(start, each) for each in dict.fromkeys((said, _Layout(points, analogs, real))) for start in starts]
+    used = _count(parameters, "POINT", "USED")
+    points, counts = header[1] if used is None else used, _analog_counts(header, parameters)
+    said = [_Layout(points, count, real if scale is None else scale < 0) for count in counts]
+    of_header = [_Layout(header[1], count, real) for count in counts]
+    possible = [(start, each) for each in dict.fromkeys(said + of_header) for start in starts]
     if len(possible) == 1:
         return possible[0]
     frames = max(_said_frames(header, parameters), default=0)
     filled = [  # the last block is filled up
         (start, each) for start, each in possible if 0 <= len(numbers.data) - start - frames * each.size < BLOCK
     ]
+    if len(filled) != 1 and len(starts) == 1 and said[0] == of_header[0] and _of_used(header, parameters):
+        filled = [(starts[0], said[0])]  # the rates alone say otherwise, and the size does not tell
     if len(filled) != 1:
         raise ValueError(
-            f"expected a C3D file: its header has {points} points and {analogs} analogue samples a frame from block "
-            f"{header[8]} on, its parameters have {said.points} and {said.analogs} from block {blocks[-1]} on"
+            f"expected a C3D file: its header has {header[1]} points and {header[2]} analogue samples a frame from "
+            f"block {header[8]} on, its parameters have {points} and {_or(counts)} from block {blocks[-1]} on"
         )
     start, each = filled[0]
     notes.append(f"header and parameters disagree; it is read with {each.points} points and {each.analogs} samples")
     return start, each
+
+
+def _analog_counts(header: list[int], parameters: Parameters) -> list[int]:
+    """How many analogue numbers a frame may have: as the header says, and as channels times samples a frame are."""
+    channels = _count(parameters, "ANALOG", "USED")
+    if channels is None:
+        return [header[2]]
+    return list(dict.fromkeys([header[2], *(channels * samples for samples in _samples(header, parameters))]))
+
+
+def _of_used(header: list[int], parameters: Parameters) -> bool:
+    """Whether the header's samples a frame, times the channels that are used, are its analogue numbers."""
+    return _count(parameters, "ANALOG", "USED") == header[2] / max(header[9], 1)
+
+
+def _samples(header: list[int], parameters: Parameters) -> list[int]:
+    """How many samples of a channel a frame may have: as the header says, and as the two rates do.
+
+    A header without a number says nothing where the rates do.
+    """
+    points, analogs = _first(parameters, "POINT", "RATE"), _first(parameters, "ANALOG", "RATE")
+    ratio = analogs / points if points and analogs and points > 0 and analogs > 0 else 0.0
+    whole = round(ratio) if math.isfinite(ratio) else 0
+    by_rates = [whole] if whole > 0 and abs(ratio - whole) < NEARLY * ratio else []
+    return list(dict.fromkeys([*([header[9]] if header[9] or not by_rates else []), *by_rates]))
+
+
+def _or(counts: list[int]) -> str:
+    return " or ".join(map(str, counts))
+
+
+def _compare_rates(of_header: float, header: list[int], parameters: Parameters, notes: list[str]) -> None:
+    """Notes of rates of the points that are not POINT:RATE, which is believed."""
+    rate, analogs = _first(parameters, "POINT", "RATE"), _first(parameters, "ANALOG", "RATE")
+    if not rate or not math.isfinite(rate) or rate <= 0:
+        return
+    others = [("its header says", of_header)]
+    if analogs and header[9] and header[2]:
+        others.append((f"ANALOG:RATE and {header[9]} samples a frame say", analogs / header[9]))
+    for what, other in others:
+        if math.isfinite(other) and other > 0 and abs(other / rate - 1) > UNLIKE:
+            notes.append(f"{what} {other:.4g} Hz, POINT:RATE says {rate:.4g} Hz, which is believed (--rate)")
 
 
 def _said_frames(header: list[int], parameters: Parameters) -> list[int]:
@@ -248,6 +292,10 @@ def _frames(available: int, layout: _Layout, header: list[int], parameters: Para
         notes.append(f"the first {max(said)} frames are read: it does not say how many more there are")
     elif min(said) < max(said):
         notes.append(f"it says {min(said)} and {max(said)} frames; {max(said)} are read")
+    elif available - max(said) * layout.size >= BLOCK:  # the last block is filled up
+        notes.append(
+            f"the last {available - max(said) * layout.size} bytes, behind its {max(said)} frames, are not read"
+        )
     return max(said)
 
 
@@ -267,13 +315,33 @@ def _points(stored: NDArray[Any], layout: _Layout, scale: float) -> Array:
     return places
 
 
-def _analogs(stored: NDArray[Any], layout: _Layout, header: list[int], parameters: Parameters) -> Array:
+def _channels(analogs: int, header: list[int], parameters: Parameters, notes: list[str]) -> int:
+    """Of how many channels a frame's analogue numbers are.
+
+    ValueError where the number of channels and that of their samples do not make that of all.
+    """
+    used, samples = _count(parameters, "ANALOG", "USED"), _samples(header, parameters)
+    if analogs == 0 or used == 0:
+        return 0
+    if not used:
+        return analogs // max(header[9], 1)
+    if analogs in [used * each for each in samples] or (samples in ([0], [1]) and analogs % used == 0):
+        return used
+    if len(samples) == 1 and samples[0] > 0 and analogs % samples[0] == 0:  # header and rates say the same
+        notes.append(f"ANALOG:USED says {used} channels; it is read with {analogs // samples[0]}, as its frames have")
+        return analogs // samples[0]
+    raise ValueError(
+        f"expected a C3D file: {used} channels of {_or(samples)} samples a frame cannot be {analogs} numbers a frame"
+    )
+
+
+def _analogs(
+    stored: NDArray[Any], layout: _Layout, header: list[int], parameters: Parameters, notes: list[str]
+) -> Array:
     """Channels (T * n, A): (number - offset) times the channel's scale and the general one."""
-    channels = _count(parameters, "ANALOG", "USED") or layout.analogs // max(header[9], 1)
-    if layout.analogs == 0 or channels == 0:
+    channels = _channels(layout.analogs, header, parameters, notes)
+    if channels == 0:
         return np.zeros((0, 0))
-    if layout.analogs % channels:
-        raise ValueError(f"expected a C3D file: {channels} channels cannot have {layout.analogs} samples a frame")
     about = parameters.get("ANALOG", {})
     unsigned = not layout.real and "".join(map(str, about.get("FORMAT", []))).upper().startswith("UNSIGNED")
     values = stored.reshape(-1, channels).astype(np.float64)

@@ -20,6 +20,13 @@ from ipman_rs.ground import Ground
 from .frames import Cameras, DataSet, Frames
 
 SAMPLE = 256  # frames that are looked at
+UNITS = (
+    ("metres", "m", 1.0), ("millimetres", "mm", 1e-3), ("centimetres", "cm", 0.01), ("decimetres", "dm", 0.1),
+    ("kilometres", "km", 1e3), ("inches", "in", 0.0254), ("feet", "ft", 0.3048), ("micrometres", "1e-6", 1e-6),
+)  # fmt: skip
+TALL = 1.9  # m: the diagonal of the box of an adult who stands
+UNLIKE = 2.5  # times as small: no other unit is told for it
+SMALL = 0.45  # m: newborn children span about so much
 BODY = (0.25, 3.5)  # m: extent of a body's joints or markers, rolled up or with raised arms
 WORLD = 100.0  # m: no body or camera is farther from the origin of its world
 NEAR_IN_CENTIMETRES = 500.0  # so far from the origin in millimetres would be within arm's reach
@@ -131,24 +138,38 @@ def _finite(what: str, some: Any, whole: Any) -> list[Finding]:
 
 def size_of_body(what: str, points: NDArray[Any]) -> list[Finding]:
     """Whether points (F, K, 3) of a person each, joints, vertices or markers, span a body in metres."""
+    extent = extent_of(points)
+    if not np.isfinite(extent):
+        return []
+    low, high = BODY
+    if SMALL <= extent <= high:
+        return [Finding("ok", f"{what}: metres (a body spans {extent:.2f})")]
+    units = [each for each in units_of(extent) if each[1] != "m"]
+    names = " or ".join(unit for unit, _, _ in units)
+    said = f"a body spans {extent:.4g}, expected {low} to {high} metres"
+    option = " or ".join(f"--units {option}" for _, option, _ in units)
+    if low <= extent < SMALL:
+        return [Finding("odd", f"{what}: a body spans {extent:.2f} metres: a newborn child?", option="--units UNIT")]
+    if not units:
+        return [Finding("wrong", f"{what}: no unit of length fits a person: {said}", option="--units UNIT")]
+    return [Finding("wrong", f"{what}: looks like {names}: {said}", f"multiply by {units[0][2]:g}", option)]
+
+
+def extent_of(points: NDArray[Any]) -> float:
+    """The diagonal of the box of points (F, K, 3), the median over frames; NaN where nothing was seen."""
     points = np.asarray(points, np.float64)
     points = np.where(np.isfinite(points).all(axis=-1, keepdims=True), points, np.nan)
     seen = ~np.isnan(points).all(axis=(1, 2))
     if not seen.any():
-        return []
+        return np.nan
     span = np.nanmax(points[seen], axis=1) - np.nanmin(points[seen], axis=1)
-    extent = float(np.median(np.linalg.norm(span, axis=-1)))
-    low, high = BODY
-    if low <= extent <= high:
-        return [Finding("ok", f"{what}: metres (a body spans {extent:.2f})")]
-    if low * 1e3 <= extent <= high * 1e3:
-        unit, advice, option = "looks like millimetres", "divide by 1000", "--units mm"
-    elif low * 1e2 <= extent <= high * 1e2:
-        unit, advice, option = "looks like centimetres", "divide by 100", "--units cm"
-    else:
-        unit, advice, option = "no unit of length fits a person", "", "--units UNIT"
-    said = f"{what}: {unit}: a body spans {extent:.4g}, expected {low} to {high} metres"
-    return [Finding("wrong", said, advice, option)]
+    return float(np.median(np.linalg.norm(span, axis=-1)))
+
+
+def units_of(extent: float) -> list[tuple[str, str, float]]:
+    """Up to two units, nearest first, in which a person who spans so much would be one: name, option and metres."""
+    fits = [each for each in UNITS if TALL / UNLIKE < extent * each[2] <= BODY[1]]
+    return sorted(fits, key=lambda each: abs(np.log(extent * each[2] / TALL)))[:2]
 
 
 def _norms(vectors: NDArray[Any]) -> NDArray[np.float64]:

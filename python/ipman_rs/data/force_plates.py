@@ -32,7 +32,7 @@ from .c3d_format import several
 from .check import Finding, demanded, size_of_body
 from .frames import DataSet, Frames
 from .joined import Joined
-from .tracks import METRES, TO_Y_UP, seen_of
+from .tracks import METRES, TO_Y_UP, not_given, seen_of
 from .units import metres, newton_metres, newtons
 
 NAME = "force-plates"
@@ -169,6 +169,7 @@ def _usable(found: c3d.Recording, used: int) -> tuple[list[_Plate], tuple[str, .
     """The plates that can be computed, and what is wrong with the others. ValueError if it is something with each."""
     plates, wrong = [], []
     scale, notes = _plates_unit(found)
+    notes = (*(note for note in found.notes if note == not_given(found.unit)), *notes)
     for index in range(min(used, MOST)):
         try:
             plate = _Plate.of(found, index, scale)
@@ -403,7 +404,7 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
             found += [Finding("odd", f"{file.name}: {note}") for note in (*content.notes, *own.notes, *said)]
             found += _outputs(file, content)
             found += sequences.told(file.name, open(file)[:])
-            found += _loads(file)
+            found += _loads(file, content.notes)
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
     return found
@@ -437,12 +438,13 @@ def standing(what: str, markers: Array, seen: NDArray[np.bool_], up: str) -> lis
     return [Finding("wrong", said, "or does this person lie?", f"--up {axis}")]
 
 
-def _loads(file: Path) -> list[Finding]:
+def _loads(file: Path, said: Sequence[str]) -> list[Finding]:
+    """What the plates measured; of the notes those that were not `said` of the points."""
     try:
         plates = read(file)
     except ValueError as error:
         return [Finding("missing", str(error))]
-    found = [Finding("odd", f"{file.name}: {note}") for note in plates.notes]
+    found = [Finding("odd", f"{file.name}: {note}") for note in plates.notes if note not in said]
     heaviest = float(np.nan_to_num(plates.loads).sum(axis=1).max())
     said = f"{file.name}: {plates.forces.shape[1]} force plates, together up to {heaviest:.0f} N"
     return [*found, Finding("ok", said) if heaviest > 200 else Finding("missing", said, "nobody stands on them")]

@@ -19,15 +19,19 @@ from ipman_rs.template import BodyTemplate
 from .check import AXES, BODY, SAMPLE, WORLD, Finding, size_of_body, upright
 
 MASS = (1.0, 650.0)  # kg: the heaviest person known weighed 635
-USUAL_MASS = (2.5, 250.0)  # kg
+USUAL_MASS = (1.8, 250.0)  # kg
+# kg/m³, mass by the cubed diagonal of the body's box: 5 with arms and legs spread, 12 standing, 65 curled up.
+BUILD, USUAL_BUILD = (1.0, 400.0), (2.5, 150.0)
 MARKER_ERROR = 0.1  # m in the mean: with more, the body is not the one that the markers were on
 USUAL_MARKER_ERROR = 0.03
 USUAL_RATE = (5.0, 2000.0)  # frames a second
 USUAL_SPEED = 15.0  # m/s: nobody runs so fast
 USUAL_HEIGHT = 10.0  # m from the origin of the world, up or down
 SMALLEST_TURN = 0.12  # rad, 7 degrees: the largest turn in a pose of a person is larger
-LIES = 0.4  # of its length: a body whose height is less
-NEAR = 0.15  # m: what is within it of the lowest point can carry the body
+LIES = 0.46  # of its length: a body whose height is less
+UPRIGHT = 0.6  # cosine: where heads are from feet and torsos of people who stand, squat, kneel or sit, it is more
+CARRIES = 0.06  # m: hands and feet within it of the lowest point carry the body
+NEAR = 0.15  # m: a hand within it of the floor may carry somebody who stands on the head
 
 SURE = 0.5  # confidence of a keypoint
 FEWEST_POINTS = 4  # of a person in an image that say something about them
@@ -73,7 +77,7 @@ def bodies(vertices: Array, template: BodyTemplate, normal: Array, *, up_is_said
     if found[0].level == "wrong":
         return found
     found += _sizes(vertices)
-    away = _far(vertices) or _height(vertices, normal)
+    away = far("vertices", vertices.mean(axis=1)) or _height(vertices, normal)
     if up_is_said:
         return found + away
     return found + away + (_stance(vertices, template, normal) or _shape(vertices, template, normal))
@@ -95,12 +99,13 @@ def evenly(count: int, most: int = SAMPLE) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
 
 
-def _far(vertices: Array) -> list[Finding]:
-    """Of bodies of a person's size whose places cannot be metres of the same world."""
-    away = float(np.median(np.linalg.norm(vertices.mean(axis=1), axis=-1)))
+def far(what: str, places: Array) -> list[Finding]:
+    """Whether people of a person's size at places (T, 3) m can be in a world of metres."""
+    away = np.linalg.norm(places, axis=-1)
+    away = float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 0.0
     if away <= WORLD:
         return []
-    said = f"vertices: bodies of a person's size, {away:.4g} m from the origin of their world, expected up to {WORLD:g}"
+    said = f"{what}: bodies of a person's size, {away:.4g} m from the origin of their world, expected up to {WORLD:g}"
     return [Finding("wrong", said, "are their places in another unit, or those of a map? Put the origin near them")]
 
 
@@ -110,30 +115,42 @@ def _height(vertices: Array, normal: Array) -> list[Finding]:
     if abs(height) <= USUAL_HEIGHT:
         return []
     side = "above" if height > 0 else "below"
-    return [Finding("odd", f"vertices: {abs(height):.4g} m {side} the origin of their world", option="--units cm")]
+    said = f"vertices: {abs(height):.4g} m {side} the origin of their world"
+    return [Finding("odd", said, "is the unit of their places another (--units), or their origin?")]
 
 
 def _stance(vertices: Array, template: BodyTemplate, normal: Array) -> list[Finding]:
-    """Of bodies whose parts have names: where the head is from the lower legs."""
-    points = {word: _of_parts(template, word) for word in ("head", "lower_leg", "forearm", "torso")}
+    """Of bodies whose parts have names: where the head is from the lower legs and from the torso, together."""
+    limbs = ("left_forearm", "right_forearm", "left_lower_leg", "right_lower_leg")
+    points = {word: _of_parts(template, word) for word in ("head", "torso", *limbs)}
     if not all(len(index) for index in points.values()):
         return []
-    ways = vertices[:, points["head"]].mean(axis=1) - vertices[:, points["lower_leg"]].mean(axis=1)
+    head, torso = (vertices[:, points[word]].mean(axis=1) for word in ("head", "torso"))
+    legs = vertices[:, np.concatenate([points["left_lower_leg"], points["right_lower_leg"]])].mean(axis=1)
+    ways = _unit(_unit(head - legs) + _unit(head - torso))
     ground = Ground(normal)
     heights = vertices @ ground.normal
     low = {word: heights[:, index].min(axis=1) - heights.min(axis=1) for word, index in points.items()}
-    on_hands_and_feet = (np.maximum(low["forearm"], low["lower_leg"]) < NEAR) & (low["torso"] > NEAR)
+    on_hands_and_feet = (np.max([low[limb] for limb in limbs], axis=0) < CARRIES) & (low["torso"] > CARRIES)
+    ways, up = ways[~on_hands_and_feet], (ways @ ground.normal)[~on_hands_and_feet]
+    if not len(up):
+        return [Finding("ok", "bodies: on hands and feet")]
+    axis = f"--up {_axis(_unit(ways.mean(axis=0)))}"
     if len(vertices) > 1:
-        return upright("bodies", ways[~on_hands_and_feet], ground) or [Finding("ok", "bodies: upright and not")]
-    way = ways[0] / np.linalg.norm(ways[0])
-    axis = _axis(way)
-    if way @ ground.normal < -0.5:
-        if way @ ground.normal < -0.8 and low["head"][0] < 1e-3 and low["forearm"][0] > NEAR:
-            return [Finding("wrong", "stands on its head, with its feet in the air", option=f"--up {axis}")]
-        return [Finding("odd", "its head is below its feet", option=f"--up {axis}")]
-    if abs(way @ ground.normal) < 0.35 and not on_hands_and_feet[0]:
-        return [Finding("odd", "lies: its head is beside its feet", option=f"--up {axis}")]
+        said = f"bodies: heads are above feet in {(up > UPRIGHT).sum()} of {len(up)}"
+        return upright("bodies", ways, ground) or [Finding("ok" if up.mean() > 0.5 else "odd", said, option=axis)]
+    if up[0] < -0.5:
+        if up[0] < -0.8 and low["head"][0] < 1e-3 and min(low[limb][0] for limb in limbs[:2]) > NEAR:
+            return [Finding("wrong", "stands on its head, with its feet in the air", option=axis)]
+        return [Finding("odd", "its head is below its feet", option=axis)]
+    if up[0] < UPRIGHT:
+        return [Finding("odd", "lies: its head is beside its feet", option=axis)]
     return [Finding("ok", "bodies: heads are above feet")]
+
+
+def _unit(ways: Array) -> Array:
+    length = np.linalg.norm(ways, axis=-1, keepdims=True)
+    return ways / np.where(length > 0, length, 1.0)
 
 
 def _shape(vertices: Array, template: BodyTemplate, normal: Array) -> list[Finding]:
@@ -173,15 +190,30 @@ def _axis(way: Array) -> str:
     return AXES[int(np.concatenate([way, -way]).argmax())].lstrip("+")
 
 
-def mass(kilograms: float) -> list[Finding]:
-    """Whether a body's mass can be a person's."""
-    if not np.isfinite(kilograms) or USUAL_MASS[0] <= kilograms <= USUAL_MASS[1]:
+def mass(kilograms: float, span: float | None = None) -> list[Finding]:
+    """Whether a body's mass can be a person's; `span` in metres is the diagonal of its box, where it is known."""
+    if not np.isfinite(kilograms):
         return []
     if kilograms <= 0:
         said = f"a body of {kilograms:.4g} kg"
         return [Finding("wrong", said, "is its surface closed, and do its faces point outwards?")]
-    level = "odd" if MASS[0] <= kilograms <= MASS[1] else "wrong"
-    return [Finding(level, f"a person of {kilograms:.4g} kg", option="--units UNIT")]
+    said = f"a person of {kilograms:.4g} kg"
+    if not USUAL_MASS[0] <= kilograms <= USUAL_MASS[1]:
+        level = "odd" if MASS[0] <= kilograms <= MASS[1] else "wrong"
+        return [Finding(level, said, option="--units UNIT")]
+    build = 10.0 if span is None else kilograms / span**3
+    if USUAL_BUILD[0] <= build <= USUAL_BUILD[1]:
+        return []
+    level = "odd" if BUILD[0] <= build <= BUILD[1] else "wrong"
+    return [Finding(level, f"{said} who spans {span:.2f} m", "are shape and units right, left and right not swapped?")]
+
+
+def masses(kilograms: Array, vertices: Array) -> list[Finding]:
+    """`mass` of bodies (T,) kg with vertices (T, V, 3) m, in the median."""
+    known = kilograms[np.isfinite(kilograms)]
+    spans = np.linalg.norm(np.ptp(np.asarray(vertices, np.float64), axis=1), axis=-1)
+    spans = spans[np.isfinite(spans)]
+    return mass(float(np.median(known)), float(np.median(spans)) if len(spans) else None) if len(known) else []
 
 
 def rate(hertz: float) -> list[Finding]:

@@ -87,21 +87,22 @@ def storage(path: str | os.PathLike[str]) -> Storage:
     if labels[0].lower() != "time" or twice:
         told = f"the column {twice!r} twice" if twice else f"{labels[0]!r} first"
         raise ValueError(f"{path}: line {rows[0][0]}: expected the time first and different names, got {told}")
-    numbers = _numbers(str(path), table, len(labels))
+    cut = len(table) > 1 and _is_cut(table[-1][1], len(labels))
+    whole = table[:-1] if cut else table
+    numbers, spread = _numbers(str(path), whole, len(labels)), list[str]()
     if not len(numbers):
         raise ValueError(f"{path}: expected rows of numbers, got none")
-    if not (np.diff(numbers[:, 0]) > 0).all():
-        row = int((~(np.diff(numbers[:, 0]) > 0)).argmax()) + 1
-        raise ValueError(f"{path}: line {table[row][0]}: expected times that increase, got {numbers[row, 0]:g} s")
+    times = text_file.seconds(numbers[:, 0], [number for number, _ in whole], str(path), spread)
     said = _said(header)
     notes = [
         f"its header says {said[name]} {name}, it has {got}"
         for name, got in (("rows", len(table)), ("columns", len(labels)))
         if name in said and said[name] != got
     ]
+    notes += [f"the last line, {table[-1][0]}, is cut short and left out: is the file complete?"] if cut else []
     degrees = {"yes": True, "no": False}.get(str(said.get("indegrees", "")).lower())
     columns = dict(zip(labels[1:], numbers.T[1:], strict=True))
-    return Storage(numbers[:, 0], columns, degrees, str(path), tuple(notes))
+    return Storage(times, columns, degrees, str(path), (*notes, *spread))
 
 
 def _labels(line: str, rows: list[tuple[int, list[str]]]) -> list[str]:
@@ -118,6 +119,17 @@ def _twice(labels: list[str]) -> str | None:
             return label
         earlier.add(label)
     return None
+
+
+def _is_cut(fields: list[str], width: int) -> bool:
+    """Whether a last row ends before its last column, or within the number there."""
+    if len(fields) != width:
+        return len(fields) < width
+    try:
+        text_file.number(fields[-1])
+    except ValueError:
+        return True
+    return False
 
 
 def _numbers(path: str, table: list[tuple[int, list[str]]], width: int) -> Array:
@@ -348,7 +360,8 @@ def _frames(
 ) -> Frames:
     joints = np.full((len(tracks), len(markers), 3), np.nan)
     seen = np.where(tracks.confidence[..., None] > 0, tracks.points, np.nan)
-    joints[:, [markers.index(marker) for marker in tracks.names]] = seen
+    column = {marker: index for index, marker in enumerate(markers)}
+    joints[:, [column[marker] for marker in tracks.names]] = seen
     demand(tracks.source, size_of_body("joints", joints))
     at = None if forces is None else plates(storage(forces), loads=loads).at(tracks.times)
     lasted = float(tracks.times[-1] - tracks.times[0])  # the times of single samples are often rounded to milliseconds

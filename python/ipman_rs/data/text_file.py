@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ipman_rs.files import read_bytes
 
 MAX_BYTES = 1 << 31  # an hour of sixty markers at 250 Hz has a third of that
+UNEVEN = 0.02  # of a recording's length: that far equal times may be from evenly spaced ones
 NOT_A_NUMBER = re.compile(
     r"[-+]?(?:s|q)?nan(?:\(\w*\))?|[-+]?1\.#(?:ind|qnan|snan|nan)\d*|n/?a|-+|null|none|missing", re.IGNORECASE
 )
@@ -55,3 +56,31 @@ def table(rows: Sequence[Sequence[str]], places: Sequence[str]) -> NDArray[np.fl
             except ValueError as error:
                 raise ValueError(f"{place}: expected numbers: {error}") from None
         return np.array(numbers, np.float64)
+
+
+def seconds(times: NDArray[np.float64], lines: Sequence[int], path: str, notes: list[str]) -> NDArray[np.float64]:
+    """Times (T,) of a table's rows, whose lines have these numbers. Equal ones, as rounded ones are, are spread evenly.
+
+    ValueError, naming the file and line, for a row without a time, for times that go back, and for equal ones among
+    others that are not even.
+    """
+    if np.isnan(times).any():
+        line = lines[int(np.isnan(times).argmax())]
+        raise ValueError(f"{path}: line {line}: expected seconds in the column Time, it is blank or no number")
+    steps = np.diff(times)
+    if not np.isfinite(times).all() or (steps < 0).any():
+        row = int((~np.isfinite(times)).argmax() if not np.isfinite(times).all() else (steps < 0).argmax() + 1)
+        raise ValueError(f"{path}: line {lines[row]}: expected times that increase, got {times[row]:g} s")
+    if not (steps == 0).any():
+        return times
+    if times[-1] == times[0]:
+        raise ValueError(f"{path}: line {lines[1]}: expected times that increase, all are {times[0]:g} s")
+    even = np.linspace(times[0], times[-1], len(times))
+    if np.abs(even - times).max() > max(2 * steps[steps > 0].min(), UNEVEN * (times[-1] - times[0])):
+        row = int((steps == 0).argmax()) + 1
+        raise ValueError(
+            f"{path}: line {lines[row]}: expected times that increase, got {times[row]:g} s again, and the others are "
+            f"not evenly spaced"
+        )
+    notes.append("some times are equal: they are taken as evenly spaced from the first to the last")
+    return even

@@ -22,15 +22,20 @@ TO_Y_UP = {
     "z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
 }
 LARGEST = 20.0  # nobody's markers are farther apart, in metres; in millimetres everybody's are
+BREAK = 2.5  # times the usual step between two samples; rounded times differ by up to twice of it
 FARTHEST = 1e7  # in any unit: programs write a number beyond it for what was not seen, NDI's -3.697314e28
 # 999, 9999.99, 99999.9 …: what programs write for a marker that was not seen.
-NINES = np.array([10.0**whole - 10.0**-part for whole in range(3, 7) for part in range(8 - whole)])
+NINES = np.array([10.0**whole - 10.0**-part for whole in range(3, 8) for part in range(8 - whole)])
+MORE_NINES = np.array([float("9" * whole + "." + "9" * part) for whole in range(3, 8) for part in range(8 - whole, 9)])
 WORDS = 32767.0, 32768.0, 2147483648.0  # the last integers, which mean the same
 OFTEN = 3  # samples in which a place stands for what was not seen
 MOST = 200_000  # repeated places that are compared
 CANDIDATES = 3  # of them that occur the most
-FEWEST_OF_A_PERSON = 3  # markers of one name before the colon: a ball or a wand has fewer
+FEWEST_OF_A_PERSON = 6  # markers of one name before the colon: a ball, a bat or a wand has fewer
 NAMELESS = re.compile(r"\*\d*|(?:unlabell?ed|unnamed|uname)[ _*-]*\d*", re.IGNORECASE)
+
+
+NOBODY = '"" (without a name before a colon)'
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,17 +61,32 @@ class Tracks:
 
     def select(self, names: Sequence[str]) -> Tracks:
         """These markers, in this order. ValueError for one that was not recorded."""
-        missing = [name for name in names if name not in self.names]
+        column = {name: index for index, name in enumerate(self.names)}
+        missing = [name for name in names if name not in column]
         if missing:
             raise ValueError(f"names: {self.source} has no marker {missing[0]!r}; it has {', '.join(self.names)}")
-        columns = [self.names.index(name) for name in names]
+        columns = [column[name] for name in names]
         return replace(self, names=tuple(names), points=self.points[:, columns], confidence=self.confidence[:, columns])
 
 
 def rate_of(times: Array) -> float:
-    """Samples a second, by the first time and the last: single ones are often rounded to milliseconds. 0 of one."""
+    """Samples a second, by the first time and the last: single ones are often rounded to milliseconds. 0 of one.
+
+    Time for which nothing was recorded is left out (`breaks`).
+    """
     lasted = float(times[-1] - times[0]) if len(times) > 1 else 0.0
-    return (len(times) - 1) / lasted if lasted > 0 else 0.0
+    if not lasted > 0:
+        return 0.0
+    steps, within = np.diff(times), ~breaks(times)
+    if within.all():
+        return (len(times) - 1) / lasted
+    return float(within.sum() / steps[within].sum())
+
+
+def breaks(times: Array) -> NDArray[np.bool_]:
+    """Which of the steps (T - 1,) between times are far longer than the others: the recording was interrupted."""
+    steps = np.diff(times)
+    return steps > BREAK * np.median(steps) if len(steps) > 2 else np.zeros(len(steps), bool)
 
 
 def tracks(
@@ -99,8 +119,18 @@ def tracks(
         raise ValueError(f"{source}: expected coordinates, all are missing")
     scale = _scale(unit, points[seen], source)
     turned = np.where(seen[..., None], points, 0.0) * scale @ TO_Y_UP[up].T
-    told = (*notes, *said, *chosen.notes)
+    guessed = [not_given(likely_unit(points[seen]))] if unit == "" else []
+    told = (*notes, *said, *chosen.notes, *guessed, *_gaps(times))
     return Tracks(chosen.names, turned, seen.astype(float), np.asarray(times, float), source, told, up, scale)
+
+
+def _gaps(times: Array) -> list[str]:
+    rows = np.flatnonzero(breaks(np.asarray(times, float)))
+    places = [f"t = {times[row]:.4g} s (of {times[row + 1] - times[row]:.3g} s)" for row in rows]
+    if not places:
+        return []
+    what = "a gap" if len(places) == 1 else f"{len(places)} gaps"
+    return [f"its times have {what}, at {_some(places, 3)}: the frames before and after are taken as neighbours"]
 
 
 def turned(tracks: Tracks, normal: Sequence[float]) -> Tracks:
@@ -121,7 +151,8 @@ def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], lis
     with np.errstate(invalid="ignore"):
         size = np.abs(points)
         nines = (size >= 999) & (size < FARTHEST)
-        nines[nines] = np.isclose(size[nines][:, None], NINES, rtol=6e-8, atol=0).any(-1)  # half of float32's spacing
+        large = size[nines]  # within half of float32's spacing, or with digits that only text has
+        nines[nines] = np.isclose(large[:, None], NINES, rtol=6e-8, atol=0).any(-1) | np.isin(large, MORE_NINES)
         far = (size >= FARTHEST).any(-1)
         alike = (size == size[..., :1]).all(-1)
     stands = far | (nines & (size >= 9999)).any(-1) | (alike & (nines.all(-1) | np.isin(size[..., 0], WORDS)))
@@ -187,6 +218,8 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     """The markers by name, without the subject that stands before a colon ("S01:LASI").
 
     Left out, and named: points without a name, the shorter of two markers of one name, other people than `subject`.
+    Two subjects are two people where both have a marker of one name, or both have FEWEST markers. `subject` "" is who
+    has none.
     ValueError for two people of whom none is chosen, and for an unknown one.
     """
     notes = []
@@ -196,12 +229,18 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     split = {column: names[column].rpartition(":") for column in known}
     people = dict.fromkeys(split[column][0].strip() for column in known)
     chosen = _person([*people], split, seen, source, subject)
+    joined = [*dict.fromkeys(w for c, (who, _, _) in split.items() if (w := who.strip()) and seen[:, c].any())]
+    if chosen is None and len(joined) > 1:
+        notes.append(f"the markers of {_some(joined)} are taken as one person's (subject, --subject: those of one)")
     if chosen is not None:
-        others = [column for column in known if split[column][0].strip() not in ("", chosen)]
-        known = [column for column in known if column not in set(others)]
+        own = {split[column][2].strip() for column in known if split[column][0].strip() == chosen}
+        nobodys = {split[column][2].strip() for column in known if not split[column][0].strip()}
+        with_him = {chosen} if own & nobodys else {"", chosen}  # names without a person are another one's, or his too
+        others = [column for column in known if split[column][0].strip() not in with_him]
+        known = [column for column in known if split[column][0].strip() in with_him]
         if others:
-            of = ", ".join(dict.fromkeys(split[column][0].strip() for column in others))
-            notes.append(f"the markers of {chosen} are taken, those of {of} left out ({len(others)})")
+            of = ", ".join(dict.fromkeys(split[column][0].strip() or NOBODY for column in others))
+            notes.append(f"the markers of {chosen or NOBODY} are taken, those of {of} left out ({len(others)})")
     best: dict[str, int] = {}
     twice = []
     for column in known:
@@ -225,25 +264,38 @@ def _person(
 ) -> str | None:
     """The chosen subject; None where all the markers can be of one person."""
     if subject is not None:
-        known = {person.lower(): person for person in people if person}
-        if subject.strip().rstrip(":").lower() not in known:
-            expected = f"one of {', '.join(known.values())}" if known else "none, for no marker has one"
+        known = {person.lower(): person for person in people}
+        wanted = subject.strip().rstrip(":").lower()
+        if wanted not in known or not any(people):
+            have = [person or NOBODY for person in people]
+            expected = f"one of {', '.join(have)}" if any(people) else "none, for no marker has one"
             raise ValueError(f"{source}: subject: expected {expected}, got {subject!r}")
-        return known[subject.strip().rstrip(":").lower()]
-    markers = {person: {split[c][2].strip() for c in split if split[c][0].strip() == person} for person in people}
-    shown = [p for p in people if any(seen[:, c].any() for c in split if split[c][0].strip() == p)]
-    rivals = [p for p in shown if p and any(markers[p] & markers[other] for other in shown if other and other != p)]
+        return known[wanted]
+    markers: dict[str, set[str]] = {person: set() for person in people}
+    shown, of_marker = dict.fromkeys(people, False), dict[str, list[str]]()
+    there = seen.any(axis=0)
+    for column, (person, _, marker) in split.items():
+        person, marker = person.strip(), marker.strip()
+        if marker not in markers[person]:
+            of_marker.setdefault(marker, []).append(person)
+        markers[person].add(marker)
+        shown[person] |= bool(there[column])
+    shared = [[person for person in each if shown[person]] for each in of_marker.values() if len(each) > 1]
+    rivals = {person for each in shared if len(each) > 1 for person in each}
     if not rivals:
-        large = [p for p in shown if p and len(markers[p]) >= FEWEST_OF_A_PERSON]
-        rivals = large if len(large) > 1 else []
+        large = {p for p in people if p and shown[p] and len(markers[p]) >= FEWEST_OF_A_PERSON}
+        rivals = large if len(large) > 1 else rivals
     if not rivals:
-        hidden = [p for p in people if p and p not in shown]
-        return next((p for p in shown if p and any(markers[p] & markers[other] for other in hidden)), None)
-    of = " and ".join(f"{person} ({_count(len(markers[person]), 'marker')})" for person in rivals)
-    many = "two" if len(rivals) == 2 else len(rivals)
-    raise ValueError(
-        f"{source}: {many} people in it, {of}: say which one (subject={rivals[0]!r}, --subject {rivals[0]})"
-    )
+        hidden = {person for each in of_marker.values() if not all(map(shown.get, each)) for person in each}
+        return next((person for person in people if person and shown[person] and person in hidden), None)
+    first, *more = [person for person in people if person in rivals]
+    of = [f"{person or NOBODY} ({_count(len(markers[person]), 'marker')})" for person in [first, *more]]
+    one = first or more[0]
+    raise ValueError(f"{source}: two people in it, {_and(of)}: say which one (subject={one!r}, --subject {one})")
+
+
+def _and(people: Sequence[str], most: int = 4) -> str:
+    return " and ".join([*people[:most], *([f"{len(people) - most} more"] if len(people) > most else [])])
 
 
 def _scale(unit: str | float, seen: Array, source: str) -> float:
@@ -255,7 +307,17 @@ def _scale(unit: str | float, seen: Array, source: str) -> float:
         if scale is None:
             raise ValueError(f"{source}: units: expected one of {', '.join(METRES)}, got {unit!r}")
         return scale
-    return METRES["mm"] if np.ptp(seen, axis=0).max() > LARGEST else METRES["m"]
+    return METRES[likely_unit(seen)]
+
+
+def likely_unit(points: Array) -> str:
+    """The unit of points (n, 3) of a person, where a file does not say it: nobody's are LARGEST metres apart."""
+    return "mm" if np.ptp(points, axis=0).max() > LARGEST else "m"
+
+
+def not_given(unit: str) -> str:
+    """The note on a unit that a file does not say."""
+    return f"its unit of length is not given: taken as {unit} (--units)"
 
 
 def _count(number: int, what: str) -> str:

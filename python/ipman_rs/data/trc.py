@@ -6,6 +6,7 @@ two tabs is a coordinate that was not measured, but tabs that are doubled throug
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,10 @@ from .tracks import Tracks, rate_of, tracks
 
 HEADER = 5  # lines: two of header fields, their values, the markers' names, their axes
 LEAST = 4  # columns of a row: frame, time and something of a marker
+FRAME = re.compile(r"frames?\s*(?:#|no\.?|nr\.?|number)?", re.IGNORECASE)
+TIME = re.compile(r"time\s*[(\[]?\s*(?:s|secs?|seconds)?\s*[)\]]?", re.IGNORECASE)
+HEADINGS = re.compile(rf"\s*{FRAME.pattern}(?:\s+{TIME.pattern}(?=\s)|(?=\s))|\s*{TIME.pattern}(?=\s)", re.IGNORECASE)
+X_AXIS = re.compile(r"x\d+", re.IGNORECASE)
 UNLIKE = 0.01  # of the rate: that far the header's may be from the times'
 
 
@@ -40,9 +45,8 @@ def read(
     head = next((row for row, line in enumerate(lines[:20]) if line.strip().lower().startswith("frame")), 3)
     header, notes = _header(lines[1:head]), []
     rows = [(number, line) for number, line in enumerate(lines[head + 1 :], head + 2) if line.strip()]
-    if rows and not _is_number(rows[0][1].split()[0]):  # the axes: X1, Y1, Z1, …
-        rows.pop(0)
-    names, table = _table_of(rows, lines[head], header, source)
+    axes = rows.pop(0)[1] if rows and not _is_number(rows[0][1].split()[0]) else ""  # X1, Y1, Z1, …
+    names, table = _table_of(rows, _names(lines[head], axes), header, source)
     if table.markers > len(names):
         more = table.markers - len(names)
         notes.append(f"{more} {'marker' if more == 1 else 'markers'} without a name behind the named ones left out")
@@ -50,7 +54,9 @@ def read(
         notes.append(f"{table.short} rows end before the last marker; what they lack is taken as not seen")
     numbers = text_file.table(table.rows, [f"{source}: line {number}" for number in table.lines])
     numbers = numbers.reshape(len(table.rows), 1 + 3 * table.markers)
-    times = _times(numbers[:, 0], table.lines, source, notes) if rate is None else np.arange(len(numbers)) / rate
+    times = (
+        text_file.seconds(numbers[:, 0], table.lines, source, notes) if rate is None else np.arange(len(numbers)) / rate
+    )
     points = numbers[:, 1 : 1 + 3 * len(names)].reshape(len(times), len(names), 3)
     _compare(header, times, notes)
     said = header.get("units", "") if unit is None else unit
@@ -81,20 +87,35 @@ def _is_number(text: str) -> bool:
         return False
 
 
-def _names(line: str) -> tuple[list[str], list[str]]:
-    """The markers' names: by the places of their columns, "" of one without a name; and those that are not blank."""
+def _names(line: str, axes: str) -> tuple[list[str], list[str]]:
+    """The markers' names: by the places of their columns, "" of one without a name; and those that are not blank.
+
+    `axes`: the line below, "" of a file without one, whose X1, X2, … stand in the columns in which markers begin.
+    """
     cells = [cell.strip() for cell in line.rstrip().split("\t")]
-    if len([cell for cell in cells if cell]) < 3:
-        words = line.split()[2:]
+    begins = [place for place, cell in enumerate(axes.rstrip().split("\t")) if X_AXIS.fullmatch(cell.strip())]
+    filled = [place for place, cell in enumerate(cells) if cell]
+    if begins and {place for place in filled if place >= begins[0]} <= set(begins) and len(cells) > begins[0]:
+        placed = [cells[place] for place in begins if place < len(cells)]
+        return placed, [name for name in placed if name]
+    if len(filled) < 3:
+        words = HEADINGS.sub("", line).split() if HEADINGS.match(line) else line.split()[2:]
         return words, words
-    second = [place for place, cell in enumerate(cells) if cell][1]  # Time
-    places = cells[second + 1 :]
-    filled = [cell for cell in places if cell]
-    while places and not places[0]:  # doubled tabs before the first name
-        places.pop(0)
+    filled = filled[_headings([cells[place] for place in filled], filled, len(begins)) :]
+    places = cells[filled[0] :]
+    names = [cell for cell in places if cell]
     if any(places[place] for place in range(len(places)) if place % 3):  # a column a name, or tabs as they came
-        return filled, filled
-    return places[::3], filled
+        return names, names
+    return places[::3], names
+
+
+def _headings(cells: list[str], places: list[int], markers: int) -> int:
+    """How many of a line's cells, which stand at these places, are Frame# and Time; of `markers`, 0 if unknown."""
+    frame = int(FRAME.fullmatch(cells[0]) is not None)
+    known = frame + (TIME.fullmatch(cells[frame]) is not None)
+    if markers:  # in other words
+        return max(known, min(2, len(cells) - markers))
+    return max(known, sum(place < 2 for place in places[:2]))
 
 
 @dataclass(frozen=True)
@@ -108,10 +129,10 @@ class _Table:
 
 
 def _table_of(
-    rows: Sequence[tuple[int, str]], line: str, header: dict[str, str], source: str
+    rows: Sequence[tuple[int, str]], names: tuple[list[str], list[str]], header: dict[str, str], source: str
 ) -> tuple[list[str], _Table]:
-    """The names and the rows that go together."""
-    by_place, filled = _names(line)
+    """The names, of two readings of them, and the rows that go together."""
+    by_place, filled = names
     declared = header.get("nummarkers", "")
     said = int(float(declared)) if _is_number(declared) else None
     try:
@@ -143,9 +164,12 @@ def _table(rows: Sequence[tuple[int, str]], markers: int, said: int | None, sour
 def _split(lines: Sequence[str], width: int) -> tuple[list[list[str]], bool]:
     """The columns of each row, and whether single tabs part them, or blanks: tabs doubled, mixed with blanks, missing.
 
-    Tabs are believed where the empty columns between them are whole markers that were not seen.
+    Tabs are believed where the empty columns between them are whole markers that were not seen, or every second one:
+    those are doubled, for no row is without its time.
     """
-    by_tabs = [_trimmed(line.rstrip("\r\n").split("\t"), width) for line in lines]
+    cells = [line.rstrip("\r\n").split("\t") for line in lines]
+    doubled = all(len(row) > 1 and not "".join(row[1::2]).strip() for row in cells)
+    by_tabs = [_trimmed(row[::2] if doubled else row, width) for row in cells]
     widest = max(map(len, by_tabs), default=width)
     fits = all(len(cells) >= LEAST for cells in by_tabs) and (widest <= width or (widest - width) % 3 == 0)
     if fits and all(_whole(cells) for cells in by_tabs):
@@ -169,23 +193,6 @@ def _whole(cells: list[str]) -> bool:
     """Whether no marker has some of its coordinates only."""
     empty = [not cell.strip() for cell in cells[2:]]
     return all(len(set(empty[at : at + 3])) == 1 for at in range(0, len(empty), 3))
-
-
-def _times(times: np.ndarray, lines: Sequence[int], source: str, notes: list[str]) -> np.ndarray:
-    """Seconds. ValueError for a row without a time and for times that go back; equal ones are spread evenly."""
-    if np.isnan(times).any():
-        line = lines[int(np.isnan(times).argmax())]
-        raise ValueError(f"{source}: line {line}: expected seconds in the column Time, it is blank or no number")
-    steps = np.diff(times)
-    if not np.isfinite(times).all() or (steps < 0).any():
-        row = int((~np.isfinite(times)).argmax() if not np.isfinite(times).all() else (steps < 0).argmax() + 1)
-        raise ValueError(f"{source}: line {lines[row]}: expected times that increase, got {times[row]:g} s")
-    if not (steps == 0).any():
-        return times
-    if times[-1] == times[0]:
-        raise ValueError(f"{source}: line {lines[1]}: expected times that increase, all are {times[0]:g} s")
-    notes.append("some times are equal: they are taken as evenly spaced from the first to the last")
-    return np.linspace(times[0], times[-1], len(times))
 
 
 def _compare(header: dict[str, str], times: np.ndarray, notes: list[str]) -> None:

@@ -11,7 +11,6 @@ from typing import Any
 from .regular import read_bytes
 
 MAX_BYTES = 2 << 30  # COCO-WholeBody's annotations have a half of that
-DIGITS = 400  # Python itself counts no more than 4300
 _LONG = re.compile(r"\d{300}")
 _SURROGATE = re.compile(r"\\[uU][dD][89a-fA-F]")
 
@@ -50,6 +49,6 @@ def parse_json(data: bytes) -> Any:
 
 def _whole(digits: str) -> int:
     """A whole number, if a float can hold it."""
-    if len(digits) > DIGITS or not abs(number := int(digits)) <= sys.float_info.max:
+    if len(digits) > 310 or not abs(number := int(digits)) <= sys.float_info.max:
         raise ValueError(f"a number of {len(digits)} digits, more than any float has")
     return number

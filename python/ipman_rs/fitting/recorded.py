@@ -161,7 +161,7 @@ def judged_fit(recorded: Recorded) -> list[Finding]:
     errors = recorded.errors
     known = errors[np.isfinite(errors)]
     found = judge.marker_error(float(known.mean())) if len(known) else []
-    return found + judge.mass(float(np.median(mass)))
+    return found + judge.masses(np.atleast_1d(mass), vertices.numpy())
 
 
 def seen_names(tracks: markers.Tracks) -> tuple[tuple[str, ...], tuple[str, ...]]:

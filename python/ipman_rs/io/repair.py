@@ -17,7 +17,6 @@ Indices = NDArray[np.int64]
 
 WELD = 1e-5  # of the mesh's size: 0.02 mm of a person. Rounding to float32 moves a corner by a hundredth of it.
 SOUP = 2 / 3  # the share of edges with a face on one side only, above which there is no surface
-LARGE = 0.25  # of the largest piece's size: no eye, tooth or shoe is as large
 
 
 @dataclass(frozen=True)
@@ -43,13 +42,7 @@ def repaired(mesh: Mesh) -> Mesh:
     outside = (mesh.faces < 0) | (mesh.faces >= len(mesh.vertices))
     if outside.any():
         raise ValueError(f"a face names vertex {mesh.faces[outside][0]} of {len(mesh.vertices)} (counted from 0)")
-    surface = without_unused(welded(without_repeated(mesh)))
-    pieces = large_pieces(surface)
-    if pieces > 1:
-        surface = surface.noting(
-            f"{pieces} large separate pieces are measured as one body (several people, or clothes over one?)"
-        )
-    return surface
+    return without_unused(welded(without_repeated(mesh)))
 
 
 def without_repeated(mesh: Mesh) -> Mesh:
@@ -190,22 +183,3 @@ def without_unused(mesh: Mesh) -> Mesh:
     loose = text.counted(int((~used).sum()), "vertex", "vertices")
     number = np.where(used, np.cumsum(used) - 1, -1)
     return _renumbered(mesh, np.flatnonzero(used), number).noting(f"{loose} that no face uses left out")
-
-
-def large_pieces(mesh: Mesh) -> int:
-    """How many separate pieces have at least LARGE of the largest one's size."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    if not len(mesh.faces):
-        return 0
-    edges = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2).T
-    links = coo_array((np.ones(edges.shape[1], np.int8), tuple(edges)), shape=(len(mesh.vertices),) * 2)
-    count, group = connected_components(links, directed=False)
-    if count == 1:
-        return 1
-    order = np.argsort(group, kind="stable")
-    starts = np.searchsorted(group[order], np.arange(count))
-    points = mesh.vertices[order]
-    size = (np.maximum.reduceat(points, starts) - np.minimum.reduceat(points, starts)).max(axis=1)
-    return int((size >= LARGE * size.max()).sum())

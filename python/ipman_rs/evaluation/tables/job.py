@@ -22,18 +22,21 @@ from numpy.typing import NDArray
 from ipman_rs import __version__, data
 from ipman_rs.body import safe_npz
 from ipman_rs.data import check, judge
-from ipman_rs.data.frames import DataSet, Frames
+from ipman_rs.data.frames import DataSet, Frames, Rows
 from ipman_rs.files import being_written, read_json, write_whole
 from ipman_rs.ground import Ground
 from ipman_rs.volume import mass_properties
 
+from ..procrustes import similarity
 from . import predictions as predicted
 from .columns import Columns, columns
-from .joints import Definition, Regressors, define
+from .joints import Definition, Regressors, compared, define
 from .models import Models
 
 PIECE = 4096  # frames: some seconds of work, and small in memory
 WEIGHED = 16  # bodies
+TURNED = 60.0  # degrees: a smaller turn is an error of the estimate
+ALIKE = 30.0  # degrees of single people's turns about their mean
 OWN = "own"  # the data set of the user's own files, in the form of predictions
 TRUTH = "truth"  # instead of a file of predictions: the data set's own bodies
 
@@ -183,10 +186,13 @@ class Job:
         another axis than the data set's up."""
         if self.predictions == TRUTH:
             return ()
-        return (
-            *self.estimates.flags,
-            *judge.admit(self.predictions, [*self._axes(), *self._masses(), *self._betas()], self.force),
-        )
+        found = [*(self._axes() or self._turned()), *self._masses(), *self._betas(), *self._of_truth()]
+        return (*self.estimates.flags, *judge.admit(self.predictions, found, self.force))
+
+    def _of_truth(self) -> list[check.Finding]:
+        """What the user's own truth has that no figure is made of."""
+        unused = self.data.unused() if isinstance(self.data, predicted.Predictions) else []
+        return [replace(each, what=f"the truth, {self.source.path}: {each.what}") for each in unused]
 
     def _masses(self) -> list[check.Finding]:
         """Of a few estimated bodies."""
@@ -220,12 +226,44 @@ class Job:
         found = [each for each in check.of_frames(standing) if each.what.startswith("joints: looks like")]
         return [replace(each, advice=self._other_axes, option="") for each in found]
 
+    def _turned(self) -> list[check.Finding]:
+        """Whether the estimated people fit the true ones only when they are turned, as from a camera's axes."""
+        from scipy.spatial.transform import Rotation
+
+        true = self._truth(judge.evenly(len(self.data), WEIGHED))
+        where = self.estimates.index.find(true.names)
+        there = np.flatnonzero(where >= 0)
+        if self.definition is None or not len(there):
+            return []
+        truth, guess = self.bodies.posed(true[there]), self.bodies.posed(self.estimates[where[there]])
+        joints = compared(truth, guess, self.definition, self.joint_regressors)
+        _, matrices, _ = similarity(joints.true, joints.estimated)
+        matrices = matrices[np.isfinite(matrices).all(axis=(1, 2))]
+        if not len(matrices):
+            return []
+        turns = Rotation.from_matrix(matrices)
+        angle = float(np.degrees(np.median(turns.magnitude())))
+        if angle <= TURNED:
+            return []
+        said = f"predicted people are the true ones turned by {angle:.0f} degrees in the median"
+        mean = turns.mean()
+        if np.degrees(np.median((mean.inv() * turns).magnitude())) < ALIKE:
+            axis = mean.as_rotvec() / mean.magnitude()
+            axis *= np.sign(axis[np.abs(axis).argmax()]) if angle > 179 else 1.0  # either way about it is the same
+            said += f", about ({', '.join(f'{number + 0.0:.2g}' for number in axis.round(2))})"
+        advice = f"turn them back if their axes are other ones than the data set's{self._other_frame}"
+        return [check.Finding("odd", said, advice)]
+
     @property
     def _other_axes(self) -> str:
         """What mends predictions in other axes than the data set's."""
+        return f"turn them, or give the file a ground (4,) of its own: normal and height{self._other_frame}"
+
+    @property
+    def _other_frame(self) -> str:
+        """The option of the data set's reader that gives its people in other axes, where it has one."""
         known = () if self.source.name == OWN else inspect.signature(data.module(self.source.name).open).parameters
-        said = "turn them, or give the file a ground (4,) of its own: normal and height"
-        return f"{said}, or --option frame=camera or frame=world" if "frame" in known else said
+        return ", or --option frame=camera or frame=world" if "frame" in known else ""
 
     @cached_property
     def made_of(self) -> dict[str, Any]:
@@ -324,7 +362,7 @@ class Job:
         there = np.flatnonzero(where >= 0)
         return true[there], self.estimates[where[there]], rows.start + there
 
-    def _truth(self, rows: slice) -> Frames:
+    def _truth(self, rows: Rows) -> Frames:
         true = self.data[rows]
         return replace(true, pose=None) if self.without_bodies else true
 

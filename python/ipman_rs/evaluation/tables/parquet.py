@@ -30,14 +30,15 @@ def needed() -> tuple[Any, Any]:
     return pyarrow, pyarrow.parquet
 
 
-def read(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any]]:
-    """The columns of predictions, unpacked into a folder, and what is one for all frames. ValueError if damaged."""
+def read(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any], frozenset[str]]:
+    """The columns of predictions, unpacked into a folder, what is one for all frames, and the names of all columns.
+    ValueError if damaged."""
     from .predictions import FOR_ALL, NUMBERS, TEXT
 
     needed()
     try:
         with _opened(path) as file:
-            known = set(file.schema_arrow.names)
+            known = frozenset(file.schema_arrow.names)
             columns = {name: _unpacked(path, file, name, unpacked) for name in (*TEXT, *NUMBERS) if name in known}
             common = {name: _one(path, file, name) for name in FOR_ALL if name in known and file.metadata.num_rows}
     except Exception as error:  # damaged bytes can fail in any way
@@ -46,7 +47,7 @@ def read(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, A
         if str(error).startswith(f"{path}: "):
             raise
         raise ValueError(f"{path}: not a Parquet file that can be read ({error}); is it complete?") from error
-    return columns, common
+    return columns, common, known
 
 
 @contextmanager

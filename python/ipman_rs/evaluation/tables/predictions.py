@@ -43,6 +43,7 @@ NUMBERS = (
     "pose", "betas", "transl", "vertices", "joints", "ground", "center_of_mass", "center_of_pressure", *LABELS,
 )  # fmt: skip
 POINTS = ("pose", "vertices", "joints")  # (F, n, 3)
+LISTED = 12  # names of arrays
 FOR_ALL = ("body", "joint_names", "frame_rate")
 
 
@@ -66,6 +67,7 @@ class Predictions:
     common: dict[str, Any]  # what is one for all frames
     fingerprint: str  # of the file's bytes
     reading: Reading = Reading()
+    others: tuple[str, ...] = ()  # further arrays of the file, which nothing reads
 
     def __len__(self) -> int:
         return len(self.columns["names"])
@@ -97,7 +99,19 @@ class Predictions:
     def flags(self) -> tuple[str, ...]:
         """What is odd about a sample, in words. ValueError, naming the option that mends it, for what is wrong."""
         found = [each for each in check.of_frames(check.sample(self)) if not each.what.startswith("lowest of")]
-        return judge.admit(self.path, found, self.reading.force)
+        return judge.admit(self.path, [*found, *self.unused()], self.reading.force)
+
+    def unused(self) -> list[check.Finding]:
+        """What of the file no figure is made of."""
+        found = []
+        beside = [name for name in ("pose", "betas", "transl") if name in self.columns or name in self.common]
+        if "vertices" in self.columns and "pose" in beside:
+            what = f"vertices are compared, not the bodies of {', '.join(beside)} beside them"
+            found.append(check.Finding("odd", what, "leave one of the two out"))
+        if self.others:
+            more = f", … ({len(self.others)} arrays)" if len(self.others) > LISTED else ""
+            found.append(check.Finding("odd", f"not used: {', '.join(self.others[:LISTED])}{more}"))
+        return found
 
     @cached_property
     def index(self) -> Names:
@@ -118,10 +132,11 @@ def read(path: str | Path, unpacked: Path, reading: Reading | None = None) -> Pr
     content = fingerprint(path)
     unpacked = unpacked / content[:16]
     if path.suffix.lower() == ".parquet":
-        columns, common = parquet.read(path, unpacked)
+        columns, common, names = parquet.read(path, unpacked)
     else:
-        columns, common = _npz(path, unpacked)
-    found = Predictions(path, *_checked(path, columns, common), content, reading or Reading())
+        columns, common, names = _npz(path, unpacked)
+    others = tuple(sorted(names - {*TEXT, *NUMBERS, *FOR_ALL}))
+    found = Predictions(path, *_checked(path, columns, common), content, reading or Reading(), others)
     if reading is not None:
         _ = found.flags
         return found
@@ -138,11 +153,12 @@ def fingerprint(path: Path) -> str:
     return digest.hexdigest()
 
 
-def _npz(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any]]:
-    known = safe_npz.names(path) & {*TEXT, *NUMBERS, *FOR_ALL}
+def _npz(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any], frozenset[str]]:
+    names = frozenset(safe_npz.names(path))
+    known = names & {*TEXT, *NUMBERS, *FOR_ALL}
     columns = {name: of_npz(path, name, unpacked) for name in sorted(known - {*FOR_ALL})}
     common = {name: safe_npz.read(path, name) for name in sorted(known & {*FOR_ALL})}
-    return columns, common
+    return columns, common, names
 
 
 def _checked(

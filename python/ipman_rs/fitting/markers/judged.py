@@ -67,7 +67,7 @@ def of_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool 
     if any(each.level == "wrong" for each in found):
         return found
     with np.errstate(invalid="ignore"):
-        found += check.place("markers", points[np.isfinite(points).all(axis=-1)])
+        found += judge.far("markers", points[np.isfinite(points).all(axis=-1)])
     rotation = TO_Y_UP[tracks.up]
     up = ways(points @ rotation, known, meanings)
     return found + ([] if up_is_said else check.upright("markers", up, Ground(rotation[1])))
@@ -78,15 +78,12 @@ def of_size(points: Array, unit: float) -> list[Finding]:
     found = check.size_of_body("markers", points)
     if not any(each.level == "wrong" for each in found):
         return found
-    fits = [
-        name
-        for name, metres in (("m", 1.0), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254))
-        if check.size_of_body("markers", points / unit * metres)[0].level == "ok"
-    ]
+    fits = [each for each in check.units_of(check.extent_of(points) / unit) if each[2] != unit]
     if not fits:
-        return found
+        return [Finding("wrong", found[0].what, option="--units UNIT")]
     said = found[0].what.rpartition(": ")[2]
-    return [Finding("wrong", f"markers: {said}, if the file's unit is right", option=f"--units {fits[0]}")]
+    option = " or ".join(f"--units {option}" for _, option, _ in fits)
+    return [Finding("wrong", f"markers: {said}, if the file's unit is right", option=option)]
 
 
 def of_floor(tracks: Tracks, meanings: Mapping[str, Meaning], ground: float = 0.0) -> list[Finding]:
