@@ -305,7 +305,7 @@ def test_points_of_another_image_size(fit, tmp_path, standing):
     assert "points lie outside the image of 480 × 640 pixels" in said.err
     assert "is that its size? (--image-size WxH) (--force: it is right as it is)" in said.err
     said = fit(tmp_path / "large.json", *options, "--force")
-    assert any("lie outside the image" in note for note in said.report["bodies"][0]["fit"]["notes"])
+    assert any("lie outside the image of 480 × 640" in flag for flag in said.report["bodies"][0]["flags"])
 
 
 def test_a_photo_of_another_size(fit, tmp_path, standing):

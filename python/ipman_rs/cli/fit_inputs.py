@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -87,18 +87,31 @@ def items(path: Path, reading: Reading) -> list[Item]:
     if many and not reading.sequence:
         notes.append(f"{path}: {len(found)} images, each fitted on its own; --sequence fits one person over time")
     made = [
-        Item(f"{path.stem}_{number}" if many else path.stem, path, one.sources[0], one, reading.photo, list(one.notes))
-        for number, one in enumerate(people)
+        Item(
+            f"{path.stem}_{number}" if many else path.stem,
+            path,
+            one.sources[0],
+            one,
+            reading.photo,
+            list(one.notes),
+            list(flags),
+        )
+        for number, (one, flags) in enumerate(people)
     ]
     made[0].notes += notes + odd
     return made
 
 
-def _admitted(path: Path, people: list[Detections], force: bool) -> tuple[list[Detections], list[str]]:
-    """Those whose points can be a person in the image, and what is odd. Raises FileError where nobody's can."""
+def _admitted(
+    path: Path, people: list[Detections], force: bool
+) -> tuple[list[tuple[Detections, tuple[str, ...]]], list[str]]:
+    """Those whose points can be a person in the image, each with what is odd; and who was left out.
+
+    Raises FileError where nobody's can.
+    """
     from ..data import judge
 
-    kept: list[Detections] = []
+    kept: list[tuple[Detections, tuple[str, ...]]] = []
     notes: list[str] = []
     refused: list[str] = []
     for one in people:
@@ -109,7 +122,7 @@ def _admitted(path: Path, people: list[Detections], force: bool) -> tuple[list[D
         except judge.NoPerson as error:
             refused.append(str(error))
             continue
-        kept.append(replace(one, notes=(*one.notes, *odd)))
+        kept.append((one, odd))
     if not kept:
         raise FileError(path, refused[0])
     if refused:

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from .fit_run import Settings
 
 
+TOLD = 3  # flags of single frames
+
+
 @dataclass
 class Recording:
     """One person over time: a marker file, or the frames of keypoint files or photos in their order."""
@@ -216,7 +219,11 @@ def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
     assert problem.points is not None
     median = (found.candidate.projected - problem.points).norm(dim=-1).median()
     notes = list(dict.fromkeys(note for item in items for note in item.notes))
-    record: dict[str, Any] = {"frames_left_out": unseen, "median_error_px": _number(median), "notes": notes}
+    flags = list(dict.fromkeys(flag for item in items for flag in item.flags))
+    if len(flags) > TOLD:
+        flags = [*flags[:TOLD], f"{len(flags) - TOLD} more such flags of frames"]
+    record: dict[str, Any] = {"frames_left_out": unseen, "median_error_px": _number(median)}
+    record |= {"notes": notes, "flags": flags}
     if imitated is not None:
         record |= {"presented": imitated.record(body.body), "notes": [*notes, *imitated.notes]}
     return found, {}, record, rate
