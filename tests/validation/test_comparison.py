@@ -145,6 +145,26 @@ def test_forces_that_are_no_numbers_are_no_foot_beside_the_plates(lite, standing
     assert figures(one)["flags"] == ["the forces of plate 1 are no numbers in 40 of 100 frames: they are left out"]
 
 
+@pytest.mark.parametrize(
+    ("load", "rate", "told"),
+    [
+        (
+            600.0,
+            10.0,
+            ["10 frames a second: accelerations, and with them the ZMP and the weight of who moves, need 24"],
+        ),
+        (0.0, 50.0, ["no weight by the plates: in no frame is a plate loaded"]),
+        (np.nan, 50.0, ["no weight by the plates: in no frame is a plate loaded"]),
+    ],
+)
+def test_why_there_is_no_weight_and_no_acceleration(lite, standing, load, rate, told):
+    plates = plates_of(np.tile([0.0, 0, 0.02], (FRAMES, 1)), np.full(FRAMES, load))
+    one = Comparison("slow", TIMES * RATE / rate, computed(swaying(standing), lite.template, plates), plates)
+    said = figures(one)["flags"]
+    assert len(said) >= len(told)
+    assert all(any(each.startswith(start) for each in said) for start in told)
+
+
 def test_what_empty_plates_read_is_no_weight(lite, standing):
     upward = np.where(TIMES < 1, 600.0, 0.0)
     plates = plates_of(np.tile([0.05, 0, 0.02], (FRAMES, 1)), upward)

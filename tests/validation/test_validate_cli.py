@@ -250,6 +250,24 @@ def test_forces_that_tell_nothing_are_named_before_the_fit(run, person, folder, 
     assert not (tmp_path / "nothing").exists()  # nobody needs the shape of who stands still
 
 
+def test_forces_in_other_axes_than_the_markers(person, tmp_path):
+    """The file of forces has z up, the markers y: --up would turn both."""
+    lab = tmp_path / "lab"
+    lab.mkdir()
+    written(lab / "walk.trc", person)
+    x, y, z = (person.com + OFF) * [1, 0, 1]
+    mot(lab / "walk_grf.mot", np.array([x, -z, y]), lambda _t: MASS * G, up="z")
+    for up in (None, (0.0, 0.0, 1.0)):
+        plan = validate_run.plan(lab, tmp_path / "out", "anny-lite", "none", 10.0, True, force_up=up)
+        told = validate_run.Told()
+        found = validate_run._read(plan, plan.trials[0], told)
+        if up is None:
+            assert "walk_grf.mot: looks like z up" in str(told.failures[0])
+            assert "(--force-up z)" in str(told.failures[0])
+    assert told.failures == []
+    np.testing.assert_allclose(found.plates.center(), np.tile([x, y, z], (len(found.plates), 1)), atol=1e-6)
+
+
 def test_forces_on_the_plates_are_turned(run, person, tmp_path):
     (tmp_path / "lab").mkdir()
     written(tmp_path / "lab" / "markers.trc", person)

@@ -43,6 +43,36 @@ def test_whatever_was_measured(lite, bodies, measured):
         assert drawn[:8] == b"\x89PNG\r\n\x1a\n"
 
 
+def legends(draw, monkeypatch):
+    """The names in all legends of a picture, and how many panels it has."""
+    found = []
+    monkeypatch.setattr(pictures, "_png", lambda figure: found.append(figure) or b"")
+    draw()
+    (figure,) = found
+    boxes = [*figure.legends, *(axis.get_legend() for axis in figure.axes if axis.get_legend())]
+    return {text.get_text() for box in boxes for text in box.get_texts()}, len(figure.axes)
+
+
+@pytest.mark.parametrize(
+    ("load", "rate", "lacking", "panels"),
+    [
+        (600.0, 50.0, set(), 4),
+        (600.0, 10.0, {"ZMP of the parts", "m (g + acceleration of the fitted CoM)"}, 4),
+        (0.0, 50.0, {"measured CoP", "m (g + acceleration of the fitted CoM)"}, 4),
+        (np.nan, 50.0, {"measured CoP", "m (g + acceleration of the fitted CoM)", "all plates"}, 3),
+    ],
+)
+def test_legends_name_what_is_drawn(lite, bodies, monkeypatch, load, rate, lacking, panels):
+    of = plates(load)
+    one = Comparison("made up", np.arange(FRAMES) / rate, computed(bodies, lite.template, of), of)
+    everything = {"measured CoP", "ZMP of the parts", "m (g + acceleration of the fitted CoM)", "all plates"}
+    named, count = legends(lambda: pictures.over_time(one), monkeypatch)
+    assert everything - named == lacking
+    assert count == panels
+    named, _ = legends(lambda: pictures.pressure_map(one, bodies, lite.template), monkeypatch)
+    assert ("CoP of a plate, with its load" in named) == (load == 600.0)
+
+
 def test_somebody_who_walks_without_plates(lite, bodies):
     """A centre of mass was measured, no force: there are no phases, and the middle frame is drawn."""
     one = Comparison("made up", TIMES, computed(bodies, lite.template), reference=np.full((FRAMES, 3), np.nan))

@@ -37,12 +37,16 @@ from .options import METRES, RATE, UNIT, UP, force
 )  # fmt: skip
 @click.option(
     "--units", type=UNIT, metavar="UNIT",
-    help="Unit of the lengths in marker files, also of plates and centres of mass in a .c3d: "
+    help="Unit of the lengths in marker files, of plates and centres of mass in a .c3d, too: "
     f"{', '.join(METRES)}, or a number of metres. Default: what they say.",
 )  # fmt: skip
 @click.option(
     "--force-units", "force_unit", type=click.Choice(["m", "cm", "mm"]), default="m", show_default=True,
     help="Unit of the centres of pressure in .mot and .sto, which do not say it.",
+)  # fmt: skip
+@click.option(
+    "--force-up", type=UP, metavar="AXIS",
+    help="What points up in .mot and .sto files of forces, where markers have other axes. Default: as --up.",
 )  # fmt: skip
 @click.option(
     "--recorded-rate", type=RATE, metavar="HZ", help="Frames a second of the markers, where their files are wrong."

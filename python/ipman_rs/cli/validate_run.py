@@ -38,7 +38,8 @@ STILL = 0.01, 0.5  # m, s: whose markers move less about their means, for so lon
 @dataclass(frozen=True)
 class Plan:
     """What one command is to do. `person`: "auto", "none", or the name of the recording whose shape is kept; `pace`:
-    frames a second that are fitted; `force_unit`: of the points in files of forces, which do not say it."""
+    frames a second that are fitted; `force_unit`: of the points in files of forces, which do not say it; `force_up`:
+    what points up in them, where it is not what points up in the markers."""
 
     folder: Path
     output: Path
@@ -50,6 +51,7 @@ class Plan:
     notes: list[str]
     unreadable: dict[Path, str]
     force_unit: str = "m"
+    force_up: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +93,7 @@ def plan(
     pace: float,
     resume: bool,
     force_unit: str = "m",
+    force_up: tuple[float, float, float] | None = None,
     **of_markers: Any,
 ) -> Plan:
     """`pace`: frames a second to fit; `of_markers`: what `Settings` has of marker files.
@@ -107,7 +110,7 @@ def plan(
     body = ip.load_body(model)  # before anything is fitted
     if settings.markers is not None:
         own.read(settings.markers, body)
-    return Plan(folder, output, trials, settings, person, pace, resume, notes, unreadable, force_unit)
+    return Plan(folder, output, trials, settings, person, pace, resume, notes, unreadable, force_unit, force_up)
 
 
 def run(plan: Plan) -> tuple[list[Record], list[str], list[FileError]]:
@@ -234,7 +237,9 @@ def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
     assert trial.forces is not None
     said = plan.settings
     try:
-        found = measured.plates(trial.forces, said.up, plan.force_unit, trial.loads, said.units)
+        apart = plan.force_up is not None and trial.forces != trial.markers
+        up = plan.force_up if apart else said.up
+        found = measured.plates(trial.forces, up, plan.force_unit, trial.loads, said.units)
     except (ValueError, ImportError) as error:
         raise FileError(trial.forces, str(error)) from error
     centers = found.at(tracks.times).center()

@@ -322,7 +322,7 @@ def _plausible(found: ForcePlates, up: str) -> None:
     if axis != up:
         raise ValueError(
             f"{found.source}: looks like {axis} up: loaded plates push along {axis} ({push[0]:.0f}, {push[1]:.0f}, "
-            f"{push[2]:.0f} N), expected along {up}; say up={axis!r} if so (--up {axis})"
+            f"{push[2]:.0f} N), expected along {up}; say up={axis!r} if so (--force-up {axis})"
         )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ipman_rs.plain import plain
 
+from .acceleration import CUTOFF
 from .comparison import Comparison, distances
 from .computed import METHODS, carried
 from .zero_moment_point import GRAVITY, along_force
@@ -54,13 +55,15 @@ def figures(one: Comparison) -> dict[str, Any]:
 
 
 def flags(one: Comparison) -> list[str]:
-    """What is odd about the plates: forces that are no numbers, a weight that changes, or is not that of standing
+    """What is odd about the plates: forces that are no numbers, no weight, one that changes, or is not that of standing
     still, a foot beside them, and a force that the movement does not explain."""
     said = [
         f"the forces of plate {plate + 1} are no numbers in {count} of {len(one.times)} frames: they are left out"
         for plate, count in enumerate(one.lacking.sum(axis=0).tolist())
         if count
     ]
+    if one.plates is not None:
+        said += _unknown(one)
     spread, loaded = _std(one.weights), int(one.beside.sum() + one.complete.sum())
     if one.beside.any():
         which = f"{one.beside.sum()} of {loaded} loaded frames"
@@ -81,6 +84,24 @@ def flags(one: Comparison) -> list[str]:
             f"upward force: {force['share']:.1%} off with the acceleration of the fitted body, {force['at_rest']:.1%} "
             "without: the plates measure not all of it, or not this movement"
         )
+    return said
+
+
+def _unknown(one: Comparison) -> list[str]:
+    """Why there is no acceleration, or no weight by the plates."""
+    said = []
+    if one.rate < 4 * CUTOFF:
+        said.append(
+            f"{one.rate:.3g} frames a second: accelerations, and with them the ZMP and the weight of who moves, "
+            f"need {4 * CUTOFF:g} or more"
+        )
+    if not np.isfinite(one.weight):
+        why = "in no frame is all of the weight on the plates"
+        if one.complete.any():
+            why = "the accelerations of the frames on the plates are not known"
+        elif not one.loaded.any():
+            why = "in no frame is a plate loaded and the force of each known"
+        said.append(f"no weight by the plates: {why}")
     return said
 
 

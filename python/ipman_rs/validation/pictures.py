@@ -57,7 +57,7 @@ def pressure_map(one: Comparison, bodies: Bodies, template: ip.BodyTemplate) -> 
         title = "" if phase == "all" else f"{phase}, "
         axis.set_title(f"{one.name}, {title}{one.times[frame]:.2f} s", fontsize=10)
     axes[0][0].set_ylabel("forward, m")
-    if one.plates is not None:
+    if one.plates is not None and (carried(one.plates)[list(chosen.values())] > 0).any():
         axes[0][0].plot([], [], "^", color="black", ms=6, mfc="white", label="CoP of a plate, with its load")
     told = {name: mark for axis in axes[0] for mark, name in zip(*axis.get_legend_handles_labels(), strict=True)}
     figure.legend(list(told.values()), list(told), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
@@ -148,12 +148,13 @@ def _draw_plates(axis: Axes, one: Comparison, frame: int, floor: Floor) -> None:
 
 def over_time(one: Comparison) -> bytes:
     """A PNG of the CoM's height, the centres on the floor along the way that the person faces on average and to the
-    left of it, and the load, over time."""
-    rows = 4 if one.plates is not None else 3
+    left of it, and the load, over time; only what is known."""
+    pushed = one.plates is not None and bool(np.isfinite(one.plates.forces[..., 1]).any())
+    rows = 4 if pushed else 3
     figure, grid = _canvas(rows, 1, (9, 2.1 * rows), sharex=True)
     axes = [row[0] for row in grid]
     axes[0].plot(one.times, one.com[:, 1], color=OURS, lw=1.3, label="fitted body, whole volume")
-    if one.reference is not None:
+    if one.reference is not None and np.isfinite(one.reference).any():
         axes[0].plot(one.times, one.reference[:, 1], color=REFERENCE, lw=2.5, zorder=1, label=f"by {one.judge}")
     axes[0].set_ylabel("CoM height, m")
     axes[0].legend(frameon=False, fontsize=7, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1))
@@ -163,7 +164,7 @@ def over_time(one: Comparison) -> bytes:
         _draw_centers(axis, one, way)
         axis.set_ylabel(f"{name}, mm")
     axes[1].legend(frameon=False, fontsize=7, ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1))
-    if one.plates is not None:
+    if pushed:
         _draw_loads(axes[3], one)
     axes[-1].set(xlabel="s", xlim=_span(one))
     return _png(figure)
@@ -190,6 +191,7 @@ def _draw_centers(axis: Axes, one: Comparison, way: Array) -> None:
         shown.append((f"CoM by {one.judge}", one.reference, {"color": REFERENCE, "lw": 2, "zorder": 1}))
     middle = one.com.mean(axis=0)
     along = {name: 1e3 * (places - middle) @ way for name, places, _ in shown}
+    shown = [each for each in shown if np.isfinite(along[each[0]]).any()]
     for name, _, look in shown:
         axis.plot(one.times, along[name], label=name, **look)
     low, high = _span(one)
@@ -208,9 +210,13 @@ def _draw_loads(axis: Axes, one: Comparison) -> None:
             axis.plot(
                 one.times, one.plates.forces[:, plate, 1], lw=1, color=f"C{1 + plate}", label=f"plate {plate + 1}"
             )
-    axis.plot(one.times, one.force[:, 1], color="black", lw=1.6, label="all plates")
     asked = one.mass * (GRAVITY + one.acceleration[:, 1])
-    axis.plot(one.times, asked, color=OURS, lw=1.2, label="m (g + acceleration of the fitted CoM)")
+    for values, color, width, name in (
+        (one.force[:, 1], "black", 1.6, "all plates"),
+        (asked, OURS, 1.2, "m (g + acceleration of the fitted CoM)"),
+    ):
+        if np.isfinite(values).any():
+            axis.plot(one.times, values, color=color, lw=width, label=name)
     axis.set_ylabel("upward force, N")
     most = float(np.nanmax(one.force[:, 1])) if np.isfinite(one.force[:, 1]).any() else 0.0
     axis.set_ylim(-30, max(1.1 * most, 100))
