@@ -51,7 +51,7 @@ def test_wrong_file_as_json(tmp_path):
     assert code == 1
     assert not record["complete"]
     wrong = [each for each in record["findings"] if each["level"] == "wrong"]
-    assert any("looks like millimetres" in each["what"] and each["advice"] == "divide by 1000" for each in wrong)
+    assert any("looks like millimetres" in each["what"] and each["advice"] == "multiply by 0.001" for each in wrong)
 
 
 def test_right_file_as_json(tmp_path):

@@ -214,7 +214,7 @@ def turned(values):
         (spoilt(imgname=lambda i: np.full(i.shape, b"\xff\xfe")), "imgname: holds what is no text"),
         (spoilt(imgname=lambda i: np.full(12 * 4, 0x7FFFFFFF, np.int32).view("U4")), "imgname: holds what is no text"),
         (spoilt(imgname=lambda i: np.arange(12)), "imgname: expected text, got type int64"),
-        (spoilt(S_world=lambda s: s * (1000, 1000, 1000, 1)), "joints: looks like millimetres: .*divide by 1000"),
+        (spoilt(S_world=lambda s: s * (1000, 1000, 1000, 1)), "joints: looks like millimetres: .*multiply by 0.001"),
         (spoilt(S_world=lambda s: s * (100, 100, 100, 1)), "joints: looks like centimetres"),
         (spoilt(S_world=turned), r"joints: looks like \+y up: .* up is said to be \(0, 0, 1\)"),
         (spoilt(transl_world=lambda t: t * 1000), "transl: looks like millimetres"),
