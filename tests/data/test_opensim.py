@@ -283,7 +283,7 @@ def test_times_rounded_until_they_are_equal(tmp_path):
     assert found.notes == ("some times are equal: they are taken as evenly spaced from the first to the last",)
 
 
-@pytest.mark.parametrize("end", ["0.2\t5", "0.2\t5\t1.5e"])
+@pytest.mark.parametrize("end", ["0.2\t5", "0.2\t5\t1e-", "0.2\t5\t1.5e"])
 def test_a_last_line_that_is_cut_short(tmp_path, end):
     (tmp_path / "a.mot").write_text(f"x\nendheader\ntime\ta\tb\n0\t1\t2\n0.1\t3\t4\n{end}")
     found = opensim.storage(tmp_path / "a.mot")

@@ -275,13 +275,13 @@ def _person(
         return known[wanted]
     markers: dict[str, set[str]] = {person: set() for person in people}
     shown, of_marker = dict.fromkeys(people, False), dict[str, list[str]]()
-    there = seen.any(axis=0)
+    there = {*np.flatnonzero(seen.any(axis=0)).tolist()}
     for column, (person, _, marker) in split.items():
         person, marker = person.strip(), marker.strip()
         if marker not in markers[person]:
             of_marker.setdefault(marker, []).append(person)
         markers[person].add(marker)
-        shown[person] |= bool(there[column])
+        shown[person] |= column in there
     shared = [[person for person in each if shown[person]] for each in of_marker.values() if len(each) > 1]
     rivals = {person for each in shared if len(each) > 1 for person in each}
     if not rivals:
