@@ -275,7 +275,8 @@ def test_forces_on_the_plates_are_turned(run, person, tmp_path):
     said = run(tmp_path / "lab", "-o", tmp_path / "out", "--rate", "10")
     assert said.code == 0, said.err
     found = records(tmp_path / "out")["markers"]
-    assert found["flags"] == ["the forces of plate 1 point down, as those on the plates do; they were turned round"]
+    assert found["flags"][0] == "the forces of plate 1 point down, as those on the plates do; they were turned round"
+    assert [flag.partition(":")[0] for flag in found["flags"][1:]] == ["10 frames a second"]
     assert found["mass"]["plates"] == pytest.approx(MASS, abs=0.3)
     np.testing.assert_allclose(found["standing"]["offset"], -OFF[[2, 0]], atol=3e-3)
 

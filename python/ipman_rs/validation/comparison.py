@@ -123,14 +123,14 @@ class Comparison:
         if self.plates is None:
             return np.zeros((len(self.times), 0), bool)
         known = np.isfinite(self.plates.forces).all(axis=-1)
-        return ~known & known.any(axis=1, keepdims=True)
+        return np.asarray(~known & np.asarray(known.any(axis=1))[:, None])
 
     @cached_property
     def loaded(self) -> Mask:
         """(T,): some plate carries a load, and the forces of all are known."""
         if self.measured is None:
             return np.zeros(len(self.times), bool)
-        return np.isfinite(self.measured[:, 0]) & ~self.lacking.any(axis=1)
+        return np.isfinite(self.measured[:, 0]) & (self.lacking.sum(axis=1) == 0)
 
     @cached_property
     def beside(self) -> Mask:
