@@ -225,7 +225,7 @@ def _vectors(name: str, form: str, rows: Array, order: tuple[int, ...] | None) -
     from scipy.spatial.transform import Rotation
 
     rows = rows.astype(np.float64)
-    known = np.isfinite(rows).all(axis=-1)
+    known = np.asarray(np.isfinite(rows).all(axis=-1))
     rows = np.where(known[..., None], rows, _IDENTITY[form] if order is None else np.eye(4)[order[3]])
     if order is not None:
         lengths = np.linalg.norm(rows, axis=-1)

@@ -153,7 +153,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
     if screen.strip() and axis not in TO_Y_UP:
         note = f"its Y_SCREEN is {screen!r}, which is no axis: taken as {found.up} up (--up)"
         found = replace(found, notes=(*found.notes, note))
-    if found.unit.strip():
+    if str(found.unit).strip():
         return found
     unit = _likely_unit(found)
     return replace(found, unit=unit, notes=(*found.notes, not_given(unit)))

@@ -120,8 +120,8 @@ class ForcePlates:
 def recorded(found: ForcePlates) -> ForcePlates:
     """Without the plates of which no force is a number; notes name them, those that lack some samples, and a load that
     is nobody's."""
-    known = np.isfinite(found.forces).all(axis=-1)  # (T, P)
-    kept = known.any(axis=0)
+    known = np.asarray(np.isfinite(found.forces).all(axis=-1))  # (T, P)
+    kept = np.asarray(known.any(axis=0))
     if not kept.any():
         return found
     notes = [f"the forces of plate {plate + 1} are no numbers: it is left out" for plate in np.flatnonzero(~kept)]

@@ -317,7 +317,7 @@ def likely_unit(points: Array) -> str:
     return "mm" if np.ptp(points, axis=0).max() > LARGEST else "m"
 
 
-def not_given(unit: str) -> str:
+def not_given(unit: str | float) -> str:
     """The note on a unit that a file does not say."""
     return f"its unit of length is not given: taken as {unit} (--units)"
 

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel
 from ipman_rs.body.joint_regressors import EXTRA, JointRegressor
-from ipman_rs.fitting.landmarks import MIDPOINTS
+from ipman_rs.fitting.sites import MIDPOINTS
 from ipman_rs.fitting.surface import skin_points
 from ipman_rs.torch.body import BodyOutput
 

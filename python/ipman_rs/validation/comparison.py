@@ -122,8 +122,8 @@ class Comparison:
         """(T, P): plates whose force is no number while another's is: nobody knows what is on them."""
         if self.plates is None:
             return np.zeros((len(self.times), 0), bool)
-        known = np.isfinite(self.plates.forces).all(axis=-1)
-        return np.asarray(~known & np.asarray(known.any(axis=1))[:, None])
+        known = np.asarray(np.isfinite(self.plates.forces).all(axis=-1))
+        return np.asarray(~known & known.any(axis=1, keepdims=True))
 
     @cached_property
     def loaded(self) -> Mask:

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from . import layouts
-from .layouts import COCO_17 as NAMES
-from .layouts import Layout
+from .layouts import COCO_17, Layout
 from .people import (
     Array,
     Image,
@@ -33,6 +32,8 @@ from .people import (
     size_of,
     track_of,
 )
+
+NAMES = COCO_17
 
 LAYOUTS: dict[int, tuple[str, Layout]] = {
     17: ("COCO", NAMES),

@@ -9,7 +9,9 @@ from typing import Any
 
 from . import coco
 from .coco import images
-from .layouts import COCO_WHOLEBODY_133 as NAMES
+from .layouts import COCO_WHOLEBODY_133
+
+NAMES = COCO_WHOLEBODY_133
 
 __all__ = ["NAMES", "images", "matches"]
 

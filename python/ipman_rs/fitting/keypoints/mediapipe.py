@@ -19,8 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from .layouts import MEDIAPIPE_33 as NAMES
+from .layouts import MEDIAPIPE_33
 from .people import Array, Image, Person, numbers, plain, scored, size_of, width_height
+
+NAMES = MEDIAPIPE_33
 
 FORMAT = "mediapipe-pose"
 IMAGE_KEYS = ("landmarks", "pose_landmarks", "poseLandmarks", "landmark", "normalized_landmarks", "normalizedLandmarks")

@@ -10,7 +10,8 @@ from torch import Tensor
 
 import ipman_rs.torch as ipt
 
-from ..landmarks import Inner, Landmarks, Point
+from ..landmarks import Landmarks
+from ..sites import Inner, Point
 from .anatomy import RADIUS
 
 FARTHEST = 5  # spreads: a marker that would have to move more was mixed up
