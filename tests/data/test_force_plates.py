@@ -212,7 +212,7 @@ def test_millimetres_that_are_said_to_be_metres(tmp_path, load):
     with pytest.raises(ValueError, match="CORNERS: .*looks like millimetres"):
         force_plates.read(path)
     c3d_file.write(path, {name: 1000 * points for name, points in markers().items()}, RATE, "m")
-    with pytest.raises(ValueError, match=r"a.c3d: joints: looks like millimetres: a body spans 1650, .*by 0.001"):
+    with pytest.raises(ValueError, match=r"a.c3d: joints: looks like millimetres: a body spans 1650, .*divide by 1000"):
         data.open("force-plates", path)
 
 
