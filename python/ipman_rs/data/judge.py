@@ -20,7 +20,7 @@ from .check import AXES, BODY, SAMPLE, WORLD, Finding, size_of_body, upright
 
 MASS = (1.0, 650.0)  # kg: the heaviest person known weighed 635
 USUAL_MASS = (1.8, 250.0)  # kg
-# kg/m³, mass by the cubed diagonal of the body's box: 5 with arms and legs spread, 12 standing, 65 curled up, 190 a cube.
+# kg/m³, mass by the cubed diagonal of a body's box: 5 with arms and legs spread, 12 standing, 65 curled up, 190 a cube.
 BUILD, USUAL_BUILD = (1.0, 400.0), (2.5, 200.0)
 MARKER_ERROR = 0.1  # m in the mean: with more, the body is not the one that the markers were on
 USUAL_MARKER_ERROR = 0.03
