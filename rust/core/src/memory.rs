@@ -33,14 +33,20 @@ pub fn isolated<O>(work: impl FnOnce() -> O) -> Option<O> {
     }
 }
 
-/// Unwinds unless so many bytes can be had: before what allocates by itself, or in many small pieces.
-pub fn ask(bytes: usize) {
+/// Whether so many bytes can be had.
+pub fn has(bytes: usize) -> bool {
     let mut probe: Vec<u8> = Vec::new();
-    if probe.try_reserve_exact(bytes.saturating_add(SPARE)).is_err() {
-        lack(bytes);
-    }
+    let reserved = probe.try_reserve_exact(bytes.saturating_add(SPARE));
     // The compiler may leave out memory that nothing uses.
     black_box(&probe);
+    reserved.is_ok()
+}
+
+/// Unwinds unless so many bytes can be had: before what allocates by itself, or in many small pieces.
+pub fn ask(bytes: usize) {
+    if !has(bytes) {
+        lack(bytes);
+    }
 }
 
 /// Room for `more` numbers behind those that are there.

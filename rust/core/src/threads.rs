@@ -12,6 +12,10 @@ use std::sync::{Mutex, OnceLock};
 /// Items a thread does between two questions for an interruption.
 const WAVE: usize = 4;
 
+/// What the system's allocator sets aside for a thread, bytes of addresses. One for which there is no room would take a page
+/// for every small vector; then all is done on the calling thread.
+const ARENA_BYTES: usize = 64 << 20;
+
 /// What the small vectors of a wave take at most, bytes: they are not asked for one by one.
 const WAVE_BYTES: usize = 1 << 20;
 
@@ -22,7 +26,8 @@ pub fn each<I: Send>(
     interrupted: &(dyn Fn() -> bool + Sync),
     f: &(dyn Fn(I) + Sync),
 ) -> Result<()> {
-    let pool = if parallel && items.len() > 1 && num_threads() > 1 { pool() } else { None };
+    let threads = if parallel && items.len() > 1 { num_threads() } else { 1 };
+    let pool = if threads > 1 && memory::has(ARENA_BYTES * threads.min(16)) { pool() } else { None };
     let length = WAVE * pool.map_or(1, ThreadPool::current_num_threads);
     let mut items = items.into_iter();
     memory::guarded(|| {
