@@ -190,7 +190,7 @@ def test_bad_images_and_labels(frames, tmp_path):
     (tmp_path / "1.png").write_bytes(b"not an image")
     (tmp_path / "2.png").unlink()
     source = images(frames)
-    for row, said in ((1, "p1: cannot identify"), (2, "p2: .*No such file")):
+    for row, said in ((1, "p1: cannot identify"), (2, "p2: .*there is no such file")):
         with pytest.raises(BadSample, match=said):
             source.sample(row, None)
     boxes = frames.boxes.copy()
@@ -226,5 +226,5 @@ def test_a_folder_of_images(frames, tmp_path):
     bare = dataclasses.replace(frames, images=np.array([f"{number}.png" for number in range(COUNT)]))
     inside = images(bare, folder=tmp_path).sample(0, None)["inputs"]
     assert torch.equal(inside, images(frames).sample(0, None)["inputs"])
-    with pytest.raises(BadSample, match="No such file"):
+    with pytest.raises(BadSample, match="there is no such file"):
         images(bare).sample(0, None)

@@ -7,7 +7,7 @@ import os
 import struct
 import sys
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import IO, Any, Literal
 
@@ -37,8 +37,12 @@ def names(path: Path) -> set[str]:
 def listed(names: Iterable[str]) -> str:
     """The names of a file's arrays for a message, those of vertices first."""
     ordered = sorted(names, key=lambda name: ("vert" not in name.lower(), name))
-    more = f", … ({len(ordered)} arrays)" if len(ordered) > LISTED else ""
-    return ", ".join(name[:40] for name in ordered[:LISTED]) + more or "nothing"
+    return first([name[:40] for name in ordered], LISTED) or "nothing"
+
+
+def first(names: Sequence[str], most: int) -> str:
+    """The first of the arrays' names, and how many there are in all where there are more."""
+    return ", ".join(names[:most]) + (f", … ({len(names)} arrays)" if len(names) > most else "")
 
 
 def read(path: Path, name: str) -> NDArray[Any]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import FileError
-from .options import FLOOR, METRES, SIZE, UNIT, UP, Setting, force, of_unknown_camera, rate
+from .options import FLOOR, METRES, SIZE, UNIT, UP, Setting, force, of_unknown_camera, rate, subject
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -89,7 +89,7 @@ if TYPE_CHECKING:
     help="List the places that --markers can name, and end.",
 )  # fmt: skip
 @force
-@click.option("--subject", metavar="NAME", help="Whose markers (NAME:LASI), where a marker file has several people's.")
+@subject
 @click.option("--obj", is_flag=True, help="Write meshes as .obj, too, not only as .glb.")
 @click.option(
     "--pictures", type=click.IntRange(0), default=8, show_default=True, help="Draw the first N items (seconds each)."

@@ -15,6 +15,7 @@ import ipman_rs as ip
 
 from .. import view
 from ..analysis import PIECE
+from ..body import safe_npz
 from ..body.sequence import pieces
 from ..data import check, judge, separate_pieces
 from ..data.check import Finding
@@ -132,21 +133,20 @@ def on_ground(
 def _judged(recording: Recording, template: Any, normal: np.ndarray, up_is_said: bool) -> list[Finding]:
     """Of some bodies of a file, evenly spaced."""
     count, size = recording.vertices.shape[:2]
-    few = np.asarray(recording.vertices[judge.evenly(count, max(1, min(check.SAMPLE, SAMPLED_VERTICES // size)))])
+    few = np.asarray(recording.vertices[check.evenly(count, max(1, min(check.SAMPLE, SAMPLED_VERTICES // size)))])
     findings = judge.bodies(few, template, normal, up_is_said=up_is_said)
     whole = few[np.isfinite(few).all(axis=(1, 2))]
     if recording.template is None and len(whole):  # a body model's own pieces are known
         findings += separate_pieces.judged(whole[0], recording.faces, normal)
     if not any(each.level == "wrong" for each in findings):
-        weighed = few[judge.evenly(len(few), WEIGHED)]
+        weighed = few[check.evenly(len(few), WEIGHED)]
         findings += judge.masses(ip.mass_properties(weighed, template).mass, weighed)
     return findings
 
 
 def _not_used(recording: Recording, read_elsewhere: Collection[str]) -> list[str]:
     names = [name for name in recording.unused if name not in read_elsewhere]
-    more = f", … ({len(names)} arrays)" if len(names) > LISTED else ""
-    return [f"not used: {', '.join(names[:LISTED])}{more}"] if names else []
+    return [f"not used: {safe_npz.first(names, LISTED)}"] if names else []
 
 
 def read(path: Path, request: Request) -> Recording:

@@ -44,10 +44,7 @@ class Unit(click.ParamType):
         word = value.strip().lower()
         if word in METRES:
             return METRES[word]
-        try:
-            metres = float(word)
-        except ValueError:
-            metres = math.nan
+        metres = _number(word)
         if not 0 < metres < math.inf:
             self.fail(f"{value!r} is none of {', '.join(METRES)}, and no number of metres such as 0.001", param, ctx)
         return metres
@@ -58,10 +55,7 @@ class Rate(click.ParamType):
 
     def convert(self, value, param, ctx):
         """Frames a second."""
-        try:
-            hertz = float(value)
-        except ValueError:
-            hertz = math.nan
+        hertz = _number(value)
         if not 0 < hertz < math.inf:
             self.fail(f"{value!r} is no number of frames a second above 0", param, ctx)
         return hertz
@@ -79,10 +73,7 @@ class GroundHeight(click.ParamType):
             return value
         if value.strip().lower() == self.word:
             return None
-        try:
-            height = float(value)
-        except ValueError:
-            height = math.nan
+        height = _number(value)
         if not math.isfinite(height):
             self.fail(f"{value!r} is neither a height in metres nor {self.word}", param, ctx)
         return height
@@ -138,6 +129,14 @@ class Setting(click.ParamType):
         return name, word
 
 
+def _number(text: str) -> float:
+    """NaN for what is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
 TIMES = Times()
 UNIT, RATE = Unit(), Rate()
 UP, GROUND, FLOOR, SIZE = UpAxis(), GroundHeight("auto"), GroundHeight("found"), ImageSize()
@@ -167,6 +166,9 @@ rate = click.option(
 )
 force = click.option(
     "--force", is_flag=True, help="Take what cannot be a person, too; what is odd about it is said all the same."
+)
+subject = click.option(
+    "--subject", metavar="NAME", help="Whose markers (NAME:LASI), where a marker file has several people's."
 )
 
 

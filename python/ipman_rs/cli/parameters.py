@@ -321,10 +321,10 @@ def _angles(pieces: Sequence[pose_arrays.Piece], degrees: bool) -> list[Finding]
     """Whether rotation vectors, which are radians here, can be right."""
     vectors = [piece for piece in pieces if not piece.is_absolute]
     for piece in vectors:
-        found = check.radians(piece.name, piece.rotations[judge.evenly(len(piece.rotations))])
+        found = check.radians(piece.name, piece.rotations[check.evenly(len(piece.rotations))])
         if found:
             return found
-    return judge.degrees([piece.rotations[judge.evenly(len(piece.rotations))] for piece in vectors]) if degrees else []
+    return judge.degrees([piece.rotations[check.evenly(len(piece.rotations))] for piece in vectors]) if degrees else []
 
 
 def _columns(pieces: Sequence[pose_arrays.Piece]) -> list[Finding]:
@@ -340,7 +340,7 @@ def _places(stored: _Npz, trans: np.ndarray | None, seconds: np.ndarray | None) 
     if trans is None:
         return []
     name = str(stored.name(*_TRANSLATIONS))
-    return check.place(name, trans[judge.evenly(len(trans))]) or judge.speed(name, trans, seconds)
+    return check.place(name, trans[check.evenly(len(trans))]) or judge.speed(name, trans, seconds)
 
 
 def _gender(stored: _Npz, body: Any, model: str) -> list[Finding]:

@@ -11,7 +11,7 @@ import click
 
 from .errors import FileError
 from .fit import needs
-from .options import METRES, RATE, UNIT, UP, force
+from .options import METRES, RATE, UNIT, UP, force, subject
 
 
 @click.command()
@@ -55,7 +55,7 @@ from .options import METRES, RATE, UNIT, UP, force
     "--markers", type=click.Path(path_type=Path), metavar="FILE",
     help="Places of markers with other names, as `ipman fit --markers` has them.",
 )  # fmt: skip
-@click.option("--subject", metavar="NAME", help="Whose markers (NAME:LASI), where a marker file has several people's.")
+@subject
 @force
 @click.option("--fresh", is_flag=True, help="Fit again what was fitted before with the same files and options.")
 def validate(

@@ -15,7 +15,7 @@ from ipman_rs.files import read_bytes
 
 from . import c3d_format
 from .c3d_format import Parameters, several
-from .tracks import METRES, TO_Y_UP, Named, Tracks, likely_unit, named, not_given, seen_of, tracks
+from .tracks import METRES, TO_Y_UP, Named, Tracks, and_more, letters, likely_unit, named, not_given, seen_of, tracks
 from .units import metres
 
 Array = NDArray[np.float64]
@@ -77,16 +77,21 @@ class Recording:
             or own in said
             or OUTPUTS.fullmatch(own)
             or (len(own) == 4 and own[:3] in axes and own[3] in "OALP")
-            or _plain(own) in CENTER_OF_MASS
+            or letters(own) in CENTER_OF_MASS
         ]
+
+    @cached_property
+    def _measured(self) -> list[int]:
+        """The columns of points that no model computed."""
+        computed = set(self._computed)
+        return [column for column in range(len(self.names)) if column not in computed]
 
     def markers(self, subject: str | None = None) -> Named:
         """The points that are markers of the person, without the subject before a colon; see `tracks.named`.
 
         ValueError for two people of whom none is chosen.
         """
-        computed = set(self._computed)
-        rest = [column for column in range(len(self.names)) if column not in computed]
+        rest = self._measured
         seen, _ = seen_of(self.points[:, rest], [self.names[column] for column in rest])
         chosen = named([self.names[column] for column in rest], seen, self.source, subject)
         return Named(chosen.names, [rest[column] for column in chosen.columns], chosen.notes)
@@ -98,7 +103,7 @@ class Recording:
         """
         for column in self._computed:
             person, _, name = self.names[column].rpartition(":")
-            if _plain(name) in CENTER_OF_MASS and subject in (None, person):
+            if letters(name) in CENTER_OF_MASS and subject in (None, person):
                 points = self.points[:, column] * self.metres
                 return np.where((points == 0).all(axis=-1, keepdims=True), np.nan, points)
         return None
@@ -161,7 +166,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
 
 def _likely_unit(found: Recording) -> str:
     """The unit of a file that does not say it: the one in which its markers, or else its plates, are not too large."""
-    rest = [column for column in range(len(found.names)) if column not in set(found._computed)]
+    rest = found._measured
     seen, _ = seen_of(found.points[:, rest], [found.names[column] for column in rest])
     corners = [each for each in found.values("FORCE_PLATFORM", "CORNERS") if isinstance(each, (int, float))]
     places = found.points[:, rest][seen] if seen.any() else np.array(corners[: len(corners) // 3 * 3]).reshape(-1, 3)
@@ -183,11 +188,10 @@ def markers(
     found = read(path)
     if not found.names and "ROTATION" in found.parameters:
         raise ValueError(f"{path}: expected markers, it has rotations of segments only, as Theia writes them")
-    computed = set(found._computed)
-    rest = [column for column in range(len(found.names)) if column not in computed]
+    rest = found._measured
     notes = [note for note in found.notes if unit is None or note != not_given(found.unit)]
-    if computed:
-        notes.append(f"{len(computed)} outputs of a model are no markers: {_some(list(found.outputs))}")
+    if found._computed:
+        notes.append(f"{len(found._computed)} outputs of a model are no markers: {and_more(list(found.outputs), 4)}")
     names = [found.names[column] for column in rest]
     said, up = found.unit if unit is None else unit, up or found.up
     times = found.times if rate is None else np.arange(len(found.points)) / rate
@@ -204,15 +208,7 @@ def _faced(parameters: Parameters) -> str:
     return "xyz"[int(normal.argmax())] if normal.max() > 0 else "z"
 
 
-def _plain(name: str) -> str:
-    return re.sub(r"[\W_]", "", name).lower()
-
-
 def _number(about: Mapping[str, list], name: str) -> float:
     """A parameter's first number; 0 for none and for one that is no number."""
     value = about.get(name, [])[:1]
     return float(value[0]) if value and isinstance(value[0], (int, float)) and np.isfinite(value[0]) else 0.0
-
-
-def _some(names: Sequence[str], most: int = 4) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -7,7 +7,7 @@ the common form. `demand` makes an error of what is wrong.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
@@ -65,7 +65,12 @@ def demanded(path: str | os.PathLike[str], data: DS) -> DS:
 
 def sample(data: DataSet, size: int = SAMPLE) -> Frames:
     """Up to `size` frames, evenly spaced."""
-    return data[np.unique(np.linspace(0, len(data) - 1, size).astype(np.int64)) if len(data) > size else slice(None)]
+    return data[evenly(len(data), size) if len(data) > size else slice(None)]
+
+
+def evenly(count: int, most: int = SAMPLE) -> NDArray[np.int64]:
+    """Up to `most` numbers from 0 to count − 1, evenly spaced: what is looked at of so many."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
 
 
 def of_frames(frames: Frames) -> list[Finding]:
@@ -172,6 +177,11 @@ def units_of(extent: float) -> list[tuple[str, str, float]]:
     """Up to two units, nearest first, in which a person who spans so much would be one: name, option and metres."""
     fits = [each for each in UNITS if TALL / UNLIKE < extent * each[2] <= BODY[1]]
     return sorted(fits, key=lambda each: abs(np.log(extent * each[2] / TALL)))[:2]
+
+
+def some(names: Sequence[str], most: int = 8) -> str:
+    """The first of the names, and an ellipsis for more."""
+    return ", ".join(names[:most]) + (", …" if len(names) > most else "")
 
 
 def _norms(vectors: NDArray[Any]) -> NDArray[np.float64]:

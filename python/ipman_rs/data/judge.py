@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 
-from .check import AXES, BODY, SAMPLE, WORLD, Finding, size_of_body, upright
+from .check import AXES, BODY, WORLD, Finding, size_of_body, some, upright
 
 MASS = (1.0, 650.0)  # kg: the heaviest person known weighed 635
 USUAL_MASS = (1.8, 250.0)  # kg
@@ -92,11 +92,6 @@ def _sizes(vertices: Array) -> list[Finding]:
     verb = "spans" if len(odd) == 1 else "span up to"
     said = f"vertices: {len(odd)} of {len(spans)} bodies {verb} {odd.max():.4g}, expected {BODY[0]} to {BODY[1]} metres"
     return [Finding("odd", said)]
-
-
-def evenly(count: int, most: int = SAMPLE) -> NDArray[np.int64]:
-    """Up to `most` numbers from 0 to count − 1, evenly spaced: the bodies that are looked at."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
 
 
 def far(what: str, places: Array) -> list[Finding]:
@@ -260,13 +255,9 @@ def known_markers(known: Sequence[str], unknown: Sequence[str], fewest: int = 6)
     count = len(known) + len(unknown)
     if not unknown:
         return []
-    said = f"{len(unknown)} of {count} markers have names without a known place: {_some(unknown)}"
+    said = f"{len(unknown)} of {count} markers have names without a known place: {some(unknown)}"
     wrong = len(known) < fewest or 3 * len(known) < count
     return [Finding("wrong" if wrong else "odd", said, "--markers FILE says where they are")]
-
-
-def _some(names: Sequence[str], most: int = 8) -> str:
-    return ", ".join(names[:most]) + (", …" if len(names) > most else "")
 
 
 def keypoints(points: Array, size: Array) -> list[Finding]:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ipman_rs.ground import Ground
 
 from . import external_loads, pairing, sequences, text_file, trc
-from .check import Finding, demand, demanded, size_of_body
+from .check import Finding, demand, demanded, size_of_body, some
 from .external_loads import ExternalLoads, Load
 from .force_plates import LOADED, UP, ForcePlates, between, recorded, standing
 from .frames import DataSet, Frames
@@ -64,7 +64,7 @@ class Storage:
         """(T, 3) of three columns. ValueError for one that is missing."""
         missing = [name for name in names if name not in self.columns]
         if missing:
-            raise ValueError(f"{self.source}: no column {missing[0]!r}; it has {_some(self) or 'none'}")
+            raise ValueError(f"{self.source}: no column {missing[0]!r}; it has {some([*self.columns]) or 'none'}")
         return np.stack([self.columns[name] for name in names], axis=1)
 
 
@@ -205,7 +205,8 @@ def plates(table: Storage, unit: str = "m", up: str = "y", loads: ExternalLoads 
         else [found for name in table.columns if (found := _wrench(table, name)) is not None]
     )
     if not wrenches:
-        raise ValueError(f"{table.source}: expected ground forces, such as ground_force_vx, it has {_some(table)}")
+        has = some([*table.columns])
+        raise ValueError(f"{table.source}: expected ground forces, such as ground_force_vx, it has {has}")
     forces, points, moments = (np.stack(part, axis=1) for part in zip(*wrenches, strict=True))
     scale = METRES[unit]
     forces, points, moments = (  # beside NaN, infinity: a centre of pressure without a load
@@ -290,7 +291,7 @@ def _loaded(table: Storage, load: Load, source: str) -> tuple[Array, Array, Arra
     force, point = (_three(table, name) for name in (load.force, load.point))
     if force is None or point is None:
         missing = load.force if force is None else load.point
-        has = f"{table.source} has {_some(table)}"
+        has = f"{table.source} has {some([*table.columns])}"
         raise ValueError(f"{source}: expected three columns that begin with {missing!r}; {has}")
     torque = _three(table, load.torque) if load.torque else None
     return force, point, np.zeros_like(force) if torque is None else torque
@@ -490,8 +491,3 @@ def _beside(path: Path, files: list[Path]) -> Beside:
     told = [what for other, what in unreadable.items() if other not in used]
     pairs.notes += wrong
     return Beside(pairs, loads, pairing.names(files, root), told)
-
-
-def _some(table: Storage) -> str:
-    names = list(table.columns)
-    return ", ".join(names[:8]) + (", …" if len(names) > 8 else "")

@@ -82,8 +82,8 @@ def _with_nothing(part: Frames, parts: Sequence[Frames], plates: int) -> Frames:
 
 def demanded(path: str | os.PathLike[str], data: Joined) -> Joined:
     """`data`, if a sample of it has plausible units and, where it has enough sequences to tell, axes and ground."""
-    chosen = [data.parts[index] for index in _spread(len(data.parts), SAMPLED) if len(data.parts[index])]
-    frames = concatenated([part[_spread(len(part), SAMPLED)] for part in chosen])
+    chosen = [data.parts[index] for index in check.evenly(len(data.parts), SAMPLED) if len(data.parts[index])]
+    frames = concatenated([part[check.evenly(len(part), SAMPLED)] for part in chosen])
     check.demand(Path(path), check.of_frames(frames if len(chosen) >= ENOUGH else replace(frames, ground=None)))
     return data
 
@@ -104,12 +104,12 @@ def judged(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Find
         except (ValueError, ImportError) as error:
             found.append(check.Finding("wrong", str(error)))
             continue
-        few = frames[_spread(len(frames), check.SAMPLE)]
+        few = frames[check.evenly(len(frames), check.SAMPLE)]
         for each in check.of_frames(replace(few, ground=None)):
             if each.level != "ok":
                 found.append(check.Finding(each.level, f"{name}: {each.what}", each.advice))
-        if index in _spread(len(parts), SAMPLED**2):
-            some.append(frames[_spread(len(frames), SAMPLED)])
+        if index in check.evenly(len(parts), SAMPLED**2):
+            some.append(frames[check.evenly(len(frames), SAMPLED)])
     try:
         return found + (check.of_frames(concatenated(some)) if some else [])
     except ValueError as error:  # they have other joints, or only some have a ground
@@ -125,8 +125,3 @@ def told(name: str, frames: Frames) -> list[check.Finding]:
 def numbered(name: str, count: int) -> NDArray[np.str_]:
     """Names of the frames of a sequence: "name/00000", "name/00001", ..."""
     return np.array([f"{name}/{number:05d}" for number in range(count)], np.str_)
-
-
-def _spread(count: int, most: int) -> NDArray[np.int64]:
-    """Up to `most` numbers from 0 to count - 1, evenly spaced."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))

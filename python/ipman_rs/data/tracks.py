@@ -132,7 +132,7 @@ def _gaps(times: Array) -> list[str]:
     if not places:
         return []
     what = "a gap" if len(places) == 1 else f"{len(places)} gaps"
-    return [f"its times have {what}, at {_some(places, 3)}: the frames before and after are taken as neighbours"]
+    return [f"its times have {what}, at {and_more(places, 3)}: the frames before and after are taken as neighbours"]
 
 
 def turned(tracks: Tracks, normal: Sequence[float]) -> Tracks:
@@ -173,7 +173,7 @@ def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], lis
 
 def _not_seen(value: str, where: NDArray[np.bool_], names: Sequence[str]) -> str:
     which = [names[int(column)] or "one without a name" for column in np.flatnonzero(where.any(axis=0)).tolist()]
-    return f"{value} is taken as not seen ({_some(which)})"
+    return f"{value} is taken as not seen ({and_more(which)})"
 
 
 def _repeated(points: Array, seen: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Array | None]:
@@ -233,7 +233,7 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     chosen = _person([*people], split, seen, source, subject)
     joined = [*dict.fromkeys(w for c, (who, _, _) in split.items() if (w := who.strip()) and seen[:, c].any())]
     if chosen is None and len(joined) > 1:
-        notes.append(f"the markers of {_some(joined)} are taken as one person's (subject, --subject: those of one)")
+        notes.append(f"the markers of {and_more(joined)} are taken as one person's (subject, --subject: those of one)")
     if chosen is not None:
         own = {split[column][2].strip() for column in known if split[column][0].strip() == chosen}
         nobodys = {split[column][2].strip() for column in known if not split[column][0].strip()}
@@ -252,7 +252,7 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
         if name not in best or seen[:, column].sum() > seen[:, best[name]].sum():
             best[name] = column
     if twice:
-        of = _some([*dict.fromkeys(twice)])
+        of = and_more([*dict.fromkeys(twice)])
         notes.append(f"more than one marker is called {of}: of each the one that was seen the longest is taken")
     return Named(tuple(best), list(best.values()), tuple(notes))
 
@@ -326,5 +326,11 @@ def _count(number: int, what: str) -> str:
     return f"{number} {what}" + ("" if number == 1 else "s")
 
 
-def _some(names: Sequence[str], most: int = 6) -> str:
+def and_more(names: Sequence[str], most: int = 6) -> str:
+    """The first of the names, and how many more there are."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def letters(name: str) -> str:
+    """The letters and digits of a name alone, lower case."""
+    return re.sub(r"[\W_]", "", name).lower()

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.body import rotations
+from ipman_rs.data.check import evenly
 from ipman_rs.data.frames import DataSet
 
 from .files import PaperFigure
@@ -43,7 +44,7 @@ class Poses:
 def of_data_set(name: str, data: DataSet, most: int = MOST, progress: Progress = lambda done: None) -> Poses:
     """Up to `most` poses of a data set, evenly spaced; those that are not finite left out. `progress` is called with
     the number of frames done. ValueError, naming the data set, without poses of the SMPL family."""
-    rows = np.unique(np.linspace(0, len(data) - 1, min(most, len(data))).astype(np.int64))
+    rows = evenly(len(data), most)
     values, names = [], []
     for start in range(0, len(rows), PIECE):
         frames = data[rows[start : start + PIECE]]

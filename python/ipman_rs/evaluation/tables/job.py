@@ -196,7 +196,7 @@ class Job:
 
     def _masses(self) -> list[check.Finding]:
         """Of a few estimated bodies."""
-        bodies = self.bodies.posed(self.estimates[judge.evenly(len(self.estimates), WEIGHED)])
+        bodies = self.bodies.posed(self.estimates[check.evenly(len(self.estimates), WEIGHED)])
         if bodies.vertices is None or bodies.model is None:
             return []
         masses = mass_properties(bodies.vertices, bodies.model.template).mass
@@ -230,7 +230,7 @@ class Job:
         """Whether the estimated people fit the true ones only when they are turned, as from a camera's axes."""
         from scipy.spatial.transform import Rotation
 
-        true = self._truth(judge.evenly(len(self.data), WEIGHED))
+        true = self._truth(check.evenly(len(self.data), WEIGHED))
         where = self.estimates.index.find(true.names)
         there = np.flatnonzero(where >= 0)
         if self.definition is None or not len(there):

@@ -109,8 +109,7 @@ class Predictions:
             what = f"vertices are compared, not the bodies of {', '.join(beside)} beside them"
             found.append(check.Finding("odd", what, "leave one of the two out"))
         if self.others:
-            more = f", … ({len(self.others)} arrays)" if len(self.others) > LISTED else ""
-            found.append(check.Finding("odd", f"not used: {', '.join(self.others[:LISTED])}{more}"))
+            found.append(check.Finding("odd", f"not used: {safe_npz.first(self.others, LISTED)}"))
         return found
 
     @cached_property

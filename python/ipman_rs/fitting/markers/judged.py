@@ -153,9 +153,7 @@ def of_rate(tracks: Tracks) -> list[Finding]:
 def rows_to_judge(tracks: Tracks) -> NDArray[np.int64]:
     """Frames in which something was seen, a few hundred of them."""
     seen = np.flatnonzero(tracks.confidence.any(axis=1))
-    if len(seen) <= check.SAMPLE:
-        return seen
-    return seen[np.linspace(0, len(seen) - 1, check.SAMPLE).astype(np.int64)]
+    return seen[check.evenly(len(seen))]
 
 
 def ways(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> Array:

@@ -11,6 +11,8 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
+from ipman_rs.data.tracks import letters
+
 from .aliases import KEYPOINTS
 from .sets import MARKERS, Meaning
 
@@ -115,14 +117,10 @@ def _shared_ends(names: Sequence[str]) -> tuple[list[str], list[str]]:
     last = Counter(match[0] for name in names if (match := re.search(r"(?<=\w)[\W_]+[^\W_]+$", name)))
     beginnings = [text for text, count in first.items() if count >= enough and not _telling(text)]
     endings = [
-        text for text, count in last.items() if not _telling(text) and (count >= enough or _word(text) in SUFFIXES)
+        text for text, count in last.items() if not _telling(text) and (count >= enough or letters(text) in SUFFIXES)
     ]
     return beginnings, endings
 
 
 def _telling(text: str) -> bool:
-    return _word(text) in TELLING
-
-
-def _word(text: str) -> str:
-    return re.sub(r"[\W_]", "", text).lower()
+    return letters(text) in TELLING

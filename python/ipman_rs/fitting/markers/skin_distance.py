@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.data.check import evenly
+
 Array = NDArray[np.float64]
 
 FRAMES = 8  # of those in which a marker was seen, spread over them
@@ -17,9 +19,7 @@ def mean_distances(vertices: NDArray[np.floating], faces: NDArray[np.integer], p
     chosen = np.zeros(seen.shape, bool)
     for marker in range(seen.shape[1]):
         frames = np.flatnonzero(seen[:, marker])
-        chosen[
-            frames[np.unique(np.linspace(0, len(frames) - 1, FRAMES).astype(int))] if len(frames) else [], marker
-        ] = 1
+        chosen[frames[evenly(len(frames), FRAMES)], marker] = True
     for frame in np.flatnonzero(chosen.any(axis=1)):
         corners = np.asarray(vertices[frame], np.float64)[faces]
         for marker in np.flatnonzero(chosen[frame]):
