@@ -12,7 +12,7 @@ import ipman_rs as ip
 from ipman_rs.body import poses
 from ipman_rs.cli import evaluate as command
 from ipman_rs.evaluation.tables import TABLES, job
-from ipman_rs.evaluation.tables.figures import FIGURES
+from ipman_rs.evaluation.tables.metrics import FIGURES
 
 FRAMES = 30
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from miniatures import human36m
 
 import ipman_rs.data as data
-from ipman_rs.body import safe_npz
 from ipman_rs.data import naming
+from ipman_rs.files import safe_npz
 
 
 @pytest.mark.parametrize("packed", [False, True])

@@ -22,9 +22,9 @@ import ipman_rs as ip
 from ipman_rs import data
 from ipman_rs.cli import main
 from ipman_rs.data import rendered
-from ipman_rs.data.rendered import writer
-from ipman_rs.data.rendered.samples import Settings
 from ipman_rs.data.rendered.torch_images import RenderedImages
+from ipman_rs.synthetic.images import writer
+from ipman_rs.synthetic.images.samples import Settings
 
 SETTINGS = Settings(seed=2, size=32)
 COUNTS = {"train": 9, "val": 2, "test": 1}

@@ -10,12 +10,12 @@ import pytest
 import trimesh
 
 import ipman_rs as ip
-from ipman_rs.data.rendered import cameras, patterns, renderer, surroundings, wardrobe
-from ipman_rs.data.rendered.figures import draw_figure, keypoint_names
-from ipman_rs.data.rendered.renderer import Solid, shaded
-from ipman_rs.data.rendered.samples import Settings, draw_sample, seen
-from ipman_rs.fitting.benchmark.scenes import FAMILIES
-from ipman_rs.fitting.surface import skin_points
+from ipman_rs.body.landmarks import skin_points
+from ipman_rs.synthetic.at_rest import FAMILIES
+from ipman_rs.synthetic.images import cameras, clothing, environment, renderer, textures
+from ipman_rs.synthetic.images.people import draw_figure, keypoint_names
+from ipman_rs.synthetic.images.renderer import Solid, shaded
+from ipman_rs.synthetic.images.samples import Settings, draw_sample, seen
 
 SETTINGS = Settings(seed=3, size=112, moving=0.5)
 
@@ -137,8 +137,8 @@ def ball():
 
 
 def plain(color):
-    pattern = patterns.draw_pattern(np.random.default_rng(0), ("plain",), np.array(color, float), (1, 1), 0.0)
-    return patterns.Pattern("plain", pattern.first, pattern.first, 1.0, 0.0, 0.0, pattern.lattice)
+    pattern = textures.draw_pattern(np.random.default_rng(0), ("plain",), np.array(color, float), (1, 1), 0.0)
+    return textures.Pattern("plain", pattern.first, pattern.first, 1.0, 0.0, 0.0, pattern.lattice)
 
 
 def test_ball_covers_what_perspective_says(ball):
@@ -148,7 +148,7 @@ def test_ball_covers_what_perspective_says(ball):
         200, rotation, -rotation @ [0.0, 0.5, 2.0], np.array([[300, 0, 100], [0, 300, 100], [0, 0, 1.0]])
     )
     draw = np.random.default_rng(0)
-    clothes, around = wardrobe.draw_clothes(draw, "anny-lite"), surroundings.draw_surroundings(draw)
+    clothes, around = clothing.draw_clothes(draw, "anny-lite"), environment.draw_surroundings(draw)
     picture = renderer.render(ball, ball.vertices, clothes, "anny-lite", around, camera)
     radius = 300 * 0.2 / math.sqrt(2**2 - 0.2**2)
     assert picture.covered.sum() == pytest.approx(math.pi * radius**2, rel=0.005)
@@ -169,13 +169,13 @@ def test_shadow_of_a_ball(ball):
 @pytest.mark.filterwarnings("error")
 def test_no_floor_is_seen(ball):
     """A camera that looks up sees what is behind the ball."""
-    around = surroundings.draw_surroundings(np.random.default_rng(0))
+    around = environment.draw_surroundings(np.random.default_rng(0))
     eye, rays = np.array([0.0, 0.3, 2.0], np.float32), np.array([[0, 0.3, -1], [0.2, 0.5, -1]], np.float32)
     np.testing.assert_array_equal(renderer.background(ball, eye, rays, 0 * rays, around), around.behind(eye, rays))
 
 
 def test_light_follows_lambert():
-    light = surroundings.Light(*(np.array(value, float) for value in ([0, 1, 0], [1] * 3, [0.5] * 3, [0.1] * 3)))
+    light = environment.Light(*(np.array(value, float) for value in ([0, 1, 0], [1] * 3, [0.5] * 3, [0.1] * 3)))
     up, side = np.array([[0.0, 1, 0]]), np.array([[1.0, 0, 0]])
     one, none = np.ones(1), np.zeros(1)
     np.testing.assert_allclose(light.on(up, one, one), 1.5)
@@ -204,7 +204,7 @@ def test_patterns_repeat_by_the_cell():
     colors = plain((0.2, 0.4, 0.6))(np.array([[0.3, 0.4]]))
     np.testing.assert_allclose(colors, [[0.2, 0.4, 0.6]], rtol=1e-6)
     first, second = np.zeros(3), np.ones(3)
-    checks = patterns.Pattern("checks", first, second, 0.5, 0.0, 0.0, np.zeros((64, 64)))
+    checks = textures.Pattern("checks", first, second, 0.5, 0.0, 0.0, np.zeros((64, 64)))
     plane = np.array([[0.1, 0.1], [0.3, 0.1], [0.3, 0.3], [0.6, 0.1], [0.1, 0.9]])
     assert checks(plane)[:, 0].tolist() == [0, 1, 0, 0, 1]
 
@@ -212,9 +212,9 @@ def test_patterns_repeat_by_the_cell():
 def test_clothes_are_where_they_belong():
     """Points of the mean body: hand and neck are skin, the breast is shirt, the thigh trousers, toes are shoes."""
     draw = np.random.default_rng(5)
-    marks = wardrobe.landmarks("anny-lite")
+    marks = clothing.landmarks("anny-lite")
     for _ in range(20):
-        clothes = wardrobe.draw_clothes(draw, "anny-lite")
+        clothes = clothing.draw_clothes(draw, "anny-lite")
         points = np.array([marks["left_hand"], marks["right_hand"], marks["spine2"], marks["left_big_toe"]])
         hand, other, breast, toe = clothes(points, "anny-lite")
         assert (hand == clothes.skin).all()

@@ -12,7 +12,7 @@ import pytest
 
 import ipman_rs as ip
 from ipman_rs.evaluation.tables import read
-from ipman_rs.evaluation.tables.figures import FIGURES
+from ipman_rs.evaluation.tables.metrics import FIGURES
 
 
 def refused(path, expected, tmp_path):

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
 from ipman_rs.evaluation import paired, paired_test
-from ipman_rs.evaluation.tables import Job, Source, columns, read
-from ipman_rs.evaluation.tables.figures import FIGURES
+from ipman_rs.evaluation.tables import Job, Source, frame_metrics, read
+from ipman_rs.evaluation.tables.metrics import FIGURES
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def test_balance_and_ground_are_those_of_the_engine(record, bodies):
 def test_skating_knows_the_frame_before_a_piece(evaluated, bodies):
     """Against a loop over the whole recording, which knows no pieces."""
     _, job = evaluated
-    soles = columns.soles(ip.load_body("anny-lite"))
+    soles = frame_metrics.soles(ip.load_body("anny-lite"))
     assert 20 < len(soles) < 200
     feet = bodies[1].vertices[:, soles].astype(float)
     found = np.concatenate([piece["skating"] for piece in job.results()])
@@ -167,7 +167,7 @@ def test_a_pressure_mat_is_compared(evaluated):
     centers = ip.center_of_pressure(vertices, model.template, floor, alpha=100, gamma=10)
     true = replace(job.data[slice(0, 6)], pressure=replace(mat, values=pressed), center_of_pressure=centers)
     assert isinstance(true, Frames)
-    found = columns.figures(true, guess, job)
+    found = frame_metrics.figures(true, guess, job)
     assert found["cop_error"] == pytest.approx(np.zeros(6), abs=1e-5)
     assert (found["pressure_iou"] > 0.9).all()
     assert (found["pressure_iou_chosen"] >= found["pressure_iou"] - 0.2).all()

@@ -11,7 +11,8 @@ from PIL import Image
 
 import ipman_rs as ip
 from ipman_rs import data
-from ipman_rs.cli import fit_outputs, main
+from ipman_rs.cli import main
+from ipman_rs.fitting.jobs import outputs
 
 
 def fitted(folder, name, body, pose, drop=0.0, **more):
@@ -34,7 +35,7 @@ def fitted(folder, name, body, pose, drop=0.0, **more):
         "model": np.array(body.name),
     }
     record = {"name": name, "source": f"/gone/{name}.jpg"}
-    fit_outputs.write_files(folder / name, {f"{name}.npz": {**arrays, **more}}, record)
+    outputs.write_files(folder / name, {f"{name}.npz": {**arrays, **more}}, record)
     return vertices - (0.0, drop, 0.0)
 
 

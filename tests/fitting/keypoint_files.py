@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import ipman_rs as ip
-from ipman_rs.fitting.keypoints import mediapipe
+from ipman_rs.data.keypoints import mediapipe
 
 SIZE = (480, 640)
 FOCAL = float(np.hypot(*SIZE))

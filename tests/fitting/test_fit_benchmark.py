@@ -13,15 +13,16 @@ import torch
 from click.testing import CliRunner
 
 import ipman_rs as ip
+from ipman_rs.ablation.fitting import metrics, observations, report, run, truth, variants
 from ipman_rs.body import load_body
 from ipman_rs.cli import main
-from ipman_rs.fitting.benchmark import measure, people, report, rows, run, scenes, settings, truth
 from ipman_rs.fitting.fit import Fit
+from ipman_rs.synthetic import at_rest, people
 
 
 @pytest.fixture(scope="module")
 def drawn():
-    return scenes.draw_scenes(4, seed=5)
+    return at_rest.draw_scenes(4, seed=5)
 
 
 @pytest.fixture(scope="module")
@@ -48,10 +49,10 @@ def test_people_are_people():
 
 
 def test_the_same_seed_draws_the_same(drawn):
-    again = scenes.draw_scenes(2, seed=5)
+    again = at_rest.draw_scenes(2, seed=5)
     for one, other in zip(drawn, again, strict=False):
         assert np.array_equal(one.vertices, other.vertices)
-    assert not np.array_equal(scenes.draw_scenes(1, seed=6)[0].vertices, drawn[0].vertices)
+    assert not np.array_equal(at_rest.draw_scenes(1, seed=6)[0].vertices, drawn[0].vertices)
 
 
 def test_balanced_bodies_rest_on_the_floor(drawn, known):
@@ -59,14 +60,14 @@ def test_balanced_bodies_rest_on_the_floor(drawn, known):
         assert scene.vertices[:, 1].min() == pytest.approx(0, abs=1e-9)
         assert ip.support_margin(scene.vertices, scene.template, ip.Ground.y_up(), 0.01, "exact") >= 0
     assert (known.margin_3 >= 0).all()
-    assert set(known.family) <= set(scenes.FAMILIES)
+    assert set(known.family) <= set(at_rest.FAMILIES)
 
 
 def test_controls_are_not_balanced():
-    tipped = truth.Truth.of(scenes.draw_scenes(4, 5, "tipped"))
+    tipped = truth.Truth.of(at_rest.draw_scenes(4, 5, "tipped"))
     assert (tipped.margin_3 < 0).mean() >= 0.75
     np.testing.assert_allclose(tipped.lowest, 0, atol=1e-9)
-    jumping = truth.Truth.of(scenes.draw_scenes(2, 5, "jumping"))
+    jumping = truth.Truth.of(at_rest.draw_scenes(2, 5, "jumping"))
     assert ((jumping.lowest >= 0.15) & (jumping.lowest <= 0.40)).all()
 
 
@@ -78,14 +79,14 @@ def test_truth_survives_its_file(known, tmp_path):
 
 def test_the_camera_sees_the_person(known):
     """Points of the problem are the projected landmarks but for the noise, and the image's y runs down."""
-    camera = settings.cameras(known, np.random.default_rng(0))
+    camera = observations.cameras(known, np.random.default_rng(0))
     seen = camera.see(torch.from_numpy(known.surface))
     assert (seen[..., 2] > 1).all()
     turns = camera.rotation
     np.testing.assert_allclose(turns @ turns.transpose(1, 2), np.eye(3)[None].repeat(4, 0), atol=1e-12)
     assert (torch.linalg.det(turns) > 0.999).all()
     assert (turns[:, 1, 1] < -0.5).all()
-    task = settings.calibrated(known, 0)
+    task = observations.calibrated(known, 0)
     landmarks = torch.from_numpy(known.landmarks)
     there = truth.known(load_body(truth.FITTED))
     points = task.camera.project(landmarks[:, [there.index(name) for name in task.problem.landmarks.names]])
@@ -97,18 +98,18 @@ def test_along_floor_finds_a_turn_and_a_shift(known):
     angle, shift = 0.7, np.array([1.0, 0.0, -2.0])
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     moved = known.surface @ turn.T + shift
-    np.testing.assert_allclose(measure.along_floor(moved, known.surface), known.surface, atol=1e-9)
+    np.testing.assert_allclose(metrics.along_floor(moved, known.surface), known.surface, atol=1e-9)
 
 
 def test_snapped_bodies_lie_on_the_floor(known):
-    task = settings.calibrated(known, 0)
-    found = measure.figures(measure.snapped(Fit(task.problem, task.starts)), task, known)
+    task = observations.calibrated(known, 0)
+    found = metrics.figures(metrics.snapped(Fit(task.problem, task.starts)), task, known)
     assert abs(found.lowest).max() < 1e-6
 
 
 def test_rows_differ_in_their_terms_alone():
-    for setting in (rows.CALIBRATED, rows.PRESENTED):
-        made = {row.name: rows.config(row, 100) for row in setting}
+    for setting in (variants.CALIBRATED, variants.PRESENTED):
+        made = {row.name: variants.config(row, 100) for row in setting}
         whole = made["both"].stages[-1]
         for name in ("baseline", "+ ground", "+ stability"):
             stage = made[name].stages[-1]
@@ -127,7 +128,7 @@ def test_command(tmp_path):
     record = json.loads((tmp_path / "fitting_benchmark.json").read_text())
     assert [block["name"] for block in record["blocks"]] == ["calibrated, good start", "calibrated, jumping"]
     names = [row["name"] for row in record["blocks"][0]["rows"]]
-    assert names == [row.name for row in rows.CALIBRATED]
+    assert names == [row.name for row in variants.CALIBRATED]
     with (tmp_path / "fitting_benchmark.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 4 * len(names) + 2 * len(run.CONTROLS)
     assert "## What was to be shown" in (tmp_path / "fitting_benchmark.md").read_text()

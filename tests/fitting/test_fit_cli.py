@@ -14,7 +14,8 @@ from click.testing import CliRunner
 
 import ipman_rs as ip
 from ipman_rs.cli import main
-from ipman_rs.fitting import camera_file, detected, keypoints
+from ipman_rs.data import keypoints
+from ipman_rs.fitting import camera_file, detected
 
 
 @pytest.fixture(scope="module")
@@ -274,8 +275,8 @@ def test_a_file_without_image_size(fit, tmp_path, standing):
 
 def openpose(landmarks, scale=1.0):
     """OpenPose's 25 points of MediaPipe's, relative to the image times `scale`."""
-    from ipman_rs.fitting.keypoints import mediapipe
-    from ipman_rs.fitting.keypoints.openpose import BODY_25
+    from ipman_rs.data.keypoints import mediapipe
+    from ipman_rs.data.keypoints.openpose import BODY_25
 
     places = dict(zip(mediapipe.NAMES, landmarks[:, [0, 1, 3]], strict=True))
     points = np.array([places.get(name, np.zeros(3)) for name in BODY_25]) * [*np.broadcast_to(scale, 2), 1]
@@ -322,7 +323,7 @@ def test_a_photo_of_another_size(fit, tmp_path, standing):
 
 def test_a_video_of_mmpose(fit, tmp_path, standing):
     """Three frames, of which the second shows nobody: two bodies, or one over time."""
-    from ipman_rs.fitting.keypoints import coco, mediapipe
+    from ipman_rs.data.keypoints import coco, mediapipe
 
     places = dict(zip(mediapipe.NAMES, standing[:, :2] * files.SIZE, strict=True))
     points = [list(places[name]) for name in coco.NAMES]

@@ -16,10 +16,10 @@ import ipman_rs as ip
 import ipman_rs.torch as ipt
 from ipman_rs import data
 from ipman_rs.cli import main
+from ipman_rs.data.keypoints.openpose import BODY_25
 from ipman_rs.evaluation.tables.job import Source
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.fitting import config, data_fits
-from ipman_rs.fitting.keypoints.openpose import BODY_25
 from ipman_rs.fitting.landmarks import Landmarks, known
 
 # A few iterations: what is tested is the way there and back.

@@ -8,8 +8,8 @@ import random
 import numpy as np
 import pytest
 
-from ipman_rs.fitting import keypoints
-from ipman_rs.fitting.keypoints import layouts, mediapipe, openpose
+from ipman_rs.data import keypoints
+from ipman_rs.data.keypoints import layouts, mediapipe, openpose
 
 SIZE = (640, 480)
 # A person who stands, in pixels, by COCO's order: the numbers are our own.

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from ipman_rs.fitting import keypoints
-from ipman_rs.fitting.detections import Detections, join
-from ipman_rs.fitting.keypoints import coco, coco_wholebody, mediapipe, openpose
+from ipman_rs.data import keypoints
+from ipman_rs.data.keypoints import coco, coco_wholebody, mediapipe, openpose
+from ipman_rs.data.keypoints.detections import Detections, join
 
 
 def flat(count, scale=1.0, start=0):

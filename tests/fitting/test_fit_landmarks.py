@@ -10,8 +10,8 @@ import pytest
 torch = pytest.importorskip("torch", reason="torch is an extra")
 
 import ipman_rs.torch as ipt  # noqa: E402
+from ipman_rs.body.landmarks import skin_points  # noqa: E402
 from ipman_rs.fitting.landmarks import Landmarks, Site, known  # noqa: E402
-from ipman_rs.fitting.surface import skin_points  # noqa: E402
 
 
 @pytest.fixture(scope="module", params=["anny", "anny-lite"])

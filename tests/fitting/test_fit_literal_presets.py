@@ -16,17 +16,17 @@ import torch
 
 import ipman_rs.torch as ipt
 from ipman_rs.body import poses
+from ipman_rs.body.landmarks import skin_points
+from ipman_rs.data.keypoints import openpose
 from ipman_rs.fitting import config, start, variables
 from ipman_rs.fitting.candidate import Candidate
 from ipman_rs.fitting.fit import fit
 from ipman_rs.fitting.geodesics import geodesics
-from ipman_rs.fitting.keypoints import openpose
 from ipman_rs.fitting.landmarks import Landmarks
 from ipman_rs.fitting.objective import Objective
 from ipman_rs.fitting.problem import Presented
 from ipman_rs.fitting.result import parameters, results
 from ipman_rs.fitting.rotations import matrix, vector
-from ipman_rs.fitting.surface import skin_points
 from ipman_rs.fitting.terms.contact_normals import ContactNormals
 from ipman_rs.fitting.terms.expression_prior import ExpressionPrior
 from ipman_rs.fitting.terms.hand_prior import HandPrior

@@ -13,8 +13,8 @@ torch = pytest.importorskip("torch", reason="torch is an extra")
 import ipman_rs.torch as ipt  # noqa: E402
 from ipman_rs.body.poses import pose_of  # noqa: E402
 from ipman_rs.cli import main  # noqa: E402
+from ipman_rs.data.markers import sites  # noqa: E402
 from ipman_rs.fitting.landmarks import Landmarks  # noqa: E402
-from ipman_rs.fitting.markers import sites  # noqa: E402
 
 NAMES = (
     *(f"{side}{name}" for side in "LR" for name in ["ASI", "PSI", "KNE", "ANK", "HEE", "TOE", "SHO", "ELB", "WRA"]),

@@ -10,11 +10,11 @@ import pytest
 pytest.importorskip("torch", reason="torch is an extra")
 
 import ipman_rs as ip
+from ipman_rs.data.markers import judged, meanings, own
+from ipman_rs.data.markers.anatomy import Anatomy, harrington
+from ipman_rs.data.markers.names import plain, unmatched
+from ipman_rs.data.markers.skin_distance import mean_distances, signed_distance
 from ipman_rs.data.tracks import TO_Y_UP, Tracks, turned
-from ipman_rs.fitting.markers import judged, meanings, own
-from ipman_rs.fitting.markers.anatomy import Anatomy, harrington
-from ipman_rs.fitting.markers.names import plain, unmatched
-from ipman_rs.fitting.markers.skin_distance import mean_distances, signed_distance
 
 
 @pytest.mark.parametrize(
@@ -168,8 +168,8 @@ def test_hip_centres_follow_the_shape(name):
     import torch
 
     import ipman_rs.torch as ipt
+    from ipman_rs.data.markers import sites
     from ipman_rs.fitting.landmarks import Landmarks
-    from ipman_rs.fitting.markers import sites
 
     body = ipt.BodyModel(name, torch.float64)
     named = ["LASI", "RASI", "LPSI", "RPSI", "LHJC", "RHJC"]
@@ -317,8 +317,8 @@ def test_wands_are_no_markers_on_the_skin():
     assert [name for name, place in found.items() if judged.on_skin(place)] == ["LKNE", "C7", "L_thigh1"]
     body = ip.load_body("anny-lite")
     anatomy = Anatomy(body)
-    from ipman_rs.fitting.markers import sites
-    from ipman_rs.fitting.markers.calibration import certainty
+    from ipman_rs.data.markers import sites
+    from ipman_rs.fitting.marker_calibration import certainty
 
     weights = {name: certainty(site) for name, site in sites(body, found).items()}
     assert weights["LTHI"] == pytest.approx(0.04)  # (1 cm / 5 cm)²

@@ -11,10 +11,10 @@ import trimesh
 torch = pytest.importorskip("torch", reason="torch is an extra")
 
 import ipman_rs.torch as ipt  # noqa: E402
-from ipman_rs.fitting import markers  # noqa: E402
+from ipman_rs.data import markers  # noqa: E402
+from ipman_rs.data.markers.sets import OPENCAP, OPENSIM_GAIT, PLUG_IN_GAIT  # noqa: E402
 from ipman_rs.fitting.landmarks import Landmarks, Site  # noqa: E402
-from ipman_rs.fitting.markers.calibration import calibrated  # noqa: E402
-from ipman_rs.fitting.markers.sets import OPENCAP, OPENSIM_GAIT, PLUG_IN_GAIT  # noqa: E402
+from ipman_rs.fitting.marker_calibration import calibrated  # noqa: E402
 
 
 def trc(rows, units="mm", names=("C7", "L.ASIS")):

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ipman_rs.fitting import keypoints, photo
+from ipman_rs.data import keypoints
+from ipman_rs.fitting import photo
 
 EXAMPLE = resources.files("ipman_rs.fitting") / "examples" / "basketball.json"
 

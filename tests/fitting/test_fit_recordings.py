@@ -12,7 +12,8 @@ torch = pytest.importorskip("torch", reason="torch is an extra")
 from fit_terms_cases import body_model  # noqa: E402
 
 import ipman_rs.torch as ipt  # noqa: E402
-from ipman_rs.fitting import markers, recorded, start  # noqa: E402
+from ipman_rs.data import markers  # noqa: E402
+from ipman_rs.fitting import marker_fit, start  # noqa: E402
 from ipman_rs.fitting.candidate import Candidate  # noqa: E402
 from ipman_rs.fitting.rotations import matrix  # noqa: E402
 
@@ -28,13 +29,13 @@ def body():
 @pytest.fixture(scope="module")
 def standing(shared, body):
     tracks = markers.read(shared("squat_forceplates") / "static1.trc")
-    return recorded.fit_tracks(body, tracks, every=EVERY["static1"])
+    return marker_fit.fit_tracks(body, tracks, every=EVERY["static1"])
 
 
 @pytest.fixture(scope="module")
 def squatting(shared, body, standing):
     tracks = markers.read(shared("squat_forceplates") / "squats1.trc")
-    return recorded.fit_tracks(body, tracks, every=EVERY["squats1"], person=standing.person)
+    return marker_fit.fit_tracks(body, tracks, every=EVERY["squats1"], person=standing.person)
 
 
 def solid(fit):
@@ -84,7 +85,7 @@ def test_the_shape_is_that_of_the_other_recording(standing, squatting):
 
 def test_markers_in_millimetres_of_another_person(shared, body):
     tracks = markers.read(shared("gait2354") / "subject01_static.trc")
-    found = recorded.fit_tracks(body, tracks, every=150)
+    found = marker_fit.fit_tracks(body, tracks, every=150)
     assert np.nanmean(found.errors) < 0.010
     assert solid(found.fit).mass.numpy().mean() == pytest.approx(72.6, rel=0.10)
 
@@ -96,16 +97,16 @@ def some_tracks(names):
 
 def test_markers_that_nobody_knows(body):
     with pytest.raises(ValueError, match=r"some.trc: expected at least 6 markers with known places, got 1 of C7, X"):
-        recorded.fit_tracks(body, some_tracks(["C7", "X"]))
+        marker_fit.fit_tracks(body, some_tracks(["C7", "X"]))
     with pytest.raises(ValueError, match="every: expected 1 or more, got 0"):
-        recorded.fit_tracks(body, some_tracks(["C7"]), every=0)
+        marker_fit.fit_tracks(body, some_tracks(["C7"]), every=0)
 
 
 def test_the_start_lies_on_the_points():
     """However a body lies and turns, `at_points` finds it, and to the bit alone as in a batch."""
     names = ["head", "left_wrist", "right_hip", "left_ankle", "pelvis"]
     tracks = markers.Tracks(tuple(names), np.zeros((4, 5, 3)), np.ones((4, 5)), np.arange(4.0), "")
-    problem = recorded.problem_of(body_model(), tracks, {name: name for name in names})
+    problem = marker_fit.problem_of(body_model(), tracks, {name: name for name in names})
     truth = start.neutral(problem)
     generator = torch.Generator().manual_seed(2)
     truth["orient"] = 2 * torch.randn(4, 3, generator=generator, dtype=torch.float64)

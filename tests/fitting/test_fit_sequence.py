@@ -11,11 +11,11 @@ torch = pytest.importorskip("torch", reason="torch is an extra")
 
 from fit_terms_cases import body_model  # noqa: E402
 
-from ipman_rs.fitting import recorded, sequence, start  # noqa: E402
+from ipman_rs.data.markers import Tracks  # noqa: E402
+from ipman_rs.fitting import marker_fit, sequence, start  # noqa: E402
 from ipman_rs.fitting.camera import Camera  # noqa: E402
 from ipman_rs.fitting.candidate import Candidate  # noqa: E402
 from ipman_rs.fitting.config import load  # noqa: E402
-from ipman_rs.fitting.markers import Tracks  # noqa: E402
 from ipman_rs.fitting.rotations import vector  # noqa: E402
 from ipman_rs.fitting.solvers import Look  # noqa: E402
 from ipman_rs.fitting.solvers.arrow import Arrow, solve  # noqa: E402
@@ -33,7 +33,7 @@ def recording(frames: int = 6, noise: float = 0.005, seed: int = 4):
     tracks = Tracks(
         tuple(NAMES), np.zeros((frames, len(NAMES), 3)), np.ones((frames, len(NAMES))), np.arange(frames), ""
     )
-    problem = recorded.problem_of(body_model(), tracks, {name: name for name in NAMES})
+    problem = marker_fit.problem_of(body_model(), tracks, {name: name for name in NAMES})
     truth = start.neutral(problem)
     phase = torch.linspace(0, 1, frames, dtype=torch.float64)
     truth["pose"][:, 15, 2] += phase

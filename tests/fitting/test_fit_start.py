@@ -11,10 +11,10 @@ import torch
 
 import ipman_rs.torch as ipt
 from ipman_rs.body import poses
+from ipman_rs.data.keypoints import mediapipe
 from ipman_rs.fitting import config, start
 from ipman_rs.fitting.camera import Camera
 from ipman_rs.fitting.fit import fit
-from ipman_rs.fitting.keypoints import mediapipe
 from ipman_rs.fitting.landmarks import Landmarks, known
 from ipman_rs.fitting.problem import Presented, Problem
 from ipman_rs.fitting.rotations import matrix, vector

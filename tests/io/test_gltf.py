@@ -13,7 +13,7 @@ from gltf_files import Gltf
 from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
-from ipman_rs.io.read_mesh import read_mesh
+from ipman_rs.files.mesh.read_mesh import read_mesh
 
 BOX = trimesh.creation.box((0.4, 1.7, 0.3))
 POINTS, FACES = np.asarray(BOX.vertices, np.float32).astype(float), np.asarray(BOX.faces)

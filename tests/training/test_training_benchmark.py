@@ -13,19 +13,19 @@ import torch
 from click.testing import CliRunner
 
 import ipman_rs.data
+from ipman_rs.ablation.training import claims, report
+from ipman_rs.ablation.training.from_images import AUGMENTING, Pictures, moved
+from ipman_rs.ablation.training.intervals import paired_over_seeds
+from ipman_rs.ablation.training.variants import BASELINE, CONTROL, OURS, settings
 from ipman_rs.body import load_body
 from ipman_rs.cli import main
 from ipman_rs.training.augment import normalised
-from ipman_rs.training.benchmark import claims, report
-from ipman_rs.training.benchmark.intervals import paired_over_seeds
-from ipman_rs.training.benchmark.pictures import AUGMENTING, Pictures, moved
-from ipman_rs.training.benchmark.rows import BASELINE, CONTROL, OURS, settings
-from ipman_rs.training.drill import Drill
-from ipman_rs.training.figures import figures
 from ipman_rs.training.lifting import views
 from ipman_rs.training.lifting.views import KEYPOINTS
+from ipman_rs.training.metrics import figures
 from ipman_rs.training.model import Estimate
 from ipman_rs.training.sources.images import Images
+from ipman_rs.training.train_loop import Drill
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import torch
 
-from ipman_rs.training.benchmark.shuffled_camera import shuffled_camera
-from ipman_rs.training.leaning import leaning
+from ipman_rs.ablation.training.shuffled_camera import shuffled_camera
 from ipman_rs.training.lifting import views
+from ipman_rs.training.tilted_labels import leaning
 from ipman_rs.training.world import seen_from, to_world
 
 

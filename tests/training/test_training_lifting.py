@@ -11,15 +11,16 @@ import torch
 
 import ipman_rs as ip
 from ipman_rs.body import load_body
-from ipman_rs.fitting.benchmark.scenes import FAMILIES
-from ipman_rs.training.drill import Drill, drill, estimated
-from ipman_rs.training.lifting import bodies, views
+from ipman_rs.synthetic import population
+from ipman_rs.synthetic.at_rest import FAMILIES
+from ipman_rs.training.lifting import views
 from ipman_rs.training.lifting.network import lifter
 from ipman_rs.training.losses import Loss, Physics
+from ipman_rs.training.train_loop import Drill, drill, estimated
 
 
 def test_people_stand(static):
-    body = load_body(bodies.BODY)
+    body = load_body(population.BODY)
     vertices = np.asarray(body(static.pose, static.betas, static.transl).vertices)
     np.testing.assert_allclose(vertices[..., 1].min(axis=1), 0, atol=1e-12)
     assert (ip.support_margin(vertices, body.template, ip.Ground.y_up(), 0.01, "exact") >= -1e-9).all()
@@ -29,22 +30,22 @@ def test_people_stand(static):
 
 
 def test_people_depend_on_seed_and_number_alone(static):
-    again = bodies.draw_bodies(9, seed=7)
+    again = population.draw_bodies(9, seed=7)
     assert np.array_equal(again.pose, static.pose[:9])
-    assert not np.array_equal(bodies.draw_bodies(1, seed=8).pose, static.pose[:1])
+    assert not np.array_equal(population.draw_bodies(1, seed=8).pose, static.pose[:1])
 
 
 def test_people_survive_their_file(static, tmp_path):
     static.save(tmp_path / "people.npz")
-    loaded = bodies.Bodies.load(tmp_path / "people.npz")
+    loaded = population.Bodies.load(tmp_path / "people.npz")
     assert all(np.array_equal(value, getattr(loaded, name)) for name, value in vars(static).items())
 
 
 def test_a_mirrored_pose_is_a_mirror_image(static):
     """Joints of the mirrored pose are the mirrored joints of the other side, as far as the mean body is symmetric."""
-    body = load_body(bodies.BODY)
-    own, other = (np.asarray(body(pose).joints) for pose in (static.pose, bodies.mirrored(static.pose)))
-    swap = [body.joint_names.index(bodies._other_side(name)) for name in body.joint_names]
+    body = load_body(population.BODY)
+    own, other = (np.asarray(body(pose).joints) for pose in (static.pose, population.mirrored(static.pose)))
+    swap = [body.joint_names.index(population._other_side(name)) for name in body.joint_names]
     np.testing.assert_allclose(other[:, swap] * [-1, 1, 1], own, atol=6e-3)
 
 

@@ -14,7 +14,7 @@ from ipman_rs.training import losses
 from ipman_rs.training.lifting import views
 from ipman_rs.training.lifting.network import lifter
 from ipman_rs.training.model import Estimate
-from ipman_rs.training.posing import Posing
+from ipman_rs.training.posed_estimate import Posing
 from ipman_rs.training.projection import FOCAL, project
 from ipman_rs.training.world import to_world
 
@@ -144,7 +144,7 @@ def test_the_gradient_is_that_of_the_loss(static):
     def value(*parameters):
         estimate = Estimate(*parameters)
         posed = posing.body(estimate.pose, estimate.betas)
-        from ipman_rs.training.posing import Posed
+        from ipman_rs.training.posed_estimate import Posed
 
         placed = Posed(posed.vertices, posed.joints, posing.points(posed))
         terms = loss._data_terms(estimate, placed, truth)

@@ -15,10 +15,11 @@ from click.testing import CliRunner  # noqa: E402
 
 import ipman_rs as ip  # noqa: E402
 import ipman_rs.torch as ipt  # noqa: E402
-from ipman_rs.cli import main, validate_run  # noqa: E402
-from ipman_rs.fitting import markers  # noqa: E402
+from ipman_rs.cli import main  # noqa: E402
+from ipman_rs.data import markers  # noqa: E402
+from ipman_rs.data.markers.sets import OPENCAP  # noqa: E402
 from ipman_rs.fitting.landmarks import Landmarks  # noqa: E402
-from ipman_rs.fitting.markers.sets import OPENCAP  # noqa: E402
+from ipman_rs.validation import run as validation_run  # noqa: E402
 
 RATE, FRAMES = 50, 40
 MASS = 64.0  # kg
@@ -191,17 +192,17 @@ def test_a_bad_file_is_told_and_the_rest_goes_on(run, folder, tmp_path):
 
 def test_a_recording_that_fails_for_no_known_reason_takes_no_other_with_it(folder, tmp_path, monkeypatch):
     (tmp_path / "lab").mkdir()
-    plan = validate_run.plan(copied(folder, tmp_path / "lab"), tmp_path / "out", "anny-lite", "none", 10.0, True)
+    plan = validation_run.plan(copied(folder, tmp_path / "lab"), tmp_path / "out", "anny-lite", "none", 10.0, True)
 
     def compared(_plan, one, *_):
         if one.trial.name == "static":
             raise AssertionError
         return {"name": one.trial.name}
 
-    monkeypatch.setattr(validate_run, "_fitted", lambda *_: {"notes": []})
-    monkeypatch.setattr(validate_run, "_compared", compared)
-    monkeypatch.setattr(validate_run, "_weighs", lambda _: False)
-    found, _, failures = validate_run.run(plan)
+    monkeypatch.setattr(validation_run, "_fitted", lambda *_: {"notes": []})
+    monkeypatch.setattr(validation_run, "_compared", compared)
+    monkeypatch.setattr(validation_run, "_weighs", lambda _: False)
+    found, _, failures = validation_run.run(plan)
     assert [one["name"] for one in found] == ["lift"]
     assert [str(each) for each in failures] == [
         f"{tmp_path / 'lab' / 'static.trc'}: cannot be compared: AssertionError"
@@ -258,9 +259,9 @@ def test_forces_in_other_axes_than_the_markers(person, tmp_path):
     x, y, z = (person.com + OFF) * [1, 0, 1]
     mot(lab / "walk_grf.mot", np.array([x, -z, y]), lambda _t: MASS * G, up="z")
     for up in (None, (0.0, 0.0, 1.0)):
-        plan = validate_run.plan(lab, tmp_path / "out", "anny-lite", "none", 10.0, True, force_up=up)
-        told = validate_run.Told()
-        found = validate_run._read(plan, plan.trials[0], told)
+        plan = validation_run.plan(lab, tmp_path / "out", "anny-lite", "none", 10.0, True, force_up=up)
+        told = validation_run.Told()
+        found = validation_run._read(plan, plan.trials[0], told)
         if up is None:
             assert "walk_grf.mot: looks like z up" in str(told.failures[0])
             assert "(--force-up z)" in str(told.failures[0])

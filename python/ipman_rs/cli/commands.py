@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..files.errors import FileError, one_line
 from .benchmark import benchmark
 from .data import data
-from .errors import FileError, one_line, warnings_in_one_line
 from .evaluate import evaluate
 from .figure import figure
 from .fit import fit
@@ -20,6 +20,7 @@ from .predict import predict
 from .simulate import simulate
 from .train import train
 from .validate import validate
+from .warned import warnings_in_one_line
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -182,8 +183,8 @@ def analyze(
     """
     if output is None and not as_json:
         raise click.UsageError("Missing option '-o' / '--output' (or '--json' to print the numbers only).")
+    from ..study.from_file import Request, measure
     from . import console
-    from .measure import Request, measure
 
     request = Request(model=model, up=up, ground=ground, parts=parts, preset=preset, **mended)
     studies: list[Study] = []

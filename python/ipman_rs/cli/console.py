@@ -12,8 +12,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from ..files.errors import one_line
 from ..view import Study
-from .errors import one_line
 
 
 def error(text: str) -> None:

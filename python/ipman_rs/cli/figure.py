@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .errors import FileError
+from ..files.errors import FileError
 from .options import GROUND, PRESETS, UP, Setting, of_files
 
 if TYPE_CHECKING:
@@ -205,7 +205,7 @@ def _one_body(body: str, frame: int | None, request: dict[str, Any]) -> tuple[An
     """Vertices, template, ground and name; `request`: the fields of `measure.Request`."""
     import ipman_rs as ip
 
-    from .measure import Request, odd_sizes, on_ground, warn, with_sizes
+    from ..study.from_file import Request, odd_sizes, on_ground, warn, with_sizes
 
     if body in ip.body.poses.NAMES and not Path(body).exists():
         for option, value in (("--frame", frame), ("--up", request["up"]), ("--parts", request["parts"])):

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .errors import FileError
+from ..files.errors import FileError
 from .options import FLOOR, METRES, SIZE, UNIT, UP, Setting, force, of_unknown_camera, rate, subject
 
 if TYPE_CHECKING:
+    from ..fitting.jobs.items import Item
+    from ..fitting.jobs.run import Settings
     from ..view import Study
-    from .fit_inputs import Item
-    from .fit_run import Settings
 
 
 @click.command()
@@ -169,8 +169,8 @@ def fit(
         raise click.UsageError("expected INPUT..., or --data with --path")
     needs("torch", "roma", "yaml")
     warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
+    from ..fitting.jobs.items import Reading
     from . import console
-    from .fit_inputs import Reading
 
     if data is not None:
         from .fit_data import fit_data
@@ -215,7 +215,7 @@ def _list_places(context: click.Context, _: click.Parameter, wanted: bool) -> No
     needs("torch", "roma", "yaml")
     import ipman_rs as ip
 
-    from ..fitting.markers import places
+    from ..data.markers import places
 
     click.echo("\n".join(places(ip.load_body("anny-lite"))))
     context.exit()
@@ -230,25 +230,25 @@ def needs(*modules: str) -> None:
 
 def _items(inputs: tuple[Path, ...], reading: Any) -> tuple[list[Item], list[Path], list[tuple[str, str]]]:
     """The people in the inputs, under names of their own, the marker files, and the files that have nobody."""
+    from ..fitting.jobs import items
     from ..view.report import safe_names
-    from . import fit_inputs
 
     found: list[Item] = []
     failures: list[tuple[str, str]] = []
     paths: list[Path] = []
     for path in inputs:
         try:
-            paths += fit_inputs.expand([path])
+            paths += items.expand([path])
         except FileError as error:
             failures.append((str(path), error.what))
     if reading.photo is not None and len(paths) > 1:
         raise click.UsageError(f"--image belongs to one keypoint file, got {len(paths)} inputs")
-    tracks = [path for path in paths if path.suffix.lower() in fit_inputs.MARKERS]
+    tracks = [path for path in paths if path.suffix.lower() in items.MARKERS]
     for path in paths:
         if path in tracks:
             continue
         try:
-            found += fit_inputs.items(path, reading)
+            found += items.items(path, reading)
         except FileError as error:
             failures.append((str(path), error.what))
         except (OSError, ValueError) as error:
@@ -262,13 +262,13 @@ def _recordings(
     tracks: list[Path], frames: list[Item], settings: Settings, pace: tuple[int, float], output: Path, resume: bool
 ) -> tuple[list[Study], list[tuple[str, str]]]:
     """The fitted recordings, measured, and those that failed."""
-    from . import fit_recordings
+    from ..fitting.jobs import recordings
 
     studies: list[Study] = []
     failures: list[tuple[str, str]] = []
-    for recording in fit_recordings.recordings(tracks, frames):
+    for recording in recordings.recordings(tracks, frames):
         try:
-            studies.append(fit_recordings.fitted(recording, settings, fit_recordings.Pace(*pace), output, resume))
+            studies.append(recordings.fitted(recording, settings, recordings.Pace(*pace), output, resume))
         except FileError as error:
             failures.append((recording.source, error.what))
         except OSError as error:
@@ -279,9 +279,9 @@ def _recordings(
 def _settings(options: dict[str, Any]) -> Settings:
     import ipman_rs as ip
 
+    from ..data.markers import own
     from ..fitting import camera_file, config
-    from ..fitting.markers import own
-    from .fit_run import Settings
+    from ..fitting.jobs.run import Settings
 
     try:
         options["camera"] = None if options["camera"] is None else camera_file.read(options["camera"])
@@ -294,7 +294,7 @@ def _settings(options: dict[str, Any]) -> Settings:
 
 
 def _run(items: list[Item], settings: Settings, output: Path, resume: bool) -> dict[str, dict[str, Any]]:
-    from .fit_run import run
+    from ..fitting.jobs.run import run
 
     try:
         return run(items, settings, output, resume)
@@ -312,8 +312,8 @@ def _studies(
     import ipman_rs as ip
 
     from ..fitting import photo
+    from ..fitting.jobs.outputs import study_of
     from . import console
-    from .fit_outputs import study_of
 
     body = ip.load_body(settings.model)
     fitted = [item for item in items if item.name in records]

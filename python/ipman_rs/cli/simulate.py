@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .errors import FileError, one_line
+from ..files.errors import FileError, one_line
 from .options import GROUND, TIMES, UP, of_files
 
 if TYPE_CHECKING:
-    from .fall_inputs import Bodies
-    from .falls import Fall
+    from ..simulation.inputs import Bodies
+    from ..simulation.report import Fall
 
 MOST_ROWS = 40
 
@@ -106,10 +106,7 @@ def simulate(
 
     Exit code: 0 when all is well, 1 when a file could not be read (the others are), 2 for wrong usage.
     """
-    from . import console
-    from .fall_inputs import read_bodies
-    from .falls import fall, write_falls
-    from .falls_compared import (
+    from ..simulation.comparison_report import (
         compare_falls,
         comparison_lines,
         comparison_record,
@@ -117,7 +114,10 @@ def simulate(
         pairs,
         write_comparison,
     )
-    from .measure import Request
+    from ..simulation.inputs import read_bodies
+    from ..simulation.report import fall, write_falls
+    from ..study.from_file import Request
+    from . import console
 
     if against is not None and (len(bodies) != 1 or options["tip_only"]):
         wrong = "--tip-only" if options["tip_only"] else f"{len(bodies)} files"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ipman_rs.files import cell, write_whole
-from ipman_rs.plain import plain
+from ipman_rs.jsonable import jsonable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +44,9 @@ def write(figure: PaperFigure, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     settle(figure.picture, DPI)
     contents = {"png": _picture(figure, "png"), "svg": _picture(figure, "svg")}
-    record = json.dumps(plain({"figure": figure.name, **figure.numbers}), allow_nan=False, ensure_ascii=False, indent=1)
+    record = json.dumps(
+        jsonable({"figure": figure.name, **figure.numbers}), allow_nan=False, ensure_ascii=False, indent=1
+    )
     contents["json"] = f"{record}\n".encode()
     if figure.arrays:
         contents["npz"] = _packed(figure.arrays)

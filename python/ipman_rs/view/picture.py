@@ -11,16 +11,17 @@ import numpy as np
 
 from ipman_rs.files import being_written
 
+from ..body.normals import vertex_normals
+from ..study.camera import Camera, look_at
 from . import colors
-from .camera import Camera, look_at
-from .geometry import floor_lines, grid_step, pressure_at, vertex_normals
+from .geometry import floor_lines, grid_step, pressure_at
 from .raster import faces_viewer, rasterize, shrink
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from .study import Study
+    from ..study.study import Study
 
 Paint = Callable[[np.ndarray], np.ndarray]
 Box = tuple[float, float, float, float]
