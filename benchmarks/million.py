@@ -83,11 +83,11 @@ def _child(*command: str, threads: int) -> dict[str, Any]:
 @click.argument("report", type=click.Path(path_type=Path))
 def run(file: Path, report: Path) -> None:
     """What `ipman analyze FILE --ground 0 -o REPORT` does, timed."""
-    from ipman_rs.study.from_file import Request, measure
+    from ipman_rs.study.from_file import Request, analyze_file
     from ipman_rs.view.report import write_report
 
     start, used = time.perf_counter(), time.process_time()
-    study = measure(file, Request(ground=0.0))
+    study = analyze_file(file, Request(ground=0.0))
     seconds, cpu = time.perf_counter() - start, time.process_time() - used
     peak = _peak_megabytes()
     write_report([study], report)

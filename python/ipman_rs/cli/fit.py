@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 import warnings
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..files.errors import FileError
-from .options import FLOOR, METRES, SIZE, UNIT, UP, Setting, force, of_unknown_camera, rate, subject
+from .options import FLOOR, METRES, SIZE, UNIT, UP, Setting, force, needs, of_unknown_camera, rate, subject
 
 if TYPE_CHECKING:
     from ..fitting.jobs.items import Item
@@ -197,7 +196,7 @@ def fit(
     for source, what in failures:
         console.error(f"{source}: {what}")
     if studies:
-        from .commands import write
+        from .report import write
 
         page = write(studies, output, failures, own_folders=True)
         fits, recorded = [s for s in studies if s.fitted is not None], [s for s in studies if s.fitted is None]
@@ -219,13 +218,6 @@ def _list_places(context: click.Context, _: click.Parameter, wanted: bool) -> No
 
     click.echo("\n".join(places(ip.load_body("anny-lite"))))
     context.exit()
-
-
-def needs(*modules: str) -> None:
-    """Ends the command where a module of the extra `fit` is missing."""
-    missing = [name for name in modules if importlib.util.find_spec(name) is None]
-    if missing:
-        raise click.ClickException(f"fitting needs {', '.join(missing)}: pip install 'ipman_rs[fit]'")
 
 
 def _items(inputs: tuple[Path, ...], reading: Any) -> tuple[list[Item], list[Path], list[tuple[str, str]]]:
@@ -263,12 +255,15 @@ def _recordings(
 ) -> tuple[list[Study], list[tuple[str, str]]]:
     """The fitted recordings, measured, and those that failed."""
     from ..fitting.jobs import recordings
+    from . import console
 
     studies: list[Study] = []
     failures: list[tuple[str, str]] = []
     for recording in recordings.recordings(tracks, frames):
         try:
-            studies.append(recordings.fitted(recording, settings, recordings.Pace(*pace), output, resume))
+            found = recordings.fitted(recording, settings, recordings.Pace(*pace), output, resume, console.progress)
+            console.warn_of(recording.source, found.flags)
+            studies.append(found)
         except FileError as error:
             failures.append((recording.source, error.what))
         except OSError as error:
@@ -295,9 +290,10 @@ def _settings(options: dict[str, Any]) -> Settings:
 
 def _run(items: list[Item], settings: Settings, output: Path, resume: bool) -> dict[str, dict[str, Any]]:
     from ..fitting.jobs.run import run
+    from . import console
 
     try:
-        return run(items, settings, output, resume)
+        return run(items, settings, output, resume, console.progress)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     except OSError as error:

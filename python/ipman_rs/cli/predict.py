@@ -110,7 +110,7 @@ def predict(
                 console.error(str(error))
             step.one()
     if studies:
-        from .commands import write
+        from .report import write
 
         page = write(studies, output, failures, own_folders=True)
         console.print_table(studies)

@@ -140,20 +140,25 @@ def simulate(
         except ImportError as error:
             raise click.ClickException(str(error)) from error
 
+    def opened(path: Path) -> Bodies:
+        read = read_bodies(path, request, console.progress)
+        console.warn_of(path, read.flags)
+        return read
+
     compared = None
     if against is None:
         for path in bodies:
             with reported():
-                falls.append(fall(read_bodies(path, request), films, **options))
+                falls.append(fall(opened(path), films, **options, progress=console.progress))
     else:  # what cannot be compared is not simulated
         both: list[Bodies] = []
         for path in (*bodies, against):
             with reported():
-                both.append(read_bodies(path, request))
+                both.append(opened(path))
         with reported():
             if not failures:
                 pairs(*both)
-                falls += [fall(each, films, **options) for each in both]
+                falls += [fall(each, films, **options, progress=console.progress) for each in both]
                 compared = compare_falls(*falls)
     record: dict[str, Any] = {"bodies": [one.record() for one in falls]}
     if compared is not None:
@@ -162,7 +167,7 @@ def simulate(
     text = json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1)
     if output is not None and falls:
         try:
-            write_falls(falls, output, text)
+            write_falls(falls, output, text, console.progress)
             if compared is not None:
                 write_comparison(*compared[1:], (falls[0].path, falls[1].path), output)
         except OSError as error:

@@ -10,8 +10,7 @@ from typing import Any
 import click
 
 from ..files.errors import FileError
-from .fit import needs
-from .options import METRES, RATE, UNIT, UP, force, subject
+from .options import METRES, RATE, UNIT, UP, force, needs, subject
 
 
 @click.command()
@@ -99,7 +98,7 @@ def validate(
     except (ValueError, ImportError) as error:
         raise click.UsageError(str(error)) from error
     try:
-        records, notes, failures = run.run(plan)
+        records, notes, failures = run.run(plan, console.progress)
         page = run.write(plan, records, notes, failures) if records else None
     except OSError as error:
         what = f"{output}: outputs cannot be written ({error.strerror or error}); choose another folder"

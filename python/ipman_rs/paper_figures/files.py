@@ -17,6 +17,7 @@ import numpy as np
 
 from ipman_rs.files import cell, write_whole
 from ipman_rs.jsonable import jsonable
+from ipman_rs.view.picture import settle
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,19 +59,6 @@ def write(figure: PaperFigure, folder: Path) -> list[Path]:
         write_whole(path, content)
         written.append(path)
     return written
-
-
-def settle(picture: Figure, dpi: float) -> None:
-    """Lays a figure out for a picture of that dpi, and ends that. The solver of matplotlib's layout is not the same in
-    the last digit each time, and an SVG names its clips after all digits."""
-    if picture.get_layout_engine() is None:
-        return
-    picture.set_dpi(dpi)
-    picture.draw_without_rendering()
-    picture.set_layout_engine("none")
-    for axes in picture.axes:
-        left, bottom, width, height = (round(float(edge), 9) for edge in axes.get_position(original=True).bounds)
-        axes.set_position((left, bottom, width, height), which="original")
 
 
 def _picture(figure: PaperFigure, form: str) -> bytes:

@@ -13,7 +13,7 @@ from ..evaluation.statistics.bootstrap import Interval
 from ..files import being_written
 from ..files.errors import FileError
 from ..jsonable import jsonable
-from ..paper_figures.files import settle
+from ..view.picture import settle
 from . import VERDICT, Comparison, Means, Simulation, compare
 from .comparison import MORE_STABLE_IN_THE_PAPER
 from .inputs import Bodies

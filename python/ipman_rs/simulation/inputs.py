@@ -19,7 +19,8 @@ from ..files import safe_npz
 from ..files.errors import FileError
 from ..fitting.jobs.outputs import RECORD
 from ..io.recording import Recording
-from ..study.from_file import Request, odd_sizes, on_ground, warn, with_sizes
+from ..progress import Progress, silent
+from ..study.from_file import Request, odd_sizes, on_ground, with_sizes
 
 _BESIDE = ("names", "body", "model", "ground", "ground_normal", "ground_height")  # arrays beside the parameters
 PREDICTIONS = "predictions.npz"  # what `ipman predict --data` and `ipman fit --data` leave in their folder
@@ -43,28 +44,26 @@ class Bodies:
         return len(self.recording.vertices)
 
 
-def read_bodies(path: Path, request: Request) -> Bodies:
-    """What is odd about them goes to stderr, too. Raises FileError."""
+def read_bodies(path: Path, request: Request, progress: Progress = silent) -> Bodies:
+    """The bodies of a file or folder; what is odd about them stands in `flags`. Raises FileError."""
     try:
         with odd_sizes() as sizes:
             if path.is_dir() and not (path / PREDICTIONS).is_file():
-                found = _fits(path, request)
+                found = _fits(path, request, progress)
             else:
-                found = replace(_file(path / PREDICTIONS if path.is_dir() else path, request), path=path)
+                found = replace(_file(path / PREDICTIONS if path.is_dir() else path, request, progress), path=path)
     except (ValueError, TypeError) as error:
         raise FileError(path, str(error)) from error
     except MemoryError as error:
         raise FileError(path, "needs more memory than there is; simulate fewer frames at once") from error
-    found = replace(found, flags=with_sizes(found.flags, sizes))
-    warn(path, found.flags)
-    return found
+    return replace(found, flags=with_sizes(found.flags, sizes))
 
 
-def _file(path: Path, request: Request) -> Bodies:
+def _file(path: Path, request: Request, progress: Progress) -> Bodies:
     arrays = _arrays(path) if path.suffix.lower() == ".npz" and path.is_file() and path.stat().st_size else {}
     request = _with_model(path, request, arrays)
     own = _own_ground(path, arrays, request.units) if request.up is None and request.ground is None else None
-    recording, template, ground, notes = on_ground(path, request, own, _BESIDE)
+    recording, template, ground, notes = on_ground(path, request, own, _BESIDE, progress)
     count = len(recording.vertices)
     if own is not None and own.height.size not in (1, count):
         raise FileError(path, f"has {own.height.size} grounds for {count} bodies; expected one, or one for each")
@@ -111,12 +110,12 @@ def _own_ground(path: Path, arrays: dict[str, np.ndarray], metres: float) -> ip.
         raise FileError(path, str(error)) from error
 
 
-def _fits(folder: Path, request: Request) -> Bodies:
+def _fits(folder: Path, request: Request, progress: Progress) -> Bodies:
     """The bodies of a folder of `ipman fit`, in the order of their names."""
     items = [record.parent for record in sorted(folder.glob(f"*/{RECORD}"))]
     if not items:
         raise FileError(folder, f"holds neither {PREDICTIONS} nor finished fits; name a file, or a folder of ipman fit")
-    each = [_file(item / f"{item.name}.npz", request) for item in items]
+    each = [_file(item / f"{item.name}.npz", request, progress) for item in items]
     first = each[0]
     for item, other in zip(items, each, strict=True):
         faces = other.recording.faces

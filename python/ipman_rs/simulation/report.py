@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from .. import view
 from ..analysis import PIECE
 from ..body.sequence import pieces
-from ..cli import console
 from ..files import being_written, write_whole
 from ..files.errors import FileError
 from ..ground import Ground
 from ..jsonable import jsonable
+from ..progress import Progress, silent
 from ..status import Status, status_names
-from ..study.study import evenly
+from ..study import Study, study
+from ..study.study import evenly, marked
 from ..view.filmstrip import draw_filmstrip
 from ..view.report import safe_names
 from . import FALLEN, VERDICT, Simulation, TipTest, simulate, tip_test
@@ -34,7 +34,7 @@ class Film:
     """A fall in pictures: the frame of the file, poses (T, V, 3) and the seconds of each."""
 
     frame: int
-    study: view.Study
+    study: Study
     seconds: tuple[float, ...]
 
 
@@ -98,7 +98,7 @@ class Fall:
         columns, stands, status = self._columns(), self.stands(), self.status()
         for frame in range(self.count):
             own = f" {frame}" if self.names is None else f" {self.names[frame]}"
-            name = console.marked(self.path.name + ("" if self.count == 1 else own), self.flags)
+            name = marked(self.path.name + ("" if self.count == 1 else own), self.flags)
             unknown = status_names(status[frame] & _UNKNOWN)
             verdict = None if stands is None else ("yes" if stands[frame] else "no")
             yield name, [_number(value) for value in columns[:, frame]], ", ".join(unknown).lower() or verdict
@@ -115,7 +115,7 @@ class Fall:
         return self._title(), cells, share
 
     def _title(self) -> str:
-        return console.marked(f"{self.path.name} ({self.count} frames)", self.flags)
+        return marked(f"{self.path.name} ({self.count} frames)", self.flags)
 
     def record(self) -> dict[str, Any]:
         """Plain numbers for JSON; of more than 10,000 frames evenly spaced ones."""
@@ -174,13 +174,14 @@ def fall(
     friction: float,
     snap: bool,
     tip_only: bool,
+    progress: Progress = silent,
 ) -> Fall:
     """Test the bodies of a file and let them go, a piece of them at a time. Raises FileError."""
     path, recording, template = bodies.path, bodies.recording, bodies.template
     try:
         options: dict[str, Any] = {"engine": engine, "shape": shape, "step": step, "friction": friction, "snap": snap}
         tips, runs, done = [], [], 0
-        with console.progress(f"letting go {path.name}", len(recording.vertices)) as bar:
+        with progress(f"letting go {path.name}", len(recording.vertices)) as bar:
             for vertices in pieces(recording.vertices, PIECE):
                 ground = _grounds(bodies.ground, slice(done, done + len(vertices)))
                 tips.append(tip_test(vertices, template, ground))
@@ -236,16 +237,15 @@ def _film(result: Fall, body: np.ndarray, frame: int, template: Any, ground: Any
     run = simulate(body, template, ground, tuple(seconds), **options)
     labels = [f"{time:.2f} s" for time in run.times]
     name = result.path.stem if result.count == 1 else f"{result.path.stem} {frame}"
-    study = view.study(name, run.posed(body), template, ground, labels=labels)
-    return Film(frame, study, tuple(run.times.tolist()))
+    return Film(frame, study(name, run.posed(body), template, ground, labels=labels), tuple(run.times.tolist()))
 
 
-def write_falls(falls: Sequence[Fall], output: Path, record: str) -> None:
+def write_falls(falls: Sequence[Fall], output: Path, record: str, progress: Progress = silent) -> None:
     """simulation.json of all files; simulation.npz and filmstrips of each, in folders where there are several."""
     output.mkdir(parents=True, exist_ok=True)
     write_whole(output / "simulation.json", record + "\n")
     names = safe_names([one.path.stem for one in falls])
-    with console.progress("writing", sum(1 + len(one.films) for one in falls)) as bar:
+    with progress("writing", sum(1 + len(one.films) for one in falls)) as bar:
         for one, name in zip(falls, names, strict=True):
             folder = output if len(falls) == 1 else output / name
             folder.mkdir(exist_ok=True)

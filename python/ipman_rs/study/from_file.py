@@ -13,10 +13,8 @@ import numpy as np
 
 import ipman_rs as ip
 
-from .. import view
 from ..analysis import PIECE
 from ..body.sequence import pieces
-from ..cli import console
 from ..data import check, judge, separate_pieces
 from ..data.check import Finding
 from ..files import regular, safe_npz
@@ -25,6 +23,8 @@ from ..io.meshes import read_mesh
 from ..io.parameters import read_npz
 from ..io.parts import match_body, read_parts
 from ..io.recording import Recording
+from ..progress import Progress, silent
+from .study import Study, study
 
 SAMPLED_VERTICES = 800_000  # of the bodies that are judged: 65 of the embedded one, a fraction of a second
 WEIGHED = 16  # bodies
@@ -46,23 +46,23 @@ class Request:
     force: bool = False  # what cannot be a person is let in, too
 
 
-def measure(path: Path, request: Request) -> view.Study:
-    """Analyse one file. Raises FileError; what is odd goes to stderr, a line each, and into the study's flags."""
-    study = analysed(path, request)
-    warn(path, study.flags)
-    return study
+_DEFAULT = Request()
 
 
-def analysed(path: Path, request: Request) -> view.Study:
-    """The same without a word on stderr."""
+def analyze_file(path: Path, request: Request = _DEFAULT, progress: Progress = silent) -> Study:
+    """The study of the bodies in one file; what is odd about them stands in its flags.
+
+    Raises:
+        FileError: the file cannot be read, or what it holds cannot be a person (`Request.force` lets it in).
+    """
     with odd_sizes() as found:
         try:
-            study = _measure(path, request)
+            analysed = _analyzed(path, request, progress)
         except (ValueError, TypeError) as error:
             raise FileError(path, str(error)) from error
         except MemoryError as error:
             raise FileError(path, "needs more memory than there is; analyse fewer frames at once") from error
-    return replace(study, flags=with_sizes(study.flags, found))
+    return replace(analysed, flags=with_sizes(analysed.flags, found))
 
 
 @contextmanager
@@ -82,26 +82,25 @@ def with_sizes(flags: Sequence[str], sizes: Sequence[str]) -> tuple[str, ...]:
     return (*flags, *([] if said else sizes[:1]))
 
 
-def warn(path: Path, flags: Sequence[str]) -> None:
-    for flag in flags:
-        console.warn(f"{path}: {flag}")
-
-
-def _measure(path: Path, request: Request) -> view.Study:
-    recording, template, ground, notes = on_ground(path, request)
+def _analyzed(path: Path, request: Request, progress: Progress) -> Study:
+    recording, template, ground, notes = on_ground(path, request, progress=progress)
     if template.num_parts == 1:
         notes.append("one part: the centre of mass is the exact one of the volume, not the paper's part-wise pCoM")
     if not template.watertight:
         notes.append("open mesh: its holes are closed by fans before volumes are measured")
-    with console.progress(f"analysing {path.name}", len(recording.vertices)) as step:
-        return view.study(
+    with progress(f"analysing {path.name}", len(recording.vertices)) as step:
+        return study(
             path.stem, recording.vertices, template, ground, request.preset, seconds=recording.seconds,
             source=str(path), notes=notes, flags=recording.flags, progress=step.to,
         )  # fmt: skip
 
 
 def on_ground(
-    path: Path, request: Request, own: ip.Ground | None = None, read_elsewhere: Collection[str] = ()
+    path: Path,
+    request: Request,
+    own: ip.Ground | None = None,
+    read_elsewhere: Collection[str] = (),
+    progress: Progress = silent,
 ) -> tuple[Recording, Any, ip.Ground, list[str]]:
     """The bodies of a file, judged, their template and ground, and what was assumed. Raises FileError.
 
@@ -120,7 +119,7 @@ def on_ground(
         notes.append(f"up: {recording.up_name} (assumed{recording.up_why}; --up says otherwise)")
     height = request.ground
     if height is None:
-        height = _lowest(recording, ip.Ground(normal).normal)
+        height = _lowest(recording, ip.Ground(normal).normal, progress)
         if not np.isfinite(height):
             raise FileError(path, "no vertex is a finite number; export it again")
         whole = "of all frames " if len(recording.vertices) > 1 else ""
@@ -162,10 +161,10 @@ def read(path: Path, request: Request) -> Recording:
     return recording if request.units == 1.0 else replace(recording, vertices=recording.vertices[:] * request.units)
 
 
-def _lowest(recording: Recording, normal: np.ndarray) -> float:
+def _lowest(recording: Recording, normal: np.ndarray, progress: Progress) -> float:
     """The least finite height along the normal; infinite if there is none."""
     lowest = np.inf
-    with console.progress(f"finding the ground of {recording.path.name}", len(recording.vertices)) as step:
+    with progress(f"finding the ground of {recording.path.name}", len(recording.vertices)) as step:
         done = 0
         for vertices in pieces(recording.vertices, PIECE):
             heights = _heights(vertices, normal)

@@ -236,3 +236,8 @@ def key_frames(num_frames: int, num_vertices: int) -> np.ndarray:
     if num_frames <= most:
         return np.arange(num_frames)
     return np.unique(np.linspace(0, num_frames - 1, most).round().astype(np.int64))
+
+
+def marked(name: str, flags: Sequence[str]) -> str:
+    """A name in a table, with a sign where something is odd; what it is stands below."""
+    return f"{name} !" if flags else name

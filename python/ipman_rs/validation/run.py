@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cli import console
 from ..data import check, judge, markers, opensim
 from ..data.force_plates import ForcePlates
 from ..data.markers import own
@@ -24,6 +23,7 @@ from ..fitting.jobs.outputs import npz
 from ..fitting.jobs.recordings import Pace, Recording, kept
 from ..fitting.jobs.run import Settings
 from ..io.parameters import read_npz
+from ..progress import Progress, silent
 from . import Comparison, computed, figures, measured, pictures, report
 from .figures import SPREAD
 from .folder import Kinds, Trial, find
@@ -112,17 +112,17 @@ def plan(
     return Plan(folder, output, trials, settings, person, pace, resume, notes, unreadable, force_unit, force_up)
 
 
-def run(plan: Plan) -> tuple[list[Record], list[str], list[FileError]]:
+def run(plan: Plan, progress: Progress = silent) -> tuple[list[Record], list[str], list[FileError]]:
     """The figures of every recording that could be compared, what was assumed, and those that failed."""
     told = Told([*plan.notes], [FileError(path, what) for path, what in plan.unreadable.items()])
     ready = [one for trial in plan.trials for one in [_read(plan, trial, told)] if one is not None]
     records: list[Record] = []
     for owner in dict.fromkeys(one.trial.owner for one in ready):
-        records += _person(plan, [one for one in ready if one.trial.owner == owner], told)
+        records += _person(plan, [one for one in ready if one.trial.owner == owner], told, progress)
     return records, told.notes, told.failures
 
 
-def _person(plan: Plan, recordings: list[Measured], told: Told) -> list[Record]:
+def _person(plan: Plan, recordings: list[Measured], told: Told, progress: Progress) -> list[Record]:
     """The figures of all recordings of one person, that of standing still first: its shape and weight are needed."""
     chosen = _chosen(plan, recordings, told)
     if all(one.plates is None and one.reference is None for one in recordings):
@@ -133,10 +133,10 @@ def _person(plan: Plan, recordings: list[Measured], told: Told) -> list[Record]:
     for one in sorted(recordings, key=lambda one: (one.trial.name != chosen, not (one.trial.still or one.still))):
         name = one.trial.name
         try:
-            fit = _fitted(plan, one, shape)
+            fit = _fitted(plan, one, shape, progress)
             if name == chosen:
                 shape = name
-            records.append(_compared(plan, one, fit, weight, told))
+            records.append(_compared(plan, one, fit, weight, told, progress))
         except OSError:
             raise  # the output, which is that of all recordings, cannot be written
         except Exception as error:  # whatever it is, the other recordings were not the cause
@@ -263,13 +263,13 @@ def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
     return found
 
 
-def _fitted(plan: Plan, one: Measured, person: str | None) -> Record:
+def _fitted(plan: Plan, one: Measured, person: str | None, progress: Progress) -> Record:
     every = max(1, round((one.tracks.rate or 1.0) / plan.pace))
     recording = Recording(one.trial.name, str(one.trial.markers), [one.trial.markers])
-    return kept(recording, plan.settings, Pace(every), plan.output, plan.resume, person)
+    return kept(recording, plan.settings, Pace(every), plan.output, plan.resume, person, progress)
 
 
-def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told) -> Record:
+def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told, progress: Progress) -> Record:
     """The figures of a fitted recording, whose person weighs `weight` kg; its series and pictures are written."""
     trial = one.trial
     folder = plan.output / trial.name
@@ -277,7 +277,7 @@ def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told)
     times = safe_npz.read(folder / f"{trial.name}.npz", "times")
     bodies, template = stored.vertices, stored.template
     plates = None if one.plates is None else one.plates.at(times)
-    with console.progress(f"measuring {trial.name}", len(times)) as step:
+    with progress(f"measuring {trial.name}", len(times)) as step:
         found = computed(bodies, template, plates, step.to)
     rows = np.abs(one.tracks.times[:, None] - times).argmin(axis=0)
     confidence = one.tracks.confidence[rows]
@@ -295,7 +295,7 @@ def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told)
     except ValueError as error:
         raise FileError(trial.com or trial.forces or trial.markers, str(error)) from error
     points = np.where(confidence[..., None] > 0, one.tracks.points[rows], np.nan)
-    files = _drawn(compared, stored, points, told)
+    files = _drawn(compared, stored, points, told, progress)
     for name, content in files.items():
         write_whole(folder / name, content)
     fitted = {"shape_from": fit["shape_from"], "markers": fit["mean_marker_error_m"], "converged": fit["converged"]}
@@ -303,11 +303,13 @@ def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told)
     return {**record, "flags": [*dict.fromkeys([*one.flags, *fit["flags"], *record["flags"]])]}
 
 
-def _drawn(compared: Comparison, stored: Any, points: NDArray[np.float64], told: Told) -> dict[str, bytes]:
+def _drawn(
+    compared: Comparison, stored: Any, points: NDArray[np.float64], told: Told, progress: Progress
+) -> dict[str, bytes]:
     """The series and the pictures, by file name; of pictures of which there is nothing to draw, a note."""
     series = report.series(compared)
     files = {"series.npz": npz(series), "series.csv": report.table(series).encode()}
-    with console.progress(f"drawing {compared.name}", 3) as step:
+    with progress(f"drawing {compared.name}", 3) as step:
         for name, draw in (
             ("pressure.png", lambda: pictures.pressure_map(compared, stored.vertices, stored.template)),
             ("over_time.png", lambda: pictures.over_time(compared)),

@@ -274,3 +274,16 @@ def write_legend(figure: Figure, study: Study, top: float) -> None:
         more = "≥ " if top >= _TOP and tick == top else ""
         axes.text(x, y + 26, f"{more}{tick:g}", size=12, color=colors.MUTED, ha="center", va="center")
     axes.set(xlim=(0, WIDTH), ylim=(height, 0))
+
+
+def settle(picture: Figure, dpi: float) -> None:
+    """Lays a figure out for a picture of that dpi, and ends that. The solver of matplotlib's layout is not the same in
+    the last digit each time, and an SVG names its clips after all digits."""
+    if picture.get_layout_engine() is None:
+        return
+    picture.set_dpi(dpi)
+    picture.draw_without_rendering()
+    picture.set_layout_engine("none")
+    for axes in picture.axes:
+        left, bottom, width, height = (round(float(edge), 9) for edge in axes.get_position(original=True).bounds)
+        axes.set_position((left, bottom, width, height), which="original")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ipman_rs.files import being_written, write_whole
 
-from ...training.metrics import Figures
+from ...training.metrics import COLUMNS, Figures, columns
 from .claims import UNITS, judged
 from .intervals import paired_over_seeds
 from .run import TILTS, Benchmark, Result
@@ -27,9 +27,6 @@ Found = Mapping[float, Sequence[Result]]
 
 PAGES = {"keypoints": "training_benchmark", "images": "training_benchmark_images"}
 TEMPLATE = "training_benchmark.md.j2"
-COLUMNS = {
-    "MPJPE": 1, "PA-MPJPE": 1, "PVE": 1, "BoSE": 1, "strict BoSE": 1, "tilt": 2, "penetration": 1, "hover": 1,
-}  # fmt: skip
 # Of these, intervals are given: digits.
 DIFFERENCES = {"PVE": 1, "BoSE": 1, "strict BoSE": 1, "tilt": 2, "penetration": 1, "hover": 1}
 ASKED = 8.0  # degrees: the tilt at which something was to be shown
@@ -72,20 +69,6 @@ def page(record: dict[str, Any]) -> str:
         verdicts=verdicts(record["blocks"]), claims=judged(record["blocks"]), units=UNITS, columns=COLUMNS,
         differences=DIFFERENCES,
     )  # fmt: skip
-
-
-def columns(figures: Figures) -> dict[str, Array]:
-    """The figures as tables show them, an entry a body: millimetres, degrees, and shares as 0 or 100 %."""
-    return {
-        "MPJPE": 1e3 * figures.mpjpe,
-        "PA-MPJPE": 1e3 * figures.pa_mpjpe,
-        "PVE": 1e3 * figures.pve,
-        "BoSE": 100.0 * figures.bose,
-        "strict BoSE": 100.0 * figures.strict,
-        "tilt": np.degrees(figures.tilt),
-        "penetration": 1e3 * (-figures.lowest).clip(min=0),
-        "hover": 1e3 * figures.lowest.clip(min=0),
-    }
 
 
 def _record(tilt: float, results: Sequence[Result]) -> dict[str, Any]:

@@ -16,12 +16,11 @@ import numpy as np
 
 import ipman_rs as ip
 
-from ... import view
 from ...body import BodyModel
 from ...body.pose_arrays import joints_of
 from ...files import read_json, safe_npz, write_whole
 from ...io import write_mesh
-from ...study.fitted import camera_of
+from ...study import Fitted, Study, camera_of, study
 from .items import Item
 
 if TYPE_CHECKING:
@@ -83,7 +82,7 @@ def study_of(
     record: dict[str, Any],
     pictured: bool,
     pixels: Callable[[Path], np.ndarray],
-) -> view.Study:
+) -> Study:
     """The analysed body of a finished item; `pixels` reads a photo."""
     path = folder / f"{item.name}.npz"
     arrays = {name: safe_npz.read(path, name) for name in safe_npz.names(path)}
@@ -93,8 +92,8 @@ def study_of(
     ground = ip.Ground(normal, height)
     before = None
     if pictured and f"{_BEFORE}betas" in arrays:
-        before = view.study("Before the physics terms", posed(body, arrays, _BEFORE), body.template, ground)
-    fitted = view.Fitted(
+        before = study("Before the physics terms", posed(body, arrays, _BEFORE), body.template, ground)
+    fitted = Fitted(
         camera=camera_of(*(arrays[name][0] for name in ("camera_rotation", "camera_translation", "focal", "center"))),
         size=tuple(arrays["image_size"][0]),
         seen=arrays["keypoints"][0],
@@ -104,9 +103,8 @@ def study_of(
         pictured=pictured,
         record={key: value for key, value in record.items() if key not in ("name", "source")},
     )
-    study = view.study(item.name, vertices, body.template, ground, source=item.source, notes=notes(record))
-    study = replace(study, flags=tuple(record["flags"]))
-    return replace(study, fitted=fitted)
+    found = study(item.name, vertices, body.template, ground, source=item.source, notes=notes(record))
+    return replace(found, flags=tuple(record["flags"]), fitted=fitted)
 
 
 def notes(record: dict[str, Any]) -> list[str]:

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...cli import console
 from ...data import judge
 from ...files import read_json, safe_npz
 from ...files.errors import FileError
+from ...progress import Progress, silent
 from .outputs import RECORD, complete, write_files
 
 if TYPE_CHECKING:
     from ...data.markers import Point
-    from ...view import Study
+    from ...study import Study
     from ..fit import Fit
     from ..marker_fit import Person, Recorded
     from .items import Item
@@ -47,18 +47,29 @@ class Pace:
     fps: float = 30.0
 
 
-def fitted(recording: Recording, settings: Settings, pace: Pace, output: Path, resume: bool) -> Study:
-    """Fit a recording, write its folder and measure it. Raises FileError."""
-    record = kept(recording, settings, pace, output, resume)
+def fitted(
+    recording: Recording,
+    settings: Settings,
+    pace: Pace,
+    output: Path,
+    resume: bool = False,
+    progress: Progress = silent,
+) -> Study:
+    """Fit a recording, write its folder and analyse it; what is odd stands in the study's flags. Raises FileError."""
+    record = kept(recording, settings, pace, output, resume, progress=progress)
     study = _measured(recording, output / recording.name, settings)
     flags = (*record.get("flags", ()), *study.flags)
-    for flag in flags:
-        console.warn(f"{recording.source}: {flag}")
     return replace(study, notes=(*study.notes, *record.get("notes", ())), flags=flags)
 
 
 def kept(
-    recording: Recording, settings: Settings, pace: Pace, output: Path, resume: bool, person: str | None = None
+    recording: Recording,
+    settings: Settings,
+    pace: Pace,
+    output: Path,
+    resume: bool,
+    person: str | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """The record of a recording's fit, which is in its folder: made now, or before with the same input and options.
 
@@ -71,10 +82,11 @@ def kept(
     record = complete(folder, identity) if resume else None
     if record is None:
         try:
+            shape = None if person is None else person_of(output / person)
             found, arrays, told, rate = (
-                _fit_markers(recording, settings, pace, None if person is None else person_of(output / person))
+                _fit_markers(recording, settings, pace, shape, progress)
                 if recording.frames is None
-                else _fit_frames(recording, settings, pace)
+                else _fit_frames(recording, settings, pace, progress)
             )
         except ValueError as error:
             raise FileError(recording.paths[0], str(error).removeprefix(f"{recording.paths[0]}: ")) from error
@@ -119,7 +131,9 @@ def _preset(recording: Recording, settings: Settings) -> str:
 Found = tuple["Fit", dict[str, np.ndarray], dict[str, Any], float]  # further arrays, what is told, frames a second
 
 
-def _fit_markers(recording: Recording, settings: Settings, pace: Pace, person: Person | None) -> Found:
+def _fit_markers(
+    recording: Recording, settings: Settings, pace: Pace, person: Person | None, progress: Progress
+) -> Found:
     import ipman_rs.torch as ipt
 
     from ...data import markers
@@ -135,7 +149,7 @@ def _fit_markers(recording: Recording, settings: Settings, pace: Pace, person: P
     judged = of_tracks(tracks, names, settings.up is not None, settings.ground or 0.0)
     flags = judge.admit(path, judged, settings.force)
     count = len(range(0, len(tracks), pace.every))
-    with console.progress(f"fitting {recording.name}", count) as step:
+    with progress(f"fitting {recording.name}", count) as step:
         told = {"every": pace.every, "ground": settings.ground or 0.0, "person": person, "own": names}
         found = marker_fit.fit_tracks(
             body, tracks, chosen, **told, progress=lambda _stage, done: step.to(min(done, count))
@@ -186,7 +200,7 @@ def _mean(errors: np.ndarray) -> float | None:
     return float(known.mean()) if len(known) else None
 
 
-def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
+def _fit_frames(recording: Recording, settings: Settings, pace: Pace, progress: Progress) -> Found:
     import ipman_rs.torch as ipt
 
     from ...data.keypoints.detections import join
@@ -197,7 +211,7 @@ def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
 
     assert recording.frames is not None
     items, unseen = recording.frames[:: pace.every], []
-    with console.progress(f"reading {recording.name}", len(items)) as step:
+    with progress(f"reading {recording.name}", len(items)) as step:
         for item in items:
             try:
                 if item.seen is None:
@@ -212,7 +226,7 @@ def _fit_frames(recording: Recording, settings: Settings, pace: Pace) -> Found:
     seen, imitated = join([item.seen for item in kept if item.seen is not None]), settings.presented(body.body)
     problem = problem_of(body, seen, settings, imitated)
     rate = pace.fps / pace.every
-    with console.progress(f"fitting {recording.name}", len(kept)) as step:
+    with progress(f"fitting {recording.name}", len(kept)) as step:
         problem, variables = start.begin(problem, settings.config.start)
         told = {"rate": rate, "progress": lambda _stage, done: step.to(min(done, len(kept)))}
         found = fit_sequence(problem, variables, settings.config, **told)
@@ -255,11 +269,11 @@ def _arrays(found: Fit, rate: float) -> dict[str, np.ndarray]:
 
 
 def _measured(recording: Recording, folder: Path, settings: Settings) -> Study:
-    from ...study.from_file import Request, analysed
+    from ...study.from_file import Request, analyze_file
 
     path = folder / f"{recording.name}.npz"
     height = float(safe_npz.read(path, "ground_height")[0]) if "ground_height" in safe_npz.names(path) else None
-    study = analysed(path, Request(model=settings.model, ground=height))
+    study = analyze_file(path, Request(model=settings.model, ground=height))
     slow = judge.rate(float(safe_npz.read(path, "mocap_frame_rate")))  # some of the recording's frames are left out
     known = {finding.what for finding in slow}
     return replace(study, flags=tuple(flag for flag in study.flags if flag.partition(";")[0] not in known))

@@ -13,9 +13,9 @@ import ipman_rs as ip
 import ipman_rs.torch as ipt
 
 from ...body import BodyModel
-from ...cli import console
 from ...data.keypoints.detections import Detections, join
 from ...files.errors import FileError
+from ...progress import Progress, silent
 from .. import detected, presented, start
 from ..camera_file import KnownCamera
 from ..config import Config, weighs
@@ -65,7 +65,9 @@ class Settings:
         return presented.load(self.pose, body, contact=self.contact, frame=self.pose_frame, up=self.pose_up)
 
 
-def run(items: list[Item], settings: Settings, output: Path, resume: bool) -> dict[str, dict[str, Any]]:
+def run(
+    items: list[Item], settings: Settings, output: Path, resume: bool = False, progress: Progress = silent
+) -> dict[str, dict[str, Any]]:
     """Fit the items and write them under `output`; the records of those that have a body, by name.
 
     Items that fail say so in `failure`. Raises ValueError for options that fit no item.
@@ -80,8 +82,8 @@ def run(items: list[Item], settings: Settings, output: Path, resume: bool) -> di
         found = {item.name: complete(output / item.name, hashes[item.name]) for item in items}
         records = {name: record for name, record in found.items() if record is not None}
     waiting = [item for item in items if item.name not in records]
-    for batch in _batches(waiting):
-        for item, result in _fitted(batch, settings, body, imitated):
+    for batch in _batches(waiting, progress):
+        for item, result in _fitted(batch, settings, body, imitated, progress):
             told = {**result.record(), "preset": settings.config.name, "model": body.body.name}
             if imitated is not None:
                 told["presented"] = imitated.record(body.body)
@@ -101,11 +103,11 @@ def _check(settings: Settings) -> None:
         raise ValueError(f"preset {config.name} knows the person's size: give --height or --mass, or both")
 
 
-def _batches(items: Iterable[Item]) -> Iterator[list[Item]]:
+def _batches(items: Iterable[Item], progress: Progress) -> Iterator[list[Item]]:
     """Items whose points have the same names, up to `BATCH` together: what else is in a batch changes no bit of any."""
     waiting: dict[tuple[str, ...], list[Item]] = {}
     todo = list(items)
-    with console.progress("reading", len(todo)) as step:
+    with progress("reading", len(todo)) as step:
         for item in todo:
             try:
                 if item.seen is None:
@@ -121,14 +123,14 @@ def _batches(items: Iterable[Item]) -> Iterator[list[Item]]:
 
 
 def _fitted(
-    batch: list[Item], settings: Settings, body: ipt.BodyModel, imitated: PresentedBody | None
+    batch: list[Item], settings: Settings, body: ipt.BodyModel, imitated: PresentedBody | None, progress: Progress
 ) -> Iterator[tuple[Item, Result]]:
     kept = [item for item in batch if not _refused(item, body, settings.camera)]
     if not kept:
         return
     problem = problem_of(body, join([item.seen for item in kept if item.seen is not None]), settings, imitated)
     config = settings.config
-    with console.progress(f"fitting {len(kept)}", len(kept) * len(config.stages)) as step:
+    with progress(f"fitting {len(kept)}", len(kept) * len(config.stages)) as step:
         problem, variables = start.begin(problem, config.start)
         done = {stage.name: number * len(kept) for number, stage in enumerate(config.stages)}
         found = fit(problem, variables, config, lambda stage, ended: step.to(done[stage] + ended), trace=True)

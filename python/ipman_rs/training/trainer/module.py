@@ -11,10 +11,9 @@ from torch import Tensor
 
 import ipman_rs.torch as ipt
 
-from ...ablation.training.report import COLUMNS, columns
 from ..batch import Batch
 from ..losses import Loss, Physics
-from ..metrics import figures
+from ..metrics import COLUMNS, columns, figures
 from ..model.build import made
 from ..posed_estimate import Posing
 from ..train_loop import clip_gradient, falling
