@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cli_files import strict, walk_parameters
 
 import ipman_rs as ip
 from ipman_rs.cli import falls
@@ -12,6 +11,7 @@ from ipman_rs.cli.falls_compared import _told_apart
 from ipman_rs.simulation import simulate, tip_test
 from ipman_rs.view import colors
 from ipman_rs.view.filmstrip import HEIGHT, WIDTH, turn_across
+from tests.helpers.cli_files import strict, walk_parameters
 
 
 @pytest.fixture(scope="module")
