@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests/data"), str(ROOT / "tests/fitting"), str(Path(__file__).parent)]
+sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import fuzz_mutations as damage  # noqa: E402
@@ -113,12 +113,11 @@ def _meshes() -> list[Kind]:
 
 
 def _bodies() -> list[Kind]:
-    from miniatures import amass, models  # pyright: ignore[reportMissingImports]
-
     from ipman_rs.body import joint_regressors
     from ipman_rs.data import open as open_data
     from ipman_rs.fitting import presented, presented_files
     from ipman_rs.study.from_file import Request, read
+    from tests.helpers.miniatures import amass, models
 
     body = ip.load_body("anny-lite")
     pose = np.zeros((2, body.num_joints, 3), np.float32)
@@ -149,10 +148,9 @@ def _bodies() -> list[Kind]:
 def _keypoints() -> list[Kind]:
     import json
 
-    import keypoint_files  # pyright: ignore[reportMissingImports]
-
     from ipman_rs.data import keypoints
     from ipman_rs.fitting import camera_file
+    from tests.helpers import keypoint_files
 
     def read(path: Path) -> Any:
         return keypoints.read(path, image_size=(640, 480))
@@ -191,12 +189,11 @@ def _settings() -> list[Kind]:
 
 
 def _recordings() -> list[Kind]:
-    from miniatures import c3d_file, moyo, opensim  # pyright: ignore[reportMissingImports]
-
     from ipman_rs.data import c3d, trc
     from ipman_rs.data import opensim as storage
     from ipman_rs.data.moyo import read_maps, read_trace
     from ipman_rs.files import safe_xml
+    from tests.helpers.miniatures import c3d_file, moyo, opensim
 
     times = np.arange(8) / 100.0
     markers = {name: np.stack([times + k, times, times], axis=1) for k, name in enumerate(("LASI", "RASI"))}
@@ -218,10 +215,9 @@ def _recordings() -> list[Kind]:
 
 
 def _pickles() -> list[Kind]:
-    from miniatures import models, threedpw  # pyright: ignore[reportMissingImports]
-
     from ipman_rs.files import safe_pickle
     from ipman_rs.fitting import presented
+    from tests.helpers.miniatures import models, threedpw
 
     def arrays(path: Path) -> Any:
         content = safe_pickle.read(path, "sequence", "a file", tolerant=True)

@@ -8,7 +8,6 @@ import sys
 
 import numpy as np
 import pytest
-from cli_files import report, strict, walk_parameters
 
 import ipman_rs as ip
 from ipman_rs import view
@@ -18,6 +17,7 @@ from ipman_rs.view import colors
 from ipman_rs.view.geometry import pressure_at
 from ipman_rs.view.raster import rasterize
 from ipman_rs.view.report import safe_names
+from tests.helpers.cli_files import report, strict, walk_parameters
 
 
 def read_png(path):

@@ -11,12 +11,12 @@ import time
 
 import numpy as np
 import pytest
-from cli_files import report, strict, walk_parameters
 
 import ipman_rs as ip
 from ipman_rs import view
 from ipman_rs.io.parameters import read_npz
 from ipman_rs.study import from_file
+from tests.helpers.cli_files import report, strict, walk_parameters
 
 FIELDS = ("status", "mass", "center_of_mass", "center_of_pressure", "inertia", "stability", "push", "balance", "lowest")
 

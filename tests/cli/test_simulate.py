@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cli_files import strict, walk_parameters
 
 import ipman_rs as ip
 from ipman_rs.simulation import report, simulate, tip_test
 from ipman_rs.simulation.comparison_report import _told_apart
 from ipman_rs.view import colors
 from ipman_rs.view.filmstrip import HEIGHT, WIDTH, turn_across
+from tests.helpers.cli_files import strict, walk_parameters
 
 
 @pytest.fixture(scope="module")
