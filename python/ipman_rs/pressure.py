@@ -57,5 +57,6 @@ def binary_center_of_pressure(
     found = np.full((*samples.shape[:-2], 3), np.nan, samples.dtype)
     for body in np.ndindex(found.shape[:-1]):
         if contact[body].any():
-            found[body] = samples[body][contact[body]].mean(axis=0, dtype=np.float64)
+            with np.errstate(over="ignore"):  # a sum that double precision cannot hold becomes infinite
+                found[body] = samples[body][contact[body]].mean(axis=0, dtype=np.float64)
     return found

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import torch
-from ipman_rs.fitting.markers.sets import OPENCAP
 
 import ipman_rs as ip
 import ipman_rs.torch as ipt
-from ipman_rs.fitting import markers
+from ipman_rs.data import markers
+from ipman_rs.data.markers.sets import OPENCAP
 from ipman_rs.fitting.landmarks import Landmarks
 
 RATE, FRAMES = 50, 40
