@@ -1,7 +1,7 @@
 """Stiff bodies let go in three engines, and the tip test, on people at rest and near the limit.
 
     python tools/validate_simulation.py            prints the tables, some minutes
-    python tools/validate_simulation.py --write    and puts them into docs/simulation.md
+    python tools/validate_simulation.py --write    and puts them into docs/results/simulation.md
     python tools/validate_simulation.py --people 2 --poses 4    fewer
 
 Needs torch (the people are made by the fitting benchmark), pybullet and mujoco.
@@ -34,7 +34,7 @@ from ipman_rs.simulation import FALLEN, Simulation, TipTest, simulate, tip_test
 from ipman_rs.simulation.fall import Engine, Shape
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "simulation.md"
+PAGE = ROOT / "docs" / "results" / "simulation.md"
 FLOOR = ip.Ground.y_up()
 TIMES = (100 / 240, 2.0, 5.0)
 NEAR = 0.020  # m
@@ -279,7 +279,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--people", type=int, default=10)
     parser.add_argument("--poses", type=int, default=20)
-    parser.add_argument("--write", action="store_true", help="put the tables into docs/simulation.md")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/results/simulation.md")
     asked = parser.parse_args()
     with console.progress("posing", asked.people * asked.poses) as step:
         found = people(asked.people, asked.poses, step.one)
