@@ -161,7 +161,7 @@ def engines(found: People, runs: dict[str, Simulation], seconds: dict[str, float
     stays = still(runs)
     rows = [
         "| engine | Spearman with MuJoCo, moved in 0.417 s | … in 2 s | near the limit, 0.417 s "
-        "| moved between 2 s and 5 s, of those that stand: median, largest | CPU a body, 5 s |",
+        "| moved between 2 s and 5 s, of those that stand: median, largest | CPU per body, 5 s |",
         "|---|---|---|---|---|---|",
     ]
     for name, run in runs.items():
@@ -219,8 +219,8 @@ def tips(tip: TipTest, rapier: Simulation, mujoco: Simulation, found: People) ->
     fall = rank(predicted, mujoco.displacement[falling, 0])
     push = rank(tip.push, -mujoco.displacement[:, 0])
     return "\n".join(rows) + (
-        f"\n\nOf the {falling.sum()} with their centre of mass outside, d(0.417 s) has a Spearman of {fall:.3f} with "
-        f"MuJoCo's displacement; the least push of all bodies one of {push:.3f} with its negative."
+        f"\n\nSpearman's correlation with MuJoCo's displacement: {fall:.3f} for d(0.417 s) of the {falling.sum()} bodies with "
+        f"their centre of mass outside; {push:.3f} for the least push of all bodies, with the sign reversed."
     )
 
 
@@ -251,7 +251,7 @@ def times(found: People, tip: TipTest) -> str:
             rows.append(f"| bodies that {name} | {1e6 * of_tip:.0f} µs | " + " | ".join(cells) + " |")
     finally:
         ip.set_num_threads(None)
-    head = "| CPU time a body, one thread | tip test | rapier, 2 s | Bullet, 2 s | MuJoCo, 2 s |\n|---|---|---|---|---|"
+    head = "| CPU time per body, one thread | tip test | rapier, 2 s | Bullet, 2 s | MuJoCo, 2 s |\n|---|---|---|---|---|"
     vertices = found.vertices.shape[1]
     return "\n".join([head, *rows]) + (
         f"\n\n{vertices:,} vertices, float32; {1e6 * of_mass:.0f} µs of the tip test are mass, centre and inertia. "

@@ -130,7 +130,7 @@ def test_command(tmp_path):
     assert names == [row.name for row in rows.CALIBRATED]
     with (tmp_path / "fitting_benchmark.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 4 * len(names) + 2 * len(run.CONTROLS)
-    assert "## What was to be shown" in (tmp_path / "fitting_benchmark.md").read_text()
+    assert "## Hypotheses" in (tmp_path / "fitting_benchmark.md").read_text()
     assert (tmp_path / "fitting_benchmark.svg").stat().st_size > 0
     fits = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.npz")}
     page = (tmp_path / "fitting_benchmark.md").read_text()
