@@ -219,8 +219,8 @@ def tips(tip: TipTest, rapier: Simulation, mujoco: Simulation, found: People) ->
     fall = rank(predicted, mujoco.displacement[falling, 0])
     push = rank(tip.push, -mujoco.displacement[:, 0])
     return "\n".join(rows) + (
-        f"\n\nSpearman's correlation with MuJoCo's displacement: {fall:.3f} for d(0.417 s) of the {falling.sum()} bodies with "
-        f"their centre of mass outside; {push:.3f} for the least push of all bodies, with the sign reversed."
+        f"\n\nSpearman's correlation with MuJoCo's displacement: {fall:.3f} for d(0.417 s) of the {falling.sum()} bodies "
+        f"with their centre of mass outside; {push:.3f} for the least push of all bodies, with the sign reversed."
     )
 
 
@@ -251,7 +251,7 @@ def times(found: People, tip: TipTest) -> str:
             rows.append(f"| bodies that {name} | {1e6 * of_tip:.0f} µs | " + " | ".join(cells) + " |")
     finally:
         ip.set_num_threads(None)
-    head = "| CPU time per body, one thread | tip test | rapier, 2 s | Bullet, 2 s | MuJoCo, 2 s |\n|---|---|---|---|---|"
+    head = "| CPU time per body, one thread | tip test | rapier, 2 s | Bullet, 2 s | MuJoCo, 2 s |\n" + "|---" * 5 + "|"
     vertices = found.vertices.shape[1]
     return "\n".join([head, *rows]) + (
         f"\n\n{vertices:,} vertices, float32; {1e6 * of_mass:.0f} µs of the tip test are mass, centre and inertia. "
