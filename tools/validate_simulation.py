@@ -219,8 +219,8 @@ def tips(tip: TipTest, rapier: Simulation, mujoco: Simulation, found: People) ->
     fall = rank(predicted, mujoco.displacement[falling, 0])
     push = rank(tip.push, -mujoco.displacement[:, 0])
     return "\n".join(rows) + (
-        f"\n\nSpearman's correlation with MuJoCo's displacement: {fall:.3f} for d(0.417 s) of the {falling.sum()} bodies "
-        f"with their centre of mass outside; {push:.3f} for the least push of all bodies, with the sign reversed."
+        f"\n\nSpearman's correlation with MuJoCo's displacement: {fall:.3f} for d(0.417 s) of the {falling.sum()} "
+        f"bodies with their centre of mass outside; {push:.3f} for the least push of all bodies, sign reversed."
     )
 
 
