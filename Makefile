@@ -81,9 +81,8 @@ test-python: $(VENV)/test-tools $(VENV)/browser | test-rust
 	OMP_NUM_THREADS=1 python -m pytest -n auto $(PYTEST_ARGS)
 
 # The numbers once more on every other CPU level that this machine has (IPMAN_SIMD).
-LEVEL_TESTS := $(addprefix tests/,test_volume_mass.py test_sampling.py test_pressure.py test_support.py test_losses.py \
-	test_analysis.py test_real_bodies.py torch_layer/test_against_reference.py torch_layer/test_gradients.py \
-	torch_layer/test_bodies.py body/test_skinning.py)
+LEVEL_TESTS := $(addprefix tests/,$(patsubst %,physics/test_%.py,volume_mass sampling pressure support losses analysis \
+	real_bodies) $(patsubst %,torch/test_%.py,against_reference gradients bodies) body/test_skinning.py)
 
 test-levels: $(VENV)/test-tools | test-python
 	for level in $$(python -c 'from ipman_rs import _core; print(*_core.simd_levels()[1:])'); do \

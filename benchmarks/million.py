@@ -85,11 +85,11 @@ def _child(*command: str, threads: int) -> dict[str, Any]:
 @click.argument("report", type=click.Path(path_type=Path))
 def run(file: Path, report: Path) -> None:
     """What `ipman analyze FILE --ground 0 -o REPORT` does, timed."""
-    from ipman_rs.cli.measure import Request, measure
+    from ipman_rs.study.from_file import Request, analyze_file
     from ipman_rs.view.report import write_report
 
     start, used = time.perf_counter(), time.process_time()
-    study = measure(file, Request(ground=0.0))
+    study = analyze_file(file, Request(ground=0.0))
     seconds, cpu = time.perf_counter() - start, time.process_time() - used
     peak = _peak_megabytes()
     write_report([study], report)
@@ -113,7 +113,7 @@ def _peak_megabytes() -> float:
 def stages() -> None:
     """µs of one core a body for posing and for analysis."""
     from ipman_rs.analysis import PIECE, analyze_sequence
-    from ipman_rs.cli.parameters import read_npz
+    from ipman_rs.io.parameters import read_npz
 
     ip.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:

@@ -21,12 +21,13 @@ import torch
 from torch import Tensor, nn
 
 import ipman_rs.torch as ipt
+from ipman_rs.synthetic import population
 from ipman_rs.training.batch import Batch
-from ipman_rs.training.lifting import bodies, views
+from ipman_rs.training.lifting import views
 from ipman_rs.training.lifting.network import lifter
 from ipman_rs.training.losses import Loss, Physics
 from ipman_rs.training.model import HMR, MeanParameters
-from ipman_rs.training.posing import Posed, Posing
+from ipman_rs.training.posed_estimate import Posed, Posing
 from ipman_rs.training.world import to_world
 
 from .peers.literal import Literal
@@ -110,7 +111,7 @@ def _batch(count: int, size: int, posing: Posing) -> Batch:
     """People on the floor, seen as keypoints or as images of noise."""
     from dataclasses import replace
 
-    seen = views.views(bodies.draw_bodies(count, 7), 7)
+    seen = views.views(population.draw_bodies(count, 7), 7)
     images = torch.randn(count, 3, size, size, generator=torch.Generator().manual_seed(0)) if size else seen.inputs
     return replace(seen, inputs=images)
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import solids
 import trimesh
 
 import ipman_rs as ip
+from tests.helpers import solids
 
 
 @pytest.fixture

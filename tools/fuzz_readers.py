@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests/data"), str(ROOT / "tests/fitting"), str(Path(__file__).parent)]
+sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import fuzz_mutations as damage  # noqa: E402
@@ -35,7 +35,7 @@ import numpy as np  # noqa: E402
 from fuzz_harness import Wrong, run  # noqa: E402
 
 import ipman_rs as ip  # noqa: E402
-from ipman_rs.cli.errors import FileError  # noqa: E402
+from ipman_rs.files.errors import FileError  # noqa: E402
 
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
@@ -78,9 +78,9 @@ def kinds() -> list[Kind]:
 
 
 def _meshes() -> list[Kind]:
-    from ipman_rs.cli import mesh_files
-    from ipman_rs.cli.measure import Request, read
-    from ipman_rs.cli.parts import read_parts
+    from ipman_rs.io import write_mesh
+    from ipman_rs.io.parts import read_parts
+    from ipman_rs.study.from_file import Request, read
 
     def mesh(path: Path) -> Any:
         return read(path, Request())
@@ -99,8 +99,8 @@ def _meshes() -> list[Kind]:
     stl = b"\0" * 80 + b"\4\0\0\0" + b"".join(b"\0" * 12 + VERTICES[f].astype("<f4").tobytes() + b"\0\0" for f in FACES)
     command = ("analyze", "FILE", "-o", "OUT")
     return [
-        Kind("a.obj", mesh_files.obj(VERTICES, FACES), damage.of_text, mesh, command),
-        Kind("a.glb", mesh_files.glb(VERTICES, FACES), damage.of_glb, mesh, command),
+        Kind("a.obj", write_mesh.obj(VERTICES, FACES), damage.of_text, mesh, command),
+        Kind("a.glb", write_mesh.glb(VERTICES, FACES), damage.of_glb, mesh, command),
         Kind("text.ply", head.format("ascii 1.0").encode() + rows, damage.of_text, mesh, command),
         Kind("binary.ply", head.format("binary_little_endian 1.0").encode() + packed, damage.of_bytes, mesh, command),
         Kind("a.stl", stl, damage.of_bytes, mesh, command),
@@ -113,12 +113,11 @@ def _meshes() -> list[Kind]:
 
 
 def _bodies() -> list[Kind]:
-    from miniatures import amass, models  # pyright: ignore[reportMissingImports]
-
     from ipman_rs.body import joint_regressors
-    from ipman_rs.cli.measure import Request, read
     from ipman_rs.data import open as open_data
     from ipman_rs.fitting import presented, presented_files
+    from ipman_rs.study.from_file import Request, read
+    from tests.helpers.miniatures import amass, models
 
     body = ip.load_body("anny-lite")
     pose = np.zeros((2, body.num_joints, 3), np.float32)
@@ -149,9 +148,9 @@ def _bodies() -> list[Kind]:
 def _keypoints() -> list[Kind]:
     import json
 
-    import keypoint_files  # pyright: ignore[reportMissingImports]
-
-    from ipman_rs.fitting import camera_file, keypoints
+    from ipman_rs.data import keypoints
+    from ipman_rs.fitting import camera_file
+    from tests.helpers import keypoint_files
 
     def read(path: Path) -> Any:
         return keypoints.read(path, image_size=(640, 480))
@@ -190,11 +189,11 @@ def _settings() -> list[Kind]:
 
 
 def _recordings() -> list[Kind]:
-    from miniatures import c3d_file, moyo, opensim  # pyright: ignore[reportMissingImports]
-
-    from ipman_rs.data import c3d, safe_xml, trc
+    from ipman_rs.data import c3d, trc
     from ipman_rs.data import opensim as storage
     from ipman_rs.data.moyo import read_maps, read_trace
+    from ipman_rs.files import safe_xml
+    from tests.helpers.miniatures import c3d_file, moyo, opensim
 
     times = np.arange(8) / 100.0
     markers = {name: np.stack([times + k, times, times], axis=1) for k, name in enumerate(("LASI", "RASI"))}
@@ -216,10 +215,9 @@ def _recordings() -> list[Kind]:
 
 
 def _pickles() -> list[Kind]:
-    from miniatures import models, threedpw  # pyright: ignore[reportMissingImports]
-
-    from ipman_rs.body import safe_pickle
+    from ipman_rs.files import safe_pickle
     from ipman_rs.fitting import presented
+    from tests.helpers.miniatures import models, threedpw
 
     def arrays(path: Path) -> Any:
         content = safe_pickle.read(path, "sequence", "a file", tolerant=True)

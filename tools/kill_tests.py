@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests" / name) for name in ("evaluate", "fitting", "validation")]
+sys.path.insert(0, str(ROOT))
 PROGRAM = (sys.executable, "-c", "from ipman_rs.cli import main; main()")
 UNEQUAL = ("tensorboard", "lightning_logs")  # folders that hold times
 
@@ -38,7 +38,7 @@ class Command:
 
 
 def _evaluate(folder: Path) -> list[str]:
-    import evaluate_files as files  # pyright: ignore[reportMissingImports]
+    from tests.helpers import evaluate_files as files
 
     true = files.truth(frames=1500)
     files.save(folder / "true.npz", true)
@@ -47,7 +47,7 @@ def _evaluate(folder: Path) -> list[str]:
 
 
 def _fit(folder: Path) -> list[str]:
-    import keypoint_files as files  # pyright: ignore[reportMissingImports]
+    from tests.helpers import keypoint_files as files
 
     (folder / "people").mkdir()
     (folder / "quick.yaml").write_text(files.QUICK)
@@ -58,9 +58,9 @@ def _fit(folder: Path) -> list[str]:
 
 
 def _validate(folder: Path) -> list[str]:
-    import test_validate_cli as made  # pyright: ignore[reportMissingImports]
+    from tests.helpers import laboratory_files as made
 
-    person = made.person.__wrapped__() if hasattr(made.person, "__wrapped__") else made.person._get_wrapped_function()()
+    person = made.person()
     (folder / "lab").mkdir()
     for name, height in (("static", 0.0), ("lift", 0.04)):
         made.trc(folder / "lab" / f"{name}.trc", person, made.moved(height)[1])

@@ -28,10 +28,10 @@ from scipy.stats import spearmanr
 
 import ipman_rs as ip
 from ipman_rs.cli import console
-from ipman_rs.fitting.benchmark import scenes
-from ipman_rs.fitting.benchmark.people import person as new_person
 from ipman_rs.simulation import FALLEN, Simulation, TipTest, simulate, tip_test
 from ipman_rs.simulation.fall import Engine, Shape
+from ipman_rs.synthetic import at_rest as resting
+from ipman_rs.synthetic.people import person as new_person
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "results" / "simulation.md"
@@ -77,24 +77,24 @@ def people(count: int, poses: int, progress: Callable[[], None]) -> People:
     return People(template, np.stack(vertices), np.array(person), np.array(near), np.array(rests))
 
 
-def settled(body, template, families: Sequence[str], draw) -> scenes.Scene:
+def settled(body, template, families: Sequence[str], draw) -> resting.Scene:
     """The person at rest on the floor, in a pose of one of the families, so that a nudge changes nothing."""
     while True:
         family = str(draw.choice(families))
-        name = str(draw.choice(scenes.FAMILIES[family]))
-        found = scenes.settle(scenes.perturbed(ip.body.poses.pose_of(body, name), body, draw), body, template)
+        name = str(draw.choice(resting.FAMILIES[family]))
+        found = resting.settle(resting.perturbed(ip.body.poses.pose_of(body, name), body, draw), body, template)
         if found is not None:
-            scene = scenes.Scene(body, template, family, name, *found)
+            scene = resting.Scene(body, template, family, name, *found)
             if tip_test(scene.vertices, template, FLOOR, nudge=FIRM).nudged_tilt < FIRM:
                 return scene
 
 
 def at_rest(body, template, draw) -> Array:
-    return settled(body, template, list(scenes.FAMILIES), draw).vertices
+    return settled(body, template, list(resting.FAMILIES), draw).vertices
 
 
 def tipped(body, template, draw) -> Array:
-    return scenes.disturbed(settled(body, template, STANDING, draw), "tipped", draw).vertices
+    return resting.disturbed(settled(body, template, STANDING, draw), "tipped", draw).vertices
 
 
 def near_limit(body, template, draw) -> Array:
@@ -119,7 +119,7 @@ def near_limit(body, template, draw) -> Array:
         return bent(scene, heading, float(low + beyond / speed))
 
 
-def bent(scene: scenes.Scene, heading: float, degrees: float) -> Array:
+def bent(scene: resting.Scene, heading: float, degrees: float) -> Array:
     """The three joints of the back share a turn about a level axis."""
     turn = np.radians(degrees) / 3 * np.array([np.cos(heading), 0.0, np.sin(heading)])
     pose = scene.full_pose.copy()

@@ -14,9 +14,10 @@ from ipman_rs.mass import center_of_mass
 from ipman_rs.pressure import binary_center_of_pressure, center_of_pressure, pressure
 from ipman_rs.sampling import sample_surface
 from ipman_rs.self_contact import SelfPenetration, self_contact_distance, self_contact_loss, self_penetration
-from ipman_rs.status import Status, UnitsWarning, body_status
+from ipman_rs.status import Status, body_status
 from ipman_rs.support import BaseOfSupport, base_of_support, bose, support_margin
 from ipman_rs.template import BodyTemplate
+from ipman_rs.units import UnitsWarning
 from ipman_rs.volume import MassProperties, mass_properties, part_volumes
 
 __all__ = [

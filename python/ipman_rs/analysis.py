@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from ipman_rs import _core, presets
 from ipman_rs.arrays import Bodies, of_each
 from ipman_rs.ground import Ground
-from ipman_rs.plain import plain
+from ipman_rs.jsonable import jsonable
 from ipman_rs.pressure import pressure
-from ipman_rs.status import Status, status_names, warn_odd_size
+from ipman_rs.status import Status, status_names
 from ipman_rs.support import BaseOfSupport, nest
 from ipman_rs.template import BodyTemplate
+from ipman_rs.units import warn_odd_size
 from ipman_rs.volume import densities
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ class Analysis:
         values = {name: value for name, value in vars(self).items() if name not in {"pressure", "status"}}
         values["base_of_support"] = vars(self.base_of_support)
         values["status"] = status_names(self.status)
-        return json.dumps(plain(values), allow_nan=False)
+        return json.dumps(jsonable(values), allow_nan=False)
 
     @classmethod
     def concatenate(cls, parts: Iterable[Analysis]) -> Analysis:

@@ -2,45 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.checks import body_template
+from ipman_rs.checks import body_template, real_array, single_or_double
 
 if TYPE_CHECKING:
     from ipman_rs.ground import Ground
     from ipman_rs.template import BodyTemplate
-
-
-def plain(name: str, value: ArrayLike) -> NDArray[Any]:
-    """An ordinary array of real numbers; masked arrays are refused, for their mask would be lost."""
-    masked = sys.modules.get("numpy.ma")  # not imported here: that would cost every user 30 ms
-    if masked is not None and _holds(value, masked.MaskedArray):
-        raise TypeError(f"{name}: masked arrays are not supported, for the mask would be ignored; fill or drop first")
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise ValueError(f"{name}: expected a regular array of numbers ({error})") from None
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"{name}: expected real numbers, got dtype {array.dtype}")
-    return array
-
-
-def _holds(value: Any, kind: type) -> bool:
-    """Whether a value is of that kind, or a list that starts with one."""
-    while isinstance(value, (list, tuple)) and value:
-        value = value[0]
-    return isinstance(value, kind)
-
-
-def single_or_double(array: NDArray[Any]) -> NDArray[Any]:
-    """float32 and half stay or become native float32; everything else becomes native float64."""
-    dtype = np.float32 if array.dtype.kind == "f" and array.dtype.itemsize <= 4 else np.float64
-    with np.errstate(over="ignore", invalid="ignore"):  # what double precision cannot hold becomes infinite
-        return np.require(array, dtype, ["C", "A"])  # what comes from packed records is not aligned
 
 
 def of_each(rows: NDArray[Any], counts: NDArray[np.int64]) -> list[NDArray[Any]]:
@@ -53,7 +24,7 @@ class Bodies:
 
     def __init__(self, vertices: ArrayLike, template: BodyTemplate) -> None:
         body_template(template)
-        array = plain("vertices", vertices)
+        array = real_array("vertices", vertices)
         expected = (template.num_vertices, 3)
         if array.ndim < 2 or array.shape[-2:] != expected:
             hint = "; the last two axes look swapped" if array.shape[-2:] == expected[::-1] else ""

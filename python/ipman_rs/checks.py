@@ -1,4 +1,4 @@
-"""One way to refuse unknown words and meaningless numbers, for the numpy and the torch layer.
+"""One way to refuse unknown words, meaningless numbers and odd arrays, for the numpy and the torch layer.
 
 Raises:
     ValueError: a word or a number out of range; the message names the argument and what was expected.
@@ -7,9 +7,11 @@ Raises:
 
 from __future__ import annotations
 
+import sys
 from typing import Any, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 LARGEST = 1e12  # of any option: single precision can still multiply it
 SMALLEST = 1e-12  # of options that divide
@@ -73,3 +75,31 @@ def _shown(value: Any) -> str:
     except ValueError:
         return f"a {type(value).__name__} of many digits"
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def real_array(name: str, value: ArrayLike) -> NDArray[Any]:
+    """An ordinary array of real numbers; masked arrays are refused, for their mask would be lost."""
+    masked = sys.modules.get("numpy.ma")  # not imported here: that would cost every user 30 ms
+    if masked is not None and _holds(value, masked.MaskedArray):
+        raise TypeError(f"{name}: masked arrays are not supported, for the mask would be ignored; fill or drop first")
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name}: expected a regular array of numbers ({error})") from None
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name}: expected real numbers, got dtype {array.dtype}")
+    return array
+
+
+def _holds(value: Any, kind: type) -> bool:
+    """Whether a value is of that kind, or a list that starts with one."""
+    while isinstance(value, (list, tuple)) and value:
+        value = value[0]
+    return isinstance(value, kind)
+
+
+def single_or_double(array: NDArray[Any]) -> NDArray[Any]:
+    """float32 and half stay or become native float32; everything else becomes native float64."""
+    dtype = np.float32 if array.dtype.kind == "f" and array.dtype.itemsize <= 4 else np.float64
+    with np.errstate(over="ignore", invalid="ignore"):  # what double precision cannot hold becomes infinite
+        return np.require(array, dtype, ["C", "A"])  # what comes from packed records is not aligned

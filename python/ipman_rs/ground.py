@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.arrays import plain
+from ipman_rs.checks import real_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +27,8 @@ class Ground:
 
     def __init__(self, normal: ArrayLike = (0.0, 1.0, 0.0), height: ArrayLike = 0.0) -> None:
         with np.errstate(over="ignore"):  # what double precision cannot hold is refused as not finite
-            directions = plain("ground normal", normal).astype(np.float64)
-            heights = plain("ground height", height).astype(np.float64)
+            directions = real_array("ground normal", normal).astype(np.float64)
+            heights = real_array("ground height", height).astype(np.float64)
         if directions.ndim == 0 or directions.shape[-1] != 3:
             raise ValueError(f"ground normal: expected (3,) or (..., 3), got {directions.shape}")
         # Scaled first, so that neither tiny nor huge normals leave the range of squares.
@@ -56,7 +56,7 @@ class Ground:
         normal, height = self._beside_points()
         # Axis by axis: a sum along an axis of 3 takes many times as long.
         with np.errstate(over="ignore", invalid="ignore"):  # points near the end of the range have no finite height
-            where = plain("points", points).astype(np.float64, copy=False)
+            where = real_array("points", points).astype(np.float64, copy=False)
             x, y, z = (where[..., axis] * normal[..., axis] for axis in range(3))
             return x + y + z - height
 
@@ -64,7 +64,7 @@ class Ground:
         """g(u), the points' feet on the ground, in the shape of `points` (see signed_height)."""
         normal, _ = self._beside_points()
         with np.errstate(over="ignore", invalid="ignore"):
-            return plain("points", points) - self.signed_height(points)[..., None] * normal
+            return real_array("points", points) - self.signed_height(points)[..., None] * normal
 
     def axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Two unit vectors in the plane, each (..., 3); (e1, e2, normal) is right-handed, e1 along x where possible."""

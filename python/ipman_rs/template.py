@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs import _core
-from ipman_rs.arrays import plain
-from ipman_rs.checks import whole
-from ipman_rs.status import warn_odd_size
+from ipman_rs.checks import real_array, whole
+from ipman_rs.units import warn_odd_size
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -56,7 +55,7 @@ class BodyTemplate:
     ) -> None:
         self.vertices = np.array(_table("vertices", vertices, columns=3), dtype=np.float64, order="C")
         self.faces = _indices("faces", _table("faces", faces, columns=3))
-        labels = np.zeros(len(self.faces), np.int64) if face_parts is None else plain("face_parts", face_parts)
+        labels = np.zeros(len(self.faces), np.int64) if face_parts is None else real_array("face_parts", face_parts)
         if labels.ndim != 1 or len(labels) != len(self.faces):
             raise ValueError(f"face_parts: expected ({len(self.faces)},), one label a face, got {labels.shape}")
         self.face_parts = _indices("face_parts", labels)
@@ -139,7 +138,7 @@ def by_key(key: int) -> BodyTemplate:
 
 
 def _table(name: str, value: ArrayLike, columns: int) -> NDArray[Any]:
-    array = plain(name, value)
+    array = real_array(name, value)
     if array.ndim != 2 or array.shape[1] != columns:
         raise ValueError(f"{name}: expected (n, {columns}), got {array.shape}")
     return array

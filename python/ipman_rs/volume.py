@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.arrays import Bodies, plain
-from ipman_rs.checks import LARGEST, SMALLEST, body_template
+from ipman_rs.arrays import Bodies
+from ipman_rs.checks import LARGEST, SMALLEST, body_template, real_array
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 
@@ -51,7 +51,7 @@ def densities(density: ArrayLike, template: BodyTemplate) -> list[float]:
     """One density or one a part, checked."""
     body_template(template)
     with np.errstate(over="ignore"):
-        values = plain("density", density).astype(np.float64)
+        values = real_array("density", density).astype(np.float64)
     if values.shape not in {(), (1,), (template.num_parts,)}:
         raise ValueError(f"density: expected one number or ({template.num_parts},), got {values.shape}")
     if not ((values >= SMALLEST).all() and (values <= LARGEST).all()):

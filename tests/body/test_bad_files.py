@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ipman_rs as ip
-from ipman_rs.body import safe_npz, safe_pickle
+from ipman_rs.files import safe_npz, safe_pickle
 
 MUCH = 1 << 31  # what hostile headers ask for
 LITTLE = 20 << 20  # what reading them may cost

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 import trimesh
-from cli_files import strict, walk_parameters
 
 import ipman_rs as ip
+from tests.helpers.cli_files import strict, walk_parameters
 
 # float32 files (.glb, .stl, binary .ply) round 2 m to 1e-7 m; text .obj has 8 digits. The losses are of order 1.
 ROUNDED = {"rtol": 1e-4, "atol": 1e-5}

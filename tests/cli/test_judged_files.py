@@ -7,11 +7,11 @@ import json
 import numpy as np
 import pytest
 import trimesh
-from cli_files import report, strict, walk_parameters
-from miniatures import models
 from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
+from tests.helpers.cli_files import report, strict, walk_parameters
+from tests.helpers.miniatures import models
 
 
 def analyze(run, *arguments):

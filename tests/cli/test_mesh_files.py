@@ -10,8 +10,9 @@ import json
 import numpy as np
 import pytest
 import trimesh
-from cli_files import strict
-from tests.io import gltf_files
+
+from tests.helpers import gltf_files
+from tests.helpers.cli_files import strict
 
 
 def analyze(run, *arguments):

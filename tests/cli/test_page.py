@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import browser
 import numpy as np
 import pytest
-from cli_files import walk_parameters
 
 import ipman_rs as ip
 from ipman_rs import view
+from tests.helpers import browser
+from tests.helpers.cli_files import walk_parameters
 
 PINK, GREEN, YELLOW = (255, 79, 163), (22, 179, 100), (224, 168, 0)
 

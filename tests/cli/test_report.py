@@ -8,16 +8,16 @@ import sys
 
 import numpy as np
 import pytest
-from cli_files import report, strict, walk_parameters
 
 import ipman_rs as ip
 from ipman_rs import view
 from ipman_rs.cli.options import PRESETS
+from ipman_rs.study.camera import look_at
 from ipman_rs.view import colors
-from ipman_rs.view.camera import look_at
 from ipman_rs.view.geometry import pressure_at
 from ipman_rs.view.raster import rasterize
 from ipman_rs.view.report import safe_names
+from tests.helpers.cli_files import report, strict, walk_parameters
 
 
 def read_png(path):

@@ -11,12 +11,12 @@ import time
 
 import numpy as np
 import pytest
-from cli_files import report, strict, walk_parameters
 
 import ipman_rs as ip
 from ipman_rs import view
-from ipman_rs.cli import measure
-from ipman_rs.cli.parameters import read_npz
+from ipman_rs.io.parameters import read_npz
+from ipman_rs.study import from_file
+from tests.helpers.cli_files import report, strict, walk_parameters
 
 FIELDS = ("status", "mass", "center_of_mass", "center_of_pressure", "inertia", "stability", "push", "balance", "lowest")
 
@@ -66,7 +66,7 @@ def test_the_ground_is_found_for_any_piece(up, run, tmp_path, monkeypatch):
     np.savez(tmp_path / "walk.npz", **walk_parameters(30))
     heights = set()
     for piece in (1, 7, 64):
-        monkeypatch.setattr(measure, "PIECE", piece)
+        monkeypatch.setattr(from_file, "PIECE", piece)
         result = run("analyze", tmp_path / "walk.npz", "--body", "anny-lite", f"--up={up}", "--json")
         assert result.code == 0, result.err
         heights.add(strict(result.out)["bodies"][0]["ground"]["height"])

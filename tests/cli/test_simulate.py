@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cli_files import strict, walk_parameters
 
 import ipman_rs as ip
-from ipman_rs.cli import falls
-from ipman_rs.cli.falls_compared import _told_apart
-from ipman_rs.simulation import simulate, tip_test
+from ipman_rs.simulation import report, simulate, tip_test
+from ipman_rs.simulation.comparison_report import _told_apart
 from ipman_rs.view import colors
 from ipman_rs.view.filmstrip import HEIGHT, WIDTH, turn_across
+from tests.helpers.cli_files import strict, walk_parameters
 
 
 @pytest.fixture(scope="module")
@@ -232,7 +231,7 @@ def test_nothing_is_simulated_that_cannot_be_compared(run, other, tmp_path, lite
     def simulated(*arguments, **options):
         raise AssertionError("simulated")
 
-    monkeypatch.setattr(falls, "simulate", simulated)
+    monkeypatch.setattr(report, "simulate", simulated)
     done = run("simulate", tmp_path / "a.npz", "--against", tmp_path / f"{other}.npz", "--json")
     assert done.code == 1
     record = strict(done.out)

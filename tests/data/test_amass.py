@@ -6,11 +6,11 @@ import pickle
 
 import numpy as np
 import pytest
-from miniatures import amass as miniature
 
 import ipman_rs.data as data
-from ipman_rs.body import safe_npz
 from ipman_rs.data import amass
+from ipman_rs.files import safe_npz
+from tests.helpers.miniatures import amass as miniature
 
 
 @pytest.mark.parametrize("kind", ["smplh", "smplx"])

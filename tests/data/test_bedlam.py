@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from miniatures import bedlam, spin
 
 import ipman_rs.data as data
 from ipman_rs.body import joints
+from tests.helpers.miniatures import bedlam, spin
 
 
 def test_scene(tmp_path):

@@ -7,9 +7,9 @@ import time
 
 import numpy as np
 import pytest
-from miniatures import c3d_bytes as raw
 
 from ipman_rs.data import c3d, c3d_format, force_plates
+from tests.helpers.miniatures import c3d_bytes as raw
 
 SUBJECT = ("C7", "LASI", "RASI")
 

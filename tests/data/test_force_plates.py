@@ -9,12 +9,11 @@ import pytest
 
 ezc3d = pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
 
-from miniatures import c3d_bytes, c3d_file  # noqa: E402
-
 import ipman_rs.data as data  # noqa: E402
 from ipman_rs.data import c3d, force_plates, opensim  # noqa: E402
 from ipman_rs.data.tracks import TO_Y_UP  # noqa: E402
 from ipman_rs.validation import measured  # noqa: E402
+from tests.helpers.miniatures import c3d_bytes, c3d_file  # noqa: E402
 
 T, RATE = 25, 100.0
 N = T * c3d_file.SAMPLES

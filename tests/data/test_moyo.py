@@ -14,11 +14,10 @@ from hypothesis import strategies as st
 
 pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
 
-from miniatures import moyo as miniature
-
 import ipman_rs.data as data
-from ipman_rs.body import safe_pickle
 from ipman_rs.data import moyo
+from ipman_rs.files import safe_pickle
+from tests.helpers.miniatures import moyo as miniature
 
 NAME = miniature.names()[0]
 

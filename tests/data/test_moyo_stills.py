@@ -7,17 +7,17 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from miniatures import models
+
+from tests.helpers.miniatures import models
 
 pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
-
-from miniatures import moyo as miniature
 
 import ipman_rs as ip
 import ipman_rs.data as data
 from ipman_rs.cli import main
 from ipman_rs.data import moyo, moyo_stills
 from ipman_rs.evaluation.tables.models import Models
+from tests.helpers.miniatures import moyo as miniature
 
 FIRST, SECOND = "220923_yogi_body_hands_03596_", "221004_yogi_nexus_body_hands_03596_"
 BOAT, CROW, TREE = "Boat_Pose_-a", "Crane_(Crow)_Pose_or_Bakasana_-a", "Tree_-b"

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from miniatures import human36m
 
 import ipman_rs.data as data
-from ipman_rs.body import safe_npz
 from ipman_rs.data import naming
+from ipman_rs.files import safe_npz
+from tests.helpers.miniatures import human36m
 
 
 @pytest.mark.parametrize("packed", [False, True])

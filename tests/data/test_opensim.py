@@ -7,10 +7,10 @@ import time
 
 import numpy as np
 import pytest
-from miniatures import opensim as miniature
 
 import ipman_rs.data as data
 from ipman_rs.data import external_loads, opensim
+from tests.helpers.miniatures import opensim as miniature
 
 COVERAGE = "sway.trc: no marker on trunk and arms was ever seen: there the body's mean is shown"
 Z_UP = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # turns y up into z up

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ipman_rs.data import force_plates, opensim
-from ipman_rs.fitting import markers
+from ipman_rs.data import force_plates, markers, opensim
 
 G = 9.80665
 MARKERS = {  # file: frames, markers, Hz

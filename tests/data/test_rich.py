@@ -7,11 +7,11 @@ import pickle
 
 import numpy as np
 import pytest
-from miniatures import rich as miniature
 
 import ipman_rs.data as data
 from ipman_rs.body.hands import Hands
 from ipman_rs.data import rich
+from tests.helpers.miniatures import rich as miniature
 
 ONE = "Pavallion_018_yoga1"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from miniatures import human36m, mpi_inf_3dhp, photos, rich_ipman, spin
 
 import ipman_rs.data as data
+from tests.helpers.miniatures import human36m, mpi_inf_3dhp, photos, rich_ipman, spin
 
 
 def pixels_of(frames):

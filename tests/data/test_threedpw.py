@@ -6,9 +6,9 @@ import pickle
 
 import numpy as np
 import pytest
-from miniatures import threedpw
 
 import ipman_rs.data as data
+from tests.helpers.miniatures import threedpw
 
 
 def test_sequence_files(tmp_path):

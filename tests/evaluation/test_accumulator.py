@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ipman_rs.evaluation import Accumulator, reasons
-from ipman_rs.evaluation.clusters import CLUSTERS, pooled
-from ipman_rs.evaluation.fixed_point import LARGEST, exact, limbs
+from ipman_rs.evaluation.statistics.clusters import CLUSTERS, pooled
+from ipman_rs.evaluation.statistics.exact_sum import LARGEST, exact, limbs
 
 METRICS = ("mpjpe", "bose")
 

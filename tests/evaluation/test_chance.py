@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from ipman_rs.evaluation import Accumulator, bootstrap, compare, paired, paired_test, sign_flip
-from ipman_rs.evaluation.clusters import CLUSTERS
+from ipman_rs.evaluation.statistics.clusters import CLUSTERS
 
 
 @pytest.fixture
@@ -103,7 +103,7 @@ def test_bodies_without_a_figure_count_in_neither(draw):
     assert paired_test(*spoilt) == paired_test(values[known], baseline[known])
 
 
-def test_sign_flip_is_scipys_permutation_test(draw):
+def test_sign_flip_is_scipys_sign_flip(draw):
     """With few sequences, from all choices of signs: exactly; ties, too."""
     for values in (draw.standard_normal(9) + 0.7, np.array([1.0, 1.0, -1.0, 2.0, 3.0]), np.zeros(3)):
         zeros = np.zeros(len(values))

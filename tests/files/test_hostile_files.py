@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from ipman_rs.body import joint_regressors, safe_npz, safe_pickle
+from ipman_rs.body import joint_regressors
 from ipman_rs.cli import main
-from ipman_rs.cli.errors import FileError
-from ipman_rs.cli.parts import read_parts
-from ipman_rs.data import moyo, safe_xml
+from ipman_rs.data import moyo
 from ipman_rs.evaluation.tables.rows import of_npz
-from ipman_rs.files import parse_json, parse_yaml, read_json, read_yaml, regular
+from ipman_rs.files import parse_json, parse_yaml, read_json, read_yaml, regular, safe_npz, safe_pickle, safe_xml
+from ipman_rs.files.errors import FileError
 from ipman_rs.fitting import camera_file, config, presented_files
+from ipman_rs.io.parts import read_parts
 from ipman_rs.training.model.checkpoint_file import read_checkpoint
 
 FACES = np.array([[0, 1, 2], [0, 2, 3]])

@@ -5,15 +5,15 @@ Judges: scipy's rotations, the engine's own skinning of a body model, and trimes
 
 from __future__ import annotations
 
-import gltf_files
 import numpy as np
 import pytest
 import trimesh
-from gltf_files import Gltf
 from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
-from ipman_rs.io.read_mesh import read_mesh
+from ipman_rs.files.mesh.read_mesh import read_mesh
+from tests.helpers import gltf_files
+from tests.helpers.gltf_files import Gltf
 
 BOX = trimesh.creation.box((0.4, 1.7, 0.3))
 POINTS, FACES = np.asarray(BOX.vertices, np.float32).astype(float), np.asarray(BOX.faces)

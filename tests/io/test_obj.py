@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from ipman_rs.io.read_mesh import read_mesh
+from ipman_rs.files.mesh.read_mesh import read_mesh
 
 BOX = trimesh.creation.box((0.4, 1.7, 0.3))
 V = "".join(f"v {x} {y} {z}\n" for x, y, z in BOX.vertices)

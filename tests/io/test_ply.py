@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from ipman_rs.io.read_mesh import read_mesh, read_points
+from ipman_rs.files.mesh.read_mesh import read_mesh, read_points
 
 BOX = trimesh.creation.box((0.4, 1.7, 0.3))
 POINTS = np.asarray(BOX.vertices, np.float32)

@@ -12,8 +12,8 @@ import pytest
 import trimesh
 
 import ipman_rs as ip
-from ipman_rs.io import repair
-from ipman_rs.io.read_mesh import read_mesh
+from ipman_rs.files.mesh import repair
+from ipman_rs.files.mesh.read_mesh import read_mesh
 
 
 @pytest.fixture(scope="module")

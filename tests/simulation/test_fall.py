@@ -8,12 +8,12 @@ import sys
 
 import numpy as np
 import pytest
-import solids
 from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
 from ipman_rs import Status
 from ipman_rs.simulation import fall, simulate, tip_test
+from tests.helpers import solids
 
 ENGINES = [
     name for name in fall.ENGINES if name != "bullet" or importlib.util.find_spec("pybullet")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.stats
-import solids
 from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
 from ipman_rs.simulation import FALLEN, Simulation, compare, simulate
+from tests.helpers import solids
 
 FLOOR = ip.Ground.y_up()
 

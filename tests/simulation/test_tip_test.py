@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-import solids
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -16,6 +15,7 @@ from scipy.spatial.transform import Rotation
 import ipman_rs as ip
 from ipman_rs import Status
 from ipman_rs.simulation import tip_test
+from tests.helpers import solids
 
 FLOOR = ip.Ground.y_up()
 GRAVITY = 9.81

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
-from ipman_rs.training.lifting import bodies, views
+from ipman_rs.synthetic import population
+from ipman_rs.training.lifting import views
 
 
 @pytest.fixture(autouse=True)
@@ -19,7 +20,7 @@ def _one_thread():
 @pytest.fixture(scope="session")
 def static():
     """28 static people, four of each family."""
-    return bodies.draw_bodies(28, seed=7)
+    return population.draw_bodies(28, seed=7)
 
 
 @pytest.fixture(scope="session")

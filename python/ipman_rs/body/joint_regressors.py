@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from . import safe_npz
+from ..files import safe_npz
 
 # By SPIN's names of its 24 joints, in which Human3.6M's last of the head is "Head (H36M)", not LSP's top of the head.
 HUMAN36M = (

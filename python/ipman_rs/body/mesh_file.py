@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..io.read_mesh import read_points
+from ..files.mesh.read_mesh import read_points
 
 ENDINGS = (".ply", ".obj")
 SPAN = (0.25, 3.5)  # m, of a body's longest side

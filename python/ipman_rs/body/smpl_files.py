@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import joints, safe_npz, safe_pickle
+from ..files import safe_npz, safe_pickle
+from . import joints
 from .hands import JOINTS_PER_HAND, Hands
 from .model import BodyModel
 

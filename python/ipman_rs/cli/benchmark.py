@@ -38,8 +38,8 @@ def fit(output: Path, bodies: int, controls: int, iterations: int, split: str, o
     Writes fitting_benchmark.md, .json, .csv and .svg into the folder, beside the fits themselves: interrupted, the same
     command goes on where it was.
     """
-    from ..fitting.benchmark import report
-    from ..fitting.benchmark.run import Benchmark, blocks
+    from ..ablation.fitting import report
+    from ..ablation.fitting.run import Benchmark, blocks
     from . import console
 
     chosen = [block for block in blocks() if not only or block.name.startswith(only)]
@@ -118,10 +118,10 @@ def train(
     """
     from concurrent.futures.process import BrokenProcessPool
 
-    from ..training.benchmark import report
-    from ..training.benchmark.keypoints import Keypoints
-    from ..training.benchmark.pictures import Pictures
-    from ..training.benchmark.run import TILTS, Benchmark
+    from ..ablation.training import report
+    from ..ablation.training.from_images import Pictures
+    from ..ablation.training.from_keypoints import Keypoints
+    from ..ablation.training.run import TILTS, Benchmark
     from . import console
 
     task = Keypoints(output, people, bodies, split) if images is None else Pictures(output, images, split, others)

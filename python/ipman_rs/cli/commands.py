@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..files.errors import FileError, one_line
 from .benchmark import benchmark
 from .data import data
-from .errors import FileError, one_line, warnings_in_one_line
 from .evaluate import evaluate
 from .figure import figure
 from .fit import fit
@@ -20,6 +20,7 @@ from .predict import predict
 from .simulate import simulate
 from .train import train
 from .validate import validate
+from .warned import warnings_in_one_line
 
 if TYPE_CHECKING:
     from ..view import Study
@@ -115,6 +116,7 @@ def demo(output: Path, preset: str) -> None:
 
     from .. import view
     from . import console
+    from .report import write
 
     body = ip.load_body("anny")
     names = ip.body.poses.NAMES
@@ -182,47 +184,26 @@ def analyze(
     """
     if output is None and not as_json:
         raise click.UsageError("Missing option '-o' / '--output' (or '--json' to print the numbers only).")
+    from ..study.from_file import Request, analyze_file
     from . import console
-    from .measure import Request, measure
+    from .report import print_json, write
 
     request = Request(model=model, up=up, ground=ground, parts=parts, preset=preset, **mended)
     studies: list[Study] = []
     failures: list[tuple[str, str]] = []
     for path in bodies:
         try:
-            studies.append(measure(path, request))
+            studies.append(analyze_file(path, request, console.progress))
+            console.warn_of(path, studies[-1].flags)
         except FileError as error:
             failures.append((str(path), error.what))
             console.error(str(error))
     # The report first: a reader that closes stdout early (`| head`) must not cost it.
     page = write(studies, output, failures) if studies and output is not None else None
     if as_json:
-        _print_json(studies, failures)
+        print_json(studies, failures)
     elif studies:
         console.print_table(studies)
         console.print_notes(studies)
         console.say(f"report: {page}")
     sys.exit(1 if failures else 0)
-
-
-def write(studies: list[Study], output: Path, failures: list[tuple[str, str]], own_folders: bool = False) -> Path:
-    """The report's page. Ends the command where nothing can be written."""
-    from ..view.report import count_files, write_report
-    from . import console
-
-    try:
-        with console.progress("writing the report", count_files(studies)) as step:
-            told = {"progress": lambda _name: step.one(), "own_folders": own_folders}
-            return write_report(studies, output, failures, **told).resolve()
-    except OSError as error:
-        console.error(f"{output}: the report cannot be written ({error.strerror or error}); choose another folder")
-        sys.exit(1)
-
-
-def _print_json(studies: list[Study], failures: list[tuple[str, str]]) -> None:
-    import json
-
-    from ..view.record import report_record
-
-    record: dict[str, Any] = report_record(studies, failures)
-    click.echo(json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1))

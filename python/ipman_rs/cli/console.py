@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from typing import Any
 
@@ -12,8 +12,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from ..view import Study
-from .errors import one_line
+from ..files.errors import one_line
+from ..study.study import Study, marked
 
 
 def error(text: str) -> None:
@@ -22,6 +22,12 @@ def error(text: str) -> None:
 
 def warn(text: str) -> None:
     _line(f"ipman: warning: {text}")
+
+
+def warn_of(path: object, flags: Iterable[str]) -> None:
+    """What is odd about the bodies of a file, a line per flag."""
+    for flag in flags:
+        warn(f"{path}: {flag}")
 
 
 def _line(text: str) -> None:
@@ -109,11 +115,6 @@ def _row(study: Study, frames: int | slice) -> list[Text]:
         _number(np.median(value["balance"]), 1, 2),
     ]
     return [*map(Text, cells), Text(said, style="green" if stable.all() else "red")]
-
-
-def marked(name: str, flags: Sequence[str]) -> str:
-    """A name in a table, with a sign where something is odd; what it is stands below."""
-    return f"{name} !" if flags else name
 
 
 def print_rows(head: Sequence[str], lines: Sequence[Sequence[str]]) -> None:

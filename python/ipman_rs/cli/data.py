@@ -113,7 +113,7 @@ def _print(findings: list[Finding], dataset: str) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from .errors import one_line
+    from ..files.errors import one_line
 
     table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
     table.add_column("", no_wrap=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .errors import FileError
+from ..files.errors import FileError
 from .options import GROUND, PRESETS, UP, Setting, of_files
 
 if TYPE_CHECKING:
@@ -202,10 +202,11 @@ def _millimetres(about: dict[str, Any]) -> list[str]:
 
 
 def _one_body(body: str, frame: int | None, request: dict[str, Any]) -> tuple[Any, Any, Any, str]:
-    """Vertices, template, ground and name; `request`: the fields of `measure.Request`."""
+    """Vertices, template, ground and name; `request`: the fields of `study.from_file.Request`."""
     import ipman_rs as ip
 
-    from .measure import Request, odd_sizes, on_ground, warn, with_sizes
+    from ..study.from_file import Request, odd_sizes, on_ground, with_sizes
+    from . import console
 
     if body in ip.body.poses.NAMES and not Path(body).exists():
         for option, value in (("--frame", frame), ("--up", request["up"]), ("--parts", request["parts"])):
@@ -221,7 +222,7 @@ def _one_body(body: str, frame: int | None, request: dict[str, Any]) -> tuple[An
     try:
         with odd_sizes() as sizes:
             recording, template, floor, _ = on_ground(path, Request(**request))
-        warn(path, with_sizes(recording.flags, sizes))
+        console.warn_of(path, with_sizes(recording.flags, sizes))
     except (ValueError, TypeError) as error:
         raise FileError(path, str(error)) from error
     count, frame = len(recording.vertices), frame or 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 import warnings
 from pathlib import Path
@@ -10,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .errors import FileError
-from .options import FLOOR, METRES, SIZE, UNIT, UP, Setting, force, of_unknown_camera, rate, subject
+from ..files.errors import FileError
+from .options import FLOOR, METRES, SIZE, UNIT, UP, Setting, force, needs, of_unknown_camera, rate, subject
 
 if TYPE_CHECKING:
+    from ..fitting.jobs.items import Item
+    from ..fitting.jobs.run import Settings
     from ..view import Study
-    from .fit_inputs import Item
-    from .fit_run import Settings
 
 
 @click.command()
@@ -169,8 +168,8 @@ def fit(
         raise click.UsageError("expected INPUT..., or --data with --path")
     needs("torch", "roma", "yaml")
     warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
+    from ..fitting.jobs.items import Reading
     from . import console
-    from .fit_inputs import Reading
 
     if data is not None:
         from .fit_data import fit_data
@@ -197,7 +196,7 @@ def fit(
     for source, what in failures:
         console.error(f"{source}: {what}")
     if studies:
-        from .commands import write
+        from .report import write
 
         page = write(studies, output, failures, own_folders=True)
         fits, recorded = [s for s in studies if s.fitted is not None], [s for s in studies if s.fitted is None]
@@ -215,40 +214,33 @@ def _list_places(context: click.Context, _: click.Parameter, wanted: bool) -> No
     needs("torch", "roma", "yaml")
     import ipman_rs as ip
 
-    from ..fitting.markers import places
+    from ..data.markers import places
 
     click.echo("\n".join(places(ip.load_body("anny-lite"))))
     context.exit()
 
 
-def needs(*modules: str) -> None:
-    """Ends the command where a module of the extra `fit` is missing."""
-    missing = [name for name in modules if importlib.util.find_spec(name) is None]
-    if missing:
-        raise click.ClickException(f"fitting needs {', '.join(missing)}: pip install 'ipman_rs[fit]'")
-
-
 def _items(inputs: tuple[Path, ...], reading: Any) -> tuple[list[Item], list[Path], list[tuple[str, str]]]:
     """The people in the inputs, under names of their own, the marker files, and the files that have nobody."""
+    from ..fitting.jobs import items
     from ..view.report import safe_names
-    from . import fit_inputs
 
     found: list[Item] = []
     failures: list[tuple[str, str]] = []
     paths: list[Path] = []
     for path in inputs:
         try:
-            paths += fit_inputs.expand([path])
+            paths += items.expand([path])
         except FileError as error:
             failures.append((str(path), error.what))
     if reading.photo is not None and len(paths) > 1:
         raise click.UsageError(f"--image belongs to one keypoint file, got {len(paths)} inputs")
-    tracks = [path for path in paths if path.suffix.lower() in fit_inputs.MARKERS]
+    tracks = [path for path in paths if path.suffix.lower() in items.MARKERS]
     for path in paths:
         if path in tracks:
             continue
         try:
-            found += fit_inputs.items(path, reading)
+            found += items.items(path, reading)
         except FileError as error:
             failures.append((str(path), error.what))
         except (OSError, ValueError) as error:
@@ -262,13 +254,16 @@ def _recordings(
     tracks: list[Path], frames: list[Item], settings: Settings, pace: tuple[int, float], output: Path, resume: bool
 ) -> tuple[list[Study], list[tuple[str, str]]]:
     """The fitted recordings, measured, and those that failed."""
-    from . import fit_recordings
+    from ..fitting.jobs import recordings
+    from . import console
 
     studies: list[Study] = []
     failures: list[tuple[str, str]] = []
-    for recording in fit_recordings.recordings(tracks, frames):
+    for recording in recordings.recordings(tracks, frames):
         try:
-            studies.append(fit_recordings.fitted(recording, settings, fit_recordings.Pace(*pace), output, resume))
+            found = recordings.fitted(recording, settings, recordings.Pace(*pace), output, resume, console.progress)
+            console.warn_of(recording.source, found.flags)
+            studies.append(found)
         except FileError as error:
             failures.append((recording.source, error.what))
         except OSError as error:
@@ -279,9 +274,9 @@ def _recordings(
 def _settings(options: dict[str, Any]) -> Settings:
     import ipman_rs as ip
 
+    from ..data.markers import own
     from ..fitting import camera_file, config
-    from ..fitting.markers import own
-    from .fit_run import Settings
+    from ..fitting.jobs.run import Settings
 
     try:
         options["camera"] = None if options["camera"] is None else camera_file.read(options["camera"])
@@ -294,10 +289,11 @@ def _settings(options: dict[str, Any]) -> Settings:
 
 
 def _run(items: list[Item], settings: Settings, output: Path, resume: bool) -> dict[str, dict[str, Any]]:
-    from .fit_run import run
+    from ..fitting.jobs.run import run
+    from . import console
 
     try:
-        return run(items, settings, output, resume)
+        return run(items, settings, output, resume, console.progress)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     except OSError as error:
@@ -312,8 +308,8 @@ def _studies(
     import ipman_rs as ip
 
     from ..fitting import photo
+    from ..fitting.jobs.outputs import study_of
     from . import console
-    from .fit_outputs import study_of
 
     body = ip.load_body(settings.model)
     fitted = [item for item in items if item.name in records]

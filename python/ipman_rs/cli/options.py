@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import os
 
@@ -185,3 +186,10 @@ def of_unknown_camera(command):
     )  # fmt: skip
     diagonal = "Focal length in pixels. Default: the image's diagonal."
     return click.option("--focal", type=float, metavar="PX", help=diagonal)(pitch(command))
+
+
+def needs(*modules: str) -> None:
+    """Ends the command where a module of the extra `fit` is missing."""
+    missing = [name for name in modules if importlib.util.find_spec(name) is None]
+    if missing:
+        raise click.ClickException(f"fitting needs {', '.join(missing)}: pip install 'ipman_rs[fit]'")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .errors import FileError
+from ..files.errors import FileError
 from .options import of_unknown_camera
 
 if TYPE_CHECKING:
@@ -70,8 +70,8 @@ def predict(
 
     Exit code: 0 when every image has a body, 1 when one has none (the others have), 2 for wrong usage.
     """
+    from ..fitting.jobs.items import IMAGES
     from . import console
-    from .fit_inputs import IMAGES
 
     if (data is None) == (not images) or (data is None) != (path is None):
         raise click.UsageError("expected images, or --data with --path")
@@ -110,7 +110,7 @@ def predict(
                 console.error(str(error))
             step.one()
     if studies:
-        from .commands import write
+        from .report import write
 
         page = write(studies, output, failures, own_folders=True)
         console.print_table(studies)
@@ -128,8 +128,8 @@ def _write_predictions(
 
     from ..body import joint_regressors
     from ..files import write_whole
+    from ..fitting.jobs.outputs import npz
     from . import console
-    from .fit_outputs import npz
 
     try:
         data = ipman_rs.data.open(name, path, **({} if split is None else {"split": split}))
@@ -171,8 +171,9 @@ def _predicted(
 
     from .. import view
     from ..fitting import photo
-    from ..view.fitted import camera_of
-    from . import fit_outputs, mesh_files
+    from ..fitting.jobs import outputs
+    from ..io import write_mesh
+    from ..study.fitted import camera_of
 
     try:
         pixels = photo.read(path)
@@ -192,8 +193,8 @@ def _predicted(
         "transl": found.transl[None], "image_size": np.array([[width, height]], float), "model": np.array(body.name),
         **{name: value[None] for name, value in camera.items()},
     }  # fmt: skip
-    files = {f"{path.stem}.npz": arrays, f"{path.stem}.glb": mesh_files.glb(vertices, body.faces)}
-    fit_outputs.write_files(output / path.stem, files, {"name": path.stem, "source": str(path)})
+    files = {f"{path.stem}.npz": arrays, f"{path.stem}.glb": write_mesh.glb(vertices, body.faces)}
+    outputs.write_files(output / path.stem, files, {"name": path.stem, "source": str(path)})
     ground = ip.Ground.y_up(vertices[:, 1].min())
     note = "predicted in one look; the floor lies under the lowest vertex"
     flags = _flags(path, vertices, body.template, ground.normal)

@@ -54,8 +54,8 @@ def render(
     """
     from concurrent.futures.process import BrokenProcessPool
 
-    from ..data.rendered.samples import Settings
-    from ..data.rendered.writer import write
+    from ..synthetic.images.samples import Settings
+    from ..synthetic.images.writer import write
     from . import console
 
     counts = {

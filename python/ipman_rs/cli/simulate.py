@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .errors import FileError, one_line
+from ..files.errors import FileError, one_line
 from .options import GROUND, TIMES, UP, of_files
 
 if TYPE_CHECKING:
-    from .fall_inputs import Bodies
-    from .falls import Fall
+    from ..simulation.inputs import Bodies
+    from ..simulation.report import Fall
 
 MOST_ROWS = 40
 
@@ -106,10 +106,7 @@ def simulate(
 
     Exit code: 0 when all is well, 1 when a file could not be read (the others are), 2 for wrong usage.
     """
-    from . import console
-    from .fall_inputs import read_bodies
-    from .falls import fall, write_falls
-    from .falls_compared import (
+    from ..simulation.comparison_report import (
         compare_falls,
         comparison_lines,
         comparison_record,
@@ -117,7 +114,10 @@ def simulate(
         pairs,
         write_comparison,
     )
-    from .measure import Request
+    from ..simulation.inputs import read_bodies
+    from ..simulation.report import fall, write_falls
+    from ..study.from_file import Request
+    from . import console
 
     if against is not None and (len(bodies) != 1 or options["tip_only"]):
         wrong = "--tip-only" if options["tip_only"] else f"{len(bodies)} files"
@@ -140,20 +140,25 @@ def simulate(
         except ImportError as error:
             raise click.ClickException(str(error)) from error
 
+    def opened(path: Path) -> Bodies:
+        read = read_bodies(path, request, console.progress)
+        console.warn_of(path, read.flags)
+        return read
+
     compared = None
     if against is None:
         for path in bodies:
             with reported():
-                falls.append(fall(read_bodies(path, request), films, **options))
+                falls.append(fall(opened(path), films, **options, progress=console.progress))
     else:  # what cannot be compared is not simulated
         both: list[Bodies] = []
         for path in (*bodies, against):
             with reported():
-                both.append(read_bodies(path, request))
+                both.append(opened(path))
         with reported():
             if not failures:
                 pairs(*both)
-                falls += [fall(each, films, **options) for each in both]
+                falls += [fall(each, films, **options, progress=console.progress) for each in both]
                 compared = compare_falls(*falls)
     record: dict[str, Any] = {"bodies": [one.record() for one in falls]}
     if compared is not None:
@@ -162,7 +167,7 @@ def simulate(
     text = json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1)
     if output is not None and falls:
         try:
-            write_falls(falls, output, text)
+            write_falls(falls, output, text, console.progress)
             if compared is not None:
                 write_comparison(*compared[1:], (falls[0].path, falls[1].path), output)
         except OSError as error:

@@ -9,9 +9,8 @@ from typing import Any
 
 import click
 
-from .errors import FileError
-from .fit import needs
-from .options import METRES, RATE, UNIT, UP, force, subject
+from ..files.errors import FileError
+from .options import METRES, RATE, UNIT, UP, force, needs, subject
 
 
 @click.command()
@@ -90,16 +89,17 @@ def validate(
     """
     needs("torch", "roma", "yaml")
     warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
-    from . import console, validate_run
+    from ..validation import run
+    from . import console
 
     try:
         said["rate"] = recorded_rate
-        plan = validate_run.plan(folder, output, model, person, rate, not fresh, **said)
+        plan = run.plan(folder, output, model, person, rate, not fresh, **said)
     except (ValueError, ImportError) as error:
         raise click.UsageError(str(error)) from error
     try:
-        records, notes, failures = validate_run.run(plan)
-        page = validate_run.write(plan, records, notes, failures) if records else None
+        records, notes, failures = run.run(plan, console.progress)
+        page = run.write(plan, records, notes, failures) if records else None
     except OSError as error:
         what = f"{output}: outputs cannot be written ({error.strerror or error}); choose another folder"
         raise click.ClickException(what) from error

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import safe_npz
+from ipman_rs.files import safe_npz
 from ipman_rs.ground import Ground
 
 from . import sequences

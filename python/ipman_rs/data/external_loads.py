@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 from xml.etree.ElementTree import Element
 
-from . import safe_xml
+from ..files import safe_xml
 
 
 @dataclass(frozen=True)

@@ -39,11 +39,12 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import mesh_file, safe_pickle
-from ipman_rs.files import read_json, regular
+from ipman_rs.body import mesh_file
+from ipman_rs.files import read_json, regular, safe_pickle
 from ipman_rs.ground import Ground
 
-from . import c3d, moyo_stills, safe_xml, sequences
+from ..files import safe_xml
+from . import c3d, moyo_stills, sequences
 from .check import Finding
 from .frames import Cameras, DataSet, Frames, PressureMaps
 

@@ -438,7 +438,7 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
 
 def _of_markers(tracks: Tracks, name: str) -> list[Finding]:
     """What `ipman fit` says of them, and how they stand where nobody knows the places of their names."""
-    from ipman_rs.fitting.markers import judged
+    from ipman_rs.data.markers import judged
 
     found = [Finding("odd", note) for note in tracks.notes] + judged.of_tracks(tracks)
     found = [replace(each, what=f"{name}: {each.what}") for each in found if each.level != "ok"]

@@ -33,14 +33,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import safe_pickle
 from ipman_rs.body.hands import Hands
 from ipman_rs.body.joints import SMPLX
-from ipman_rs.files import read_json
+from ipman_rs.files import read_json, safe_pickle
+from ipman_rs.files.mesh.read_mesh import read_points
 from ipman_rs.ground import Ground
-from ipman_rs.io.read_mesh import read_points
 
-from . import naming, safe_xml, sequences
+from ..files import safe_xml
+from . import naming, sequences
 from .check import Finding
 from .frames import Cameras, DataSet, Frames
 

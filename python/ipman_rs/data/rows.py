@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import safe_npz
+from ipman_rs.files import safe_npz
 
 from .check import Finding
 from .frames import Rows

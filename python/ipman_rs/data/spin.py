@@ -29,7 +29,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.fitting.keypoints.openpose import BODY_25
+from ipman_rs.data.keypoints.openpose import BODY_25
 from ipman_rs.ground import Ground
 
 from . import naming

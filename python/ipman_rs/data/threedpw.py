@@ -26,7 +26,8 @@ from typing import Any
 
 import numpy as np
 
-from ipman_rs.body import joints, safe_pickle
+from ipman_rs.body import joints
+from ipman_rs.files import safe_pickle
 
 from . import naming, spin
 from .check import Finding, demanded, of_frames

@@ -4,12 +4,8 @@ Metrics take numpy arrays or torch tensors and give one number a body, (...), in
 there is none (`alike`). `Accumulator` adds them up over shards, exactly.
 """
 
-from .accumulator import Accumulator
-from .bootstrap import Interval, bootstrap, paired
 from .bose import BoseMode, bose
-from .column import Summary
 from .com_error import com_error
-from .comparison import Comparison, compare
 from .cop_error import cop_error
 from .foot_skating import foot_skating
 from .moyo_protocol import MoyoFigures, PressureFigures, moyo
@@ -20,7 +16,11 @@ from .pressure_map import Mat, pressure_map
 from .procrustes import aligned, similarity
 from .pve import pve
 from .reasons import reasons
-from .sign_flip import paired_test, sign_flip
+from .statistics.accumulator import Accumulator
+from .statistics.bootstrap import Interval, bootstrap, paired
+from .statistics.comparison import Comparison, compare
+from .statistics.metric_sums import Summary
+from .statistics.permutation_test import paired_test, sign_flip
 from .tilt import root_tilt, tilt
 
 __all__ = [

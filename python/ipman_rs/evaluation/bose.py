@@ -10,14 +10,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ipman_rs.arrays import Bodies, plain
-from ipman_rs.checks import choice
+from ipman_rs.arrays import Bodies
+from ipman_rs.checks import choice, real_array
 from ipman_rs.ground import Ground
 from ipman_rs.mass import Method
 from ipman_rs.support import support_margin
 from ipman_rs.template import BodyTemplate
 
-from .alike import AnyGround, alike
+from .numpy_or_torch import AnyGround, alike
 from .penetration import lowest
 
 BoseMode = Literal["paper", "released", "strict"]
@@ -57,7 +57,7 @@ def bose(
     if labels is not None and bose_mode != "released":
         raise ValueError(f'labels: expected with bose_mode="released" only, got bose_mode={bose_mode!r}')
     shape = Bodies(vertices, template).shape
-    truth = None if labels is None else plain("labels", labels).astype(float)
+    truth = None if labels is None else real_array("labels", labels).astype(float)
     if truth is not None and truth.shape != shape:
         raise ValueError(f"labels: expected one a body, {shape}, got {truth.shape}")
     tau = THRESHOLDS[bose_mode] if threshold is None else threshold

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ipman_rs.checks import positive
 
-from .alike import AnyGround, alike
+from .numpy_or_torch import AnyGround, alike
 from .points import finite, norm, points
 
 

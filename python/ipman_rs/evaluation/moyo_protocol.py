@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.checks import number
 
-from .alike import AnyGround, alike, as_array
+from .numpy_or_torch import AnyGround, alike, as_array
 from .points import Array, norm, points, vector
 from .pressure_iou import PressureMode, as_measured, best_iou
 from .pressure_map import Mat, cells_of, normalised

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ipman_rs.ground import Ground
 
-from .alike import AnyGround, alike
+from .numpy_or_torch import AnyGround, alike
 from .points import Array, points
 
 

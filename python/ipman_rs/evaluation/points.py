@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.arrays import plain
+from ipman_rs.checks import real_array
 
 Array = NDArray[np.float64]
 
 
 def points(name: str, value: ArrayLike) -> Array:
     """(..., N, 3) in float64. ValueError for another shape, or no points; TypeError for what is no number."""
-    array = plain(name, value)
+    array = real_array(name, value)
     if array.ndim < 2 or array.shape[-1] != 3 or not array.shape[-2]:
         raise ValueError(f"{name}: expected points (..., N, 3), got {array.shape}")
     return array.astype(np.float64, copy=False)
@@ -22,14 +22,14 @@ def points(name: str, value: ArrayLike) -> Array:
 
 def pair(name: str, estimated: ArrayLike, true: ArrayLike) -> tuple[Array, Array]:
     """Two arrays of corresponding points, of one shape (..., N, 3)."""
-    first, second = plain(name, estimated), plain(name, true)
+    first, second = real_array(name, estimated), real_array(name, true)
     _same(name, first, second, "(..., N, 3)")
     return points(name, first), points(name, second)
 
 
 def vector(name: str, value: ArrayLike) -> Array:
     """(..., 3) in float64."""
-    array = plain(name, value)
+    array = real_array(name, value)
     if not array.ndim or array.shape[-1] != 3:
         raise ValueError(f"{name}: expected (..., 3), got {array.shape}")
     return array.astype(np.float64, copy=False)
@@ -37,7 +37,7 @@ def vector(name: str, value: ArrayLike) -> Array:
 
 def vectors(name: str, estimated: ArrayLike, true: ArrayLike) -> tuple[Array, Array]:
     """Two arrays of one shape (..., 3)."""
-    first, second = plain(name, estimated), plain(name, true)
+    first, second = real_array(name, estimated), real_array(name, true)
     _same(name, first, second, "(..., 3)")
     return vector(name, first), vector(name, second)
 

@@ -7,10 +7,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ipman_rs.arrays import plain
-from ipman_rs.checks import choice
+from ipman_rs.checks import choice, real_array
 
-from .alike import alike
+from .numpy_or_torch import alike
 from .points import Array
 from .pressure_map import normalised
 
@@ -41,7 +40,7 @@ def frame_difference(estimated: ArrayLike, measured: ArrayLike, pressure_mode: P
 def maps(estimated: ArrayLike, measured: ArrayLike, pressure_mode: PressureMode) -> tuple[Array, Array]:
     """Both maps, scaled; the measured one NaN where it shows nothing."""
     choice("pressure_mode", pressure_mode, PressureMode)
-    first, second = plain("estimated", estimated).astype(float), plain("measured", measured).astype(float)
+    first, second = real_array("estimated", estimated).astype(float), real_array("measured", measured).astype(float)
     if first.shape != second.shape or first.ndim < 2 or 0 in first.shape[-2:]:
         raise ValueError(f"maps: expected two arrays of one shape (..., H, W), got {first.shape} and {second.shape}")
     return normalised(first, (-2, -1)), as_measured(second, pressure_mode)

@@ -7,9 +7,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.arrays import plain
+from ipman_rs.checks import real_array
 
-from .alike import alike
+from .numpy_or_torch import alike
 from .points import Array, points
 
 
@@ -36,7 +36,7 @@ def pressure_map(samples: ArrayLike, pressure: ArrayLike, mat: Mat) -> Any:
     Samples off the mat are left out. A body that is not finite has a map of NaN. ValueError where shapes do not fit.
     """
     where = points("samples", samples)
-    weights = plain("pressure", pressure).astype(np.float64)
+    weights = real_array("pressure", pressure).astype(np.float64)
     if weights.shape != where.shape[:-1]:
         raise ValueError(f"pressure: expected one a sample, {where.shape[:-1]}, got {weights.shape}")
     height, width = mat.values.shape[-2:]

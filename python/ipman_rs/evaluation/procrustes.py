@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .alike import alike
+from .numpy_or_torch import alike
 from .points import Array, finite, pair
 
 

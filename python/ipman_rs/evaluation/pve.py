@@ -6,7 +6,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from .alike import alike
+from .numpy_or_torch import alike
 from .points import norm, pair, vector
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .alike import as_array
+from .numpy_or_torch import as_array
 
 
 def reasons(conditions: Mapping[str, ArrayLike]) -> NDArray[np.str_]:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ipman_rs.arrays import plain
+from ipman_rs.checks import real_array
 from ipman_rs.ground import Ground
 
-from .alike import AnyGround, alike
+from .numpy_or_torch import AnyGround, alike
 from .points import Array, finite, norm, pair
 from .procrustes import similarity
 
@@ -51,7 +51,7 @@ def tilt(
 def root_tilt(estimated: ArrayLike, true: ArrayLike, ground: AnyGround, true_ground: AnyGround | None = None) -> Any:
     """`tilt` from the rotations (..., 3, 3) of the roots, from the rest pose to each one's world, where a body model
     gives them. ValueError where the shapes differ."""
-    first, second = (plain("rotations", value).astype(np.float64) for value in (estimated, true))
+    first, second = (real_array("rotations", value).astype(np.float64) for value in (estimated, true))
     if first.shape != second.shape or first.shape[-2:] != (3, 3):
         raise ValueError(f"rotations: expected two arrays (..., 3, 3), got {first.shape} and {second.shape}")
     first, second = finite(first), finite(second)

@@ -13,13 +13,15 @@ from typing import Any
 from ipman_rs.files import read_yaml
 
 from .solvers import SOLVERS, Options
-from .start import search
 from .terms import TERMS
 from .variables import BLOCKS
 
 FOLDER = Path(__file__).parent / "presets"
 MOST = 1_000_000  # iterations of a stage
 PRESETS = tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
+
+
+SEARCHES = ("body", "mean", "camera", "points")
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,23 @@ def load(name: str | Path) -> Config:
         raise ValueError(f"{path}: {error}") from None
 
 
+def search_of(start: Mapping[str, Any]) -> str:
+    """What a preset's `start` looks for. ValueError for what is not known."""
+    search_options(start)
+    how = start.get("search", "body")
+    if how not in SEARCHES:
+        raise ValueError(f"start, search: expected one of {', '.join(SEARCHES)}, got {how!r}")
+    return how
+
+
+def search_options(start: Mapping[str, Any]) -> dict[str, Any]:
+    """The `start` of a preset without its `search`. ValueError for an unknown option."""
+    unknown = sorted(set(start) - {"search", "yaws", "iterations"})
+    if unknown:
+        raise ValueError(f"start: expected search, yaws or iterations, got {', '.join(unknown)}")
+    return {name: int(value) for name, value in start.items() if name != "search"}
+
+
 def _config(name: str, content: Any) -> Config:
     _known("the file", content, ("description", "solver", "start", "stages", "terms", "tolerance"))
     terms, start = _terms("terms", content.get("terms")), content.get("start") or {}
@@ -91,7 +110,7 @@ def _config(name: str, content: Any) -> Config:
     _expect("start, search", start.get("search", ""), "str")
     for option in ("yaws", "iterations"):
         _whole(f"start, {option}", start.get(option, 1), 1)
-    search(start)
+    search_of(start)
     listed = content.get("stages") or ()
     if not listed or not isinstance(listed, (list, tuple)):
         raise ValueError(f"stages: expected a list of at least one, got {_short(listed)}")

@@ -23,18 +23,19 @@ from numpy.typing import NDArray
 
 import ipman_rs as ip
 import ipman_rs.torch as ipt
-from ipman_rs.body import BodyModel, embedded, safe_npz
+from ipman_rs.body import BodyModel, embedded
 from ipman_rs.data.frames import DataSet, Frames
 from ipman_rs.evaluation.tables.job import Source
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.evaluation.tables.predictions import fingerprint
-from ipman_rs.files import being_written, read_json, regular, write_whole
+from ipman_rs.files import being_written, read_json, regular, safe_npz, write_whole
 
-from . import data_frames, keypoints, photo, presented, start
+from ..data import keypoints
+from ..data.keypoints.detections import Detections, join
+from . import data_frames, photo, presented, start
 from .config import Config, weighs
 from .data_frames import World
 from .detected import too_little
-from .detections import Detections, join
 from .fit import fit
 from .landmarks import known
 from .problem import Problem

@@ -20,9 +20,9 @@ from ipman_rs.body import BodyModel, embedded, joints, pose_arrays
 from ipman_rs.data.frames import Frames
 from ipman_rs.evaluation.tables.models import Bodies
 
+from ..data.keypoints.detections import Detections
 from .camera import Camera
 from .detected import shared_names
-from .detections import Detections
 from .landmarks import Landmarks
 from .presented import PresentedBody, of_pose, touching
 from .presented_files import y_up

@@ -11,9 +11,9 @@ from torch import Tensor
 
 import ipman_rs.torch as ipt
 
+from ..data.keypoints.detections import Detections
 from .camera import Camera
 from .camera_file import KnownCamera
-from .detections import Detections
 from .landmarks import Landmarks, known
 from .problem import Problem
 from .start import SEEN, level_camera

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,8 +10,9 @@ import numpy as np
 import torch
 
 import ipman_rs.torch as ipt
+from ipman_rs.torch.threads import one_thread
 
-from . import switch
+from . import static_gate
 from .candidate import Candidate
 from .config import Config, Stage
 from .objective import Objective
@@ -97,18 +97,7 @@ def judged(problem: Problem, variables: Variables) -> Problem:
         return problem
     with torch.no_grad():
         vertices = Candidate(problem, variables).vertices
-        return replace(problem, static=switch.static(vertices, problem.body.template, problem.ground))
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Torch on one thread: a body's matrices are too small for more, and their bits must not depend on it."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
+        return replace(problem, static=static_gate.static(vertices, problem.body.template, problem.ground))
 
 
 def run_stage(

@@ -19,8 +19,8 @@ from torch import Tensor
 import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel
 
-from .sites import MIDPOINTS, Inner, Point, Site
-from .surface import FINGERTIPS, SIDES, skin_points
+from ..body.landmarks import FINGERTIPS, SIDES, skin_points
+from ..body.sites import MIDPOINTS, Inner, Point, Site
 
 # Joints of fingers, their tips, and the knuckles of `surface`.
 HAND_POINTS = frozenset(

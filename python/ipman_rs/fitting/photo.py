@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ipman_rs.files import regular
 
-from .detections import Array, Detections, join
-from .keypoints import mediapipe
+from ..data.keypoints import mediapipe
+from ..data.keypoints.detections import Array, Detections, join
 
 Box = tuple[float, float, float, float]  # x, y, width, height in pixels
 

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ipman_rs.body import BodyModel, embedded, joints, pose_arrays, safe_npz, safe_pickle
-from ipman_rs.files import read_json, regular
+from ipman_rs.body import BodyModel, embedded, joints, pose_arrays
+from ipman_rs.files import read_json, regular, safe_npz, safe_pickle
 from ipman_rs.ground import Ground
 
 Array = NDArray[Any]

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from ipman_rs.body.model import BodyModel
 from ipman_rs.body.pose_arrays import joints_of
-from ipman_rs.plain import plain
+from ipman_rs.jsonable import jsonable
 
 from .candidate import Candidate
 from .config import Config
@@ -81,7 +81,7 @@ class Result:
             "converged": self.converged,
             "reason": late[-1]["reason"],
             "iterations": sum(stage["iterations"] for stage in self.stages),
-            "reprojection": plain(self.reprojection()),
+            "reprojection": jsonable(self.reprojection()),
             "stages": self.stages,
         }
 
@@ -151,10 +151,10 @@ def _before_physics(fit: Fit, config: Config, start: Variables) -> Variables | N
 
 
 def _stage(stage: StageReport, row: int) -> dict[str, Any]:
-    terms = {name: plain(cost[row]) for name, cost in stage.terms.items()}
+    terms = {name: jsonable(cost[row]) for name, cost in stage.terms.items()}
     told = {"name": stage.name, "reason": stage.reasons[row], "iterations": stage.iterations[row], "terms": terms}
     if stage.trace is not None:
-        told["trace"] = {name: plain(costs) for name, costs in stage.trace[row].items()}
+        told["trace"] = {name: jsonable(costs) for name, costs in stage.trace[row].items()}
     return told
 
 

@@ -25,8 +25,9 @@ from torch import Tensor
 import ipman_rs.torch as ipt
 from ipman_rs.checks import not_negative
 
+from ..torch.threads import one_thread
 from .config import Config, Stage
-from .fit import CHUNK, Fit, StageReport, judged, on_the_ground, one_thread, run_stage
+from .fit import CHUNK, Fit, StageReport, judged, on_the_ground, run_stage
 from .objective import Objective
 from .problem import Problem
 from .solvers import Look, Options, minimise

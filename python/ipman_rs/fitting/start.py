@@ -23,6 +23,9 @@ from torch import Tensor
 from ipman_rs.body.poses import NAMES, pose_of
 
 from .camera import NEAREST
+from .config import Stage, search_of, search_options
+from .fit import on_the_ground, run_stage
+from .objective import Objective
 from .problem import Problem
 from .rotations import matrix, nearest, vector
 from .solvers import Options
@@ -43,31 +46,19 @@ SEEN = 0.1  # confidence from which a point counts as seen
 WEIGHTS = {"reprojection": 4.0, "pose_prior": 40.0, "joint_limits": 200.0, "shape_prior": 50.0}
 DEEPEST = 100.0  # m
 TRIED = 8  # placed poses that are fitted for a few iterations
-SEARCHES = ("body", "mean", "camera", "points")
 
 
 def begin(problem: Problem, start: Mapping[str, Any]) -> tuple[Problem, dict[str, Tensor]]:
     """Where a fit by a preset with this `start` begins: the problem, its ground known where the camera moves around the
     body, and the variables. ValueError for an unknown option."""
-    how, given = search(start), options(start)
+    how, given = search_of(start), search_options(start)
     if how == "points":
         return problem, at_points(problem)
     if how == "camera":
-        from .fit import on_the_ground
-
         if problem.ground is None:
             problem = on_the_ground(problem, neutral(problem))
         return problem, camera_around(problem, **given)
     return problem, (mean_before_camera if how == "mean" else before_camera)(problem, **given)
-
-
-def search(start: Mapping[str, Any]) -> str:
-    """What a preset's `start` looks for. ValueError for what is not known."""
-    options(start)
-    how = start.get("search", "body")
-    if how not in SEARCHES:
-        raise ValueError(f"start, search: expected one of {', '.join(SEARCHES)}, got {how!r}")
-    return how
 
 
 def level_camera(pitch: float | Tensor = 0.0) -> Tensor:
@@ -186,10 +177,6 @@ def _best(
     moves_camera: bool,
 ) -> dict[str, Tensor]:
     """Of all poses and yaws, each placed, the `TRIED` that explain the points best are fitted; the lowest cost wins."""
-    from .config import Stage
-    from .fit import run_stage
-    from .objective import Objective
-
     bodies, count = problem.num_bodies, len(poses) * yaws
     many = problem.rows(torch.arange(bodies).repeat_interleave(count))
     starts = {
@@ -285,11 +272,3 @@ def _roll(problem: Problem) -> Tensor:
     roll = torch.atan2(up[:, 0], -up[:, 1])
     known = _seen(problem)[:, ends].all(dim=1)
     return torch.where(known, (roll / (math.pi / 2)).round() * (math.pi / 2), 0.0)
-
-
-def options(start: Mapping[str, Any]) -> dict[str, Any]:
-    """The `start` of a preset without its `search`. ValueError for an unknown option."""
-    unknown = sorted(set(start) - {"search", "yaws", "iterations"})
-    if unknown:
-        raise ValueError(f"start: expected search, yaws or iterations, got {', '.join(unknown)}")
-    return {name: int(value) for name, value in start.items() if name != "search"}

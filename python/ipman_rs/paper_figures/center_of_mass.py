@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from ipman_rs.study.camera import Camera
     from ipman_rs.view import Study
-    from ipman_rs.view.camera import Camera
 
 Array = NDArray[np.floating]
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.study.camera import Camera
 from ipman_rs.view import Study, cells, colors
-from ipman_rs.view.camera import Camera
 from ipman_rs.view.picture import Box, camera_on
 
 from .estimated_people import Estimated, shared_names, studies

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 import ipman_rs as ip
 from ipman_rs import view
-from ipman_rs.body import BodyModel, embedded, safe_npz
+from ipman_rs.body import BodyModel, embedded
 from ipman_rs.body.pose_arrays import joints_of
 from ipman_rs.data.frames import DataSet, Frames
 from ipman_rs.evaluation.tables import predictions
 from ipman_rs.evaluation.tables.models import Models
-from ipman_rs.files import read_json
+from ipman_rs.files import read_json, safe_npz
+from ipman_rs.study.fitted import camera_of
 from ipman_rs.view import Study
-from ipman_rs.view.fitted import camera_of
 
 PHOTOS = (".jpg", ".jpeg", ".png")
 RECORD, PREDICTIONS = "fit.json", "predictions.npz"

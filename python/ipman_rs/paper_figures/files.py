@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ipman_rs.files import cell, write_whole
-from ipman_rs.plain import plain
+from ipman_rs.jsonable import jsonable
+from ipman_rs.view.picture import settle
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +45,9 @@ def write(figure: PaperFigure, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     settle(figure.picture, DPI)
     contents = {"png": _picture(figure, "png"), "svg": _picture(figure, "svg")}
-    record = json.dumps(plain({"figure": figure.name, **figure.numbers}), allow_nan=False, ensure_ascii=False, indent=1)
+    record = json.dumps(
+        jsonable({"figure": figure.name, **figure.numbers}), allow_nan=False, ensure_ascii=False, indent=1
+    )
     contents["json"] = f"{record}\n".encode()
     if figure.arrays:
         contents["npz"] = _packed(figure.arrays)
@@ -56,19 +59,6 @@ def write(figure: PaperFigure, folder: Path) -> list[Path]:
         write_whole(path, content)
         written.append(path)
     return written
-
-
-def settle(picture: Figure, dpi: float) -> None:
-    """Lays a figure out for a picture of that dpi, and ends that. The solver of matplotlib's layout is not the same in
-    the last digit each time, and an SVG names its clips after all digits."""
-    if picture.get_layout_engine() is None:
-        return
-    picture.set_dpi(dpi)
-    picture.draw_without_rendering()
-    picture.set_layout_engine("none")
-    for axes in picture.axes:
-        left, bottom, width, height = (round(float(edge), 9) for edge in axes.get_position(original=True).bounds)
-        axes.set_position((left, bottom, width, height), which="original")
 
 
 def _picture(figure: PaperFigure, form: str) -> bytes:

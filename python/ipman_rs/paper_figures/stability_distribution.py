@@ -76,7 +76,7 @@ def of_data_set(
 def of_built_people(people: int, preset: str = "paper-r", progress: Progress = lambda done: None) -> Losses:
     """L_stability of built people at rest, whose exact centre of mass lies over what they stand on: the "balanced"
     scenes of `ipman benchmark fit` from seed 0. Truth here, not an estimate."""
-    from ipman_rs.fitting.benchmark.scenes import draw_scenes
+    from ipman_rs.synthetic.at_rest import draw_scenes
 
     constants = ip.presets.get(preset)
     scenes = draw_scenes(people, 0, progress=progress)

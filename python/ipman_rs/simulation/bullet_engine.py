@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pybullet
 
-from .cross_check import Array, UprightDrop
+from .drop import Array, UprightDrop
 from .solids import GRAVITY
 
 RADIUS = 1e-4  # m

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.evaluation.bootstrap import Interval, bootstrap, paired
-from ipman_rs.evaluation.clusters import differences
+from ipman_rs.evaluation.statistics.bootstrap import Interval, bootstrap, paired
+from ipman_rs.evaluation.statistics.clusters import differences
 
 from .fall import Simulation
 

@@ -22,7 +22,8 @@ from ipman_rs.status import Status
 from ipman_rs.template import BodyTemplate
 from ipman_rs.volume import densities
 
-from .cross_check import Drop, each_drop
+from .cross_check import each_drop
+from .drop import Drop
 from .solids import CONTACT, Solids
 from .tipping import FALLEN
 

@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from .cross_check import Array, UprightDrop
+from .drop import Array, UprightDrop
 from .solids import GRAVITY
 
 mj: Any = mujoco  # compiled, without types

@@ -12,7 +12,7 @@ from torch import Tensor
 from torch._C._functorch import is_functorch_wrapped_tensor
 
 from ipman_rs import Ground as NumpyGround
-from ipman_rs.arrays import plain
+from ipman_rs.checks import real_array
 
 from .arrays import dense
 
@@ -132,7 +132,7 @@ def _tensor(name: str, value: Numbers) -> Tensor:
             return value
         return value.to(torch.float64)
     with np.errstate(over="ignore"):  # what double precision cannot hold is refused as not finite
-        return torch.as_tensor(plain(name, value).astype(np.float64))
+        return torch.as_tensor(real_array(name, value).astype(np.float64))
 
 
 def _has_tangent(tensor: Tensor) -> bool:

@@ -25,9 +25,9 @@ from .augment import ROOM, Augmentation, crop, to_crop
 from .batch import Batch
 from .lifting.views import KEYPOINTS
 from .model import HMR
-from .model.made import made
+from .model.build import made
 from .model.trained_weights import read_trained
-from .posing import HIPS, REGRESSED_HIPS, Posing, check_regressor
+from .posed_estimate import HIPS, REGRESSED_HIPS, Posing, check_regressor
 from .sources import BadSample, Images
 from .trainer.config import Config, config
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.plain import plain
+from ipman_rs.jsonable import jsonable
 
 from .acceleration import CUTOFF
 from .comparison import Comparison, distances
@@ -27,7 +27,7 @@ AXES = ("forward", "left", "up")
 def figures(one: Comparison) -> dict[str, Any]:
     """All that `report` prints of a recording."""
     mass = one.computed.mass if one.seen is None else one.computed.mass[one.seen]
-    return plain(
+    return jsonable(
         {
             "name": one.name,
             "kind": one.kind,

@@ -6,12 +6,12 @@ view.write_report([study], Path("out"))                    # report.html, report
 
 from __future__ import annotations
 
-from .fitted import Fitted
+from ..study.fitted import Fitted
+from ..study.study import Study, study
 from .floor import draw_floor_view
 from .html import page
 from .picture import draw_picture
 from .report import write_report
-from .study import Study, study
 from .timeline import draw_timeline
 
 __all__ = ["Fitted", "Study", "draw_floor_view", "draw_picture", "draw_timeline", "page", "study", "write_report"]

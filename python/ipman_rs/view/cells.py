@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..study.camera import Camera
 from . import colors
-from .camera import Camera
 from .fitted import in_front
 from .floor import draw_map
 from .picture import Box, Paint, draw_body, draw_markers, draw_scene, heat_top, new_page
@@ -16,7 +16,7 @@ from .picture import Box, Paint, draw_body, draw_markers, draw_scene, heat_top, 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .study import Study
+    from ..study.study import Study
 
 _MARGIN = 0.06  # of a cell, around the body
 _SHARP = 2  # pixels of the result to one of the cell

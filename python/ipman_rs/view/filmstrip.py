@@ -7,15 +7,15 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
+from ..study.camera import Camera, front_of, look_at
 from . import colors
-from .camera import Camera, front_of, look_at
 from .geometry import floor_lines, grid_step
 from .picture import draw_body, new_page, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .study import Study
+    from ..study.study import Study
 
 # Pixels of one picture of the strip, and the part of it (left, top, right, bottom) that the body fills.
 WIDTH, HEIGHT = 420, 760

@@ -15,7 +15,7 @@ from .raster import faces_viewer, rasterize
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .study import Study
+    from ..study.study import Study
 
 HEIGHT = 1200
 # The map's square on the page, as fractions of it.

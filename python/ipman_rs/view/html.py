@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from ipman_rs.plain import plain
+from ipman_rs.jsonable import jsonable
 from ipman_rs.status import status_names
 
+from ..study.study import Study
 from . import colors
 from .picture import heat_top
-from .study import Study
 from .timeline import SERIES
 
 # Columns that the page shows for every frame.
@@ -95,22 +95,22 @@ def _body(study: Study, folder: Path | None) -> dict[str, Any]:
         "parts": list(study.template.part_names),
         "labels": [study.label(frame) for frame in range(study.num_frames)],
         "named": bool(study.labels),
-        "seconds": plain(study.seconds),
-        "keyFrames": plain(keys),
+        "seconds": jsonable(study.seconds),
+        "keyFrames": jsonable(keys),
         "broken": [not bool(finite[k].all()) for k in range(len(keys))],
         "numVertices": int(study.template.num_vertices),
-        "low": plain(low),
-        "step": plain(step),
+        "low": jsonable(low),
+        "step": jsonable(step),
         "vertices": _base64(packed),
         "faces": _base64(study.template.faces.astype("<u2" if small else "<u4")),
         "wide": not small,
         "vertexParts": _base64(_vertex_parts(study)),
-        "polygons": [plain(np.round(_floor_axes(study, study.polygons[frame]), 5)) for frame in keys],
+        "polygons": [jsonable(np.round(_floor_axes(study, study.polygons[frame]), 5)) for frame in keys],
         "com": _points(study, "center_of_mass"),
         "cop": _points(study, "center_of_pressure"),
         "status": [status_names(status) for status in study.numbers["status"]],
-        "numbers": {key: plain(_short(study.numbers[key])) for key in _SHOWN},
-        "partVolumes": plain(_short(study.numbers["part_volumes"][keys])),
+        "numbers": {key: jsonable(_short(study.numbers[key])) for key in _SHOWN},
+        "partVolumes": jsonable(_short(study.numbers["part_volumes"][keys])),
     }
 
 
@@ -140,7 +140,7 @@ def _floor_axes(study: Study, points: np.ndarray) -> np.ndarray:
 
 
 def _points(study: Study, key: str) -> list[Any]:
-    return plain(np.round(_floor_axes(study, study.numbers[key]), 5))
+    return jsonable(np.round(_floor_axes(study, study.numbers[key]), 5))
 
 
 def _short(column: np.ndarray) -> np.ndarray:

@@ -11,16 +11,17 @@ import numpy as np
 
 from ipman_rs.files import being_written
 
+from ..body.normals import vertex_normals
+from ..study.camera import Camera, look_at
 from . import colors
-from .camera import Camera, look_at
-from .geometry import floor_lines, grid_step, pressure_at, vertex_normals
+from .geometry import floor_lines, grid_step, pressure_at
 from .raster import faces_viewer, rasterize, shrink
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from .study import Study
+    from ..study.study import Study
 
 Paint = Callable[[np.ndarray], np.ndarray]
 Box = tuple[float, float, float, float]
@@ -273,3 +274,16 @@ def write_legend(figure: Figure, study: Study, top: float) -> None:
         more = "≥ " if top >= _TOP and tick == top else ""
         axes.text(x, y + 26, f"{more}{tick:g}", size=12, color=colors.MUTED, ha="center", va="center")
     axes.set(xlim=(0, WIDTH), ylim=(height, 0))
+
+
+def settle(picture: Figure, dpi: float) -> None:
+    """Lays a figure out for a picture of that dpi, and ends that. The solver of matplotlib's layout is not the same in
+    the last digit each time, and an SVG names its clips after all digits."""
+    if picture.get_layout_engine() is None:
+        return
+    picture.set_dpi(dpi)
+    picture.draw_without_rendering()
+    picture.set_layout_engine("none")
+    for axes in picture.axes:
+        left, bottom, width, height = (round(float(edge), 9) for edge in axes.get_position(original=True).bounds)
+        axes.set_position((left, bottom, width, height), which="original")

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ipman_rs.plain import plain
+from ipman_rs.jsonable import jsonable
 from ipman_rs.status import status_names
 
-from .study import Study
+from ..study.study import Study
 
 UNITS = {
     "vertices, centres, polygon, margin, lowest, com_cop_distance, stability, normal x height": "m",
@@ -38,15 +38,15 @@ def report_record(studies: Sequence[Study], failures: Sequence[tuple[str, str]] 
 
 def study_record(study: Study) -> dict[str, Any]:
     template = study.template
-    fitted = {} if study.fitted is None else {"fit": plain(study.fitted.record)}
+    fitted = {} if study.fitted is None else {"fit": jsonable(study.fitted.record)}
     return {
         "name": study.name,
         "source": study.source,
         **fitted,
         "notes": list(study.notes),
         "flags": list(study.flags),
-        "preset": plain(asdict(study.preset)),
-        "ground": {"normal": plain(study.ground.normal), "height": plain(study.ground.height)},
+        "preset": jsonable(asdict(study.preset)),
+        "ground": {"normal": jsonable(study.ground.normal), "height": jsonable(study.ground.height)},
         "template": {
             "vertices": int(template.num_vertices),
             "faces": int(template.num_faces),
@@ -61,14 +61,14 @@ def study_record(study: Study) -> dict[str, Any]:
 
 def frame_record(study: Study, frame: int) -> dict[str, Any]:
     row = {key: column[frame] for key, column in study.numbers.items()}
-    volumes = dict(zip(study.template.part_names, plain(row.pop("part_volumes")), strict=True))
+    volumes = dict(zip(study.template.part_names, jsonable(row.pop("part_volumes")), strict=True))
     return {
         "frame": study.number(frame),
         "label": study.label(frame),
-        "seconds": None if study.seconds is None else plain(study.seconds[frame]),
+        "seconds": None if study.seconds is None else jsonable(study.seconds[frame]),
         "status": status_names(row.pop("status")),
-        **{key: plain(value) for key, value in row.items()},
-        "polygon": plain(study.polygons[frame]),
+        **{key: jsonable(value) for key, value in row.items()},
+        "polygon": jsonable(study.polygons[frame]),
         "part_volumes": volumes,
     }
 

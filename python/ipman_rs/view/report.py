@@ -11,12 +11,12 @@ import numpy as np
 
 from ipman_rs.files import being_written, write_whole
 
+from ..study.study import MAX_LISTED_FRAMES, Study
 from .fitted import draw_fitted
 from .floor import draw_floor_view
 from .html import page
 from .picture import draw_picture
 from .record import report_record, study_arrays
-from .study import MAX_LISTED_FRAMES, Study
 from .timeline import draw_timeline
 
 

@@ -11,7 +11,7 @@ from . import colors
 from .picture import save
 
 if TYPE_CHECKING:
-    from .study import Study
+    from ..study.study import Study
 
 # Column, title, unit, factor to the unit, colour: the report's page shows the same ones.
 SERIES = (

@@ -20,16 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs import __version__, data
-from ipman_rs.body import safe_npz
 from ipman_rs.data import check, judge
 from ipman_rs.data.frames import DataSet, Frames, Rows
-from ipman_rs.files import being_written, read_json, write_whole
+from ipman_rs.files import being_written, read_json, safe_npz, write_whole
 from ipman_rs.ground import Ground
 from ipman_rs.volume import mass_properties
 
 from ..procrustes import similarity
 from . import predictions as predicted
-from .columns import Columns, columns
+from .frame_metrics import Columns, columns
 from .joints import Definition, Regressors, compared, define
 from .models import Models
 

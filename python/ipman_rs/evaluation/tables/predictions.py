@@ -27,10 +27,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import safe_npz
 from ipman_rs.data import check, judge
 from ipman_rs.data.frames import Frames, Rows
-from ipman_rs.files import regular
+from ipman_rs.files import regular, safe_npz
 from ipman_rs.ground import Ground
 
 from . import parquet

@@ -16,11 +16,11 @@ import numpy as np
 from ipman_rs import __version__
 from ipman_rs.files import being_written, cell, write_whole
 
-from ..bootstrap import Interval
+from ..statistics.bootstrap import Interval
 from . import parquet
-from .figures import FIGURES, Figure
 from .job import Job
 from .joints import COUNTED, Definition
+from .metrics import FIGURES, Figure
 from .paper import Table
 from .summary import EDGES, Difference, Measured, frames_of
 

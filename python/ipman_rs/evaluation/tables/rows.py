@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import safe_npz
 from ipman_rs.data.frames import Rows
-from ipman_rs.files import being_written, regular
+from ipman_rs.files import being_written, regular, safe_npz
 
 BLOCK = 1 << 16  # rows that are gone through at a time
 _CHUNK = 1 << 22  # bytes that are unpacked at a time

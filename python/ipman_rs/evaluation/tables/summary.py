@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accumulator import Accumulator, Clusters
-from ..bootstrap import Interval
-from ..column import Summary
-from ..sign_flip import sign_flip
-from .columns import Columns
-from .figures import FIGURES
+from ..statistics.accumulator import Accumulator, Clusters
+from ..statistics.bootstrap import Interval
+from ..statistics.metric_sums import Summary
+from ..statistics.permutation_test import sign_flip
+from .frame_metrics import Columns
 from .job import Job
+from .metrics import FIGURES
 
 # The frames below each of these are counted, of figures that are lengths or angles: a tenth of a millimetre to 10 m.
 EDGES = np.logspace(-4, 1, 251)

@@ -4,8 +4,8 @@
     | Bᵀ  C | shared numbers
 
 Solved by Cholesky's factors of the band, block by block, and the Schur complement C − Bᵀ A⁻¹ B, so the time is linear
-in the frames. In torch, whose one thread (`fit.one_thread`) always gives the same bits; scipy's banded solver takes as
-many threads as it finds.
+in the frames. In torch, whose one thread (`one_thread`) always gives the same bits; scipy's banded solver takes as many
+threads as it finds.
 """
 
 from __future__ import annotations

@@ -17,7 +17,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from ipman_rs.body import joints, safe_npz, safe_pickle
+from ipman_rs.body import joints
+from ipman_rs.files import safe_npz, safe_pickle
 
 from ..candidate import Candidate
 from ..problem import Problem

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 import ipman_rs.torch as ipt
 from ipman_rs.checks import positive
 
+from ...body.sites import MIDPOINTS
 from ..candidate import Candidate
 from ..landmarks import Landmarks, known
 from ..problem import Problem
-from ..sites import MIDPOINTS
 from ..variables import Variables
 
 DIFFERENCES = {1: (-1.0, 1.0), 2: (1.0, -2.0, 1.0)}

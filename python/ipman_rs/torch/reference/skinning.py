@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import roma
 import torch
 from torch import Tensor, nn
 
-if TYPE_CHECKING:
-    from ..body import BodyModel
+
+class BodyModel(Protocol):
+    """What `ipman_rs.torch.BodyModel` has that skinning reads: the numpy body and its arrays as buffers."""
+
+    body: Any
+    v_template: Tensor
+    shapedirs: Tensor
+    expressiondirs: Tensor
+    posedirs: Tensor | None
+    J_template: Tensor
+    J_shapedirs: Tensor
+    J_expressiondirs: Tensor
+    parents: tuple[int, ...]
+    rest_rotation: Tensor
+    weights: Tensor
+    pose_mean: Tensor
 
 
 def posed(

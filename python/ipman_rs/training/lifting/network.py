@@ -7,8 +7,8 @@ from torch import Tensor, nn
 
 from ipman_rs.body import load_body
 
+from ...synthetic.population import BODY
 from ..model import HMR, MeanParameters
-from .bodies import BODY
 from .views import KEYPOINTS
 
 WIDTH = 256

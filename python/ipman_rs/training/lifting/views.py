@@ -12,11 +12,11 @@ from torch import Tensor
 
 import ipman_rs.torch as ipt
 from ipman_rs.body import rotations
-from ipman_rs.fitting.keypoints import coco
+from ipman_rs.data.keypoints import coco
 
+from ...synthetic.population import BODY, Bodies
 from ..batch import Batch
-from ..posing import HIPS, Posing
-from .bodies import BODY, Bodies
+from ..posed_estimate import HIPS, Posing
 
 Array = NDArray[np.floating]
 Draw = np.random.Generator

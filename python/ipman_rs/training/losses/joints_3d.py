@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from torch import Tensor
 
-from ..posing import HIPS
+from ..posed_estimate import HIPS
 
 
 def joints_3d_loss(joints: Tensor, labels: Tensor, hips: Sequence[int] = HIPS, count: int | None = None) -> Tensor:

@@ -12,7 +12,7 @@ from ipman_rs import BodyTemplate
 from ipman_rs.checks import choice
 
 from ..batch import Batch
-from ..posing import Posed
+from ..posed_estimate import Posed
 from ..world import to_world
 
 Counted = Literal["labelled", "world"]

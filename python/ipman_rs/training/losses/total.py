@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from ..batch import Batch
 from ..model import HMR, Estimate, keypoint_maps_loss
-from ..posing import Posed, Posing
+from ..posed_estimate import Posed, Posing
 from ..projection import project
 from .body_parameters import betas_loss, pose_loss
 from .joints_3d import joints_3d_loss

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import BodyModel, poses, rotations, safe_npz
+from ipman_rs.body import BodyModel, poses, rotations
+from ipman_rs.files import safe_npz
 
 Array = NDArray[np.floating]
 

@@ -18,7 +18,7 @@ from ipman_rs.data import DataSet, Frames
 from ipman_rs.files import regular
 
 from ..augment import Augmentation, Augmenting, Pixels, cut, follow, normalised, to_crop
-from ..posing import HIPS, REGRESSED
+from ..posed_estimate import HIPS, REGRESSED
 from .source import BadSample
 
 Array = NDArray[np.floating]

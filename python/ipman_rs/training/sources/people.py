@@ -8,10 +8,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ...synthetic.population import draw_bodies
 from ..batch import Batch
-from ..leaning import leaning
-from ..lifting.bodies import draw_bodies
 from ..lifting.views import noisy, views
+from ..tilted_labels import leaning
 
 
 class People:

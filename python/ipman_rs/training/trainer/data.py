@@ -14,7 +14,7 @@ from ipman_rs.body.joint_regressors import JointRegressor, read
 
 from ..batch import Batch
 from ..lifting.views import KEYPOINTS
-from ..posing import REGRESSED
+from ..posed_estimate import REGRESSED
 from ..sources import BadSample, Images, Mixture, People, Share, Source
 from ..sources.mixture import Steps
 from . import config

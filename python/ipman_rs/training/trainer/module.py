@@ -12,12 +12,11 @@ from torch import Tensor
 import ipman_rs.torch as ipt
 
 from ..batch import Batch
-from ..benchmark.report import COLUMNS, columns
-from ..drill import clip_gradient, falling
-from ..figures import figures
 from ..losses import Loss, Physics
-from ..model.made import made
-from ..posing import Posing
+from ..metrics import COLUMNS, columns, figures
+from ..model.build import made
+from ..posed_estimate import Posing
+from ..train_loop import clip_gradient, falling
 from . import config, data
 
 

@@ -1,0 +1,141 @@
+"""The fits of all rows of all blocks. What is done is kept in a folder, and not done again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from ipman_rs.files import being_written
+
+from ...fitting.config import Config
+from ...fitting.fit import Fit, StageReport, fit
+from ...synthetic.at_rest import draw_scenes
+from ...torch.threads import one_thread
+from .metrics import Figures, figures, snapped
+from .observations import Task, calibrated, presented, regressed
+from .truth import Truth
+from .variants import CALIBRATED, PRESENTED, Row, config
+
+SPLITS = {"test": 40_000, "tune": 10_000}  # seeds of the people; those of 20_000 and 30_000 were looked at
+CONTROLS = ("baseline", "both", "ours", "ours without physics")
+
+
+@dataclass(frozen=True)
+class Block:
+    """People, what is told of them, and the rows. told: None (the camera and the floor), "regressed" (a start, too), or
+    the degrees of noise of a presented pose."""
+
+    name: str
+    kind: str
+    told: float | str | None
+    rows: tuple[Row, ...]
+
+
+def blocks() -> list[Block]:
+    few = tuple(row for row in CALIBRATED if row.name in CONTROLS)
+    few_presented = tuple(row for row in PRESENTED if row.name in CONTROLS)
+    return [
+        Block("calibrated", "balanced", None, tuple(CALIBRATED)),
+        Block("presented, 3°", "balanced", 3.0, tuple(PRESENTED)),
+        Block("presented, 10°", "balanced", 10.0, tuple(PRESENTED)),
+        Block("calibrated, good start", "balanced", "regressed", tuple(CALIBRATED)),
+        Block("calibrated, tipped", "tipped", None, few),
+        Block("calibrated, jumping", "jumping", None, few),
+        Block("presented, 3°, tipped", "tipped", 3.0, few_presented),
+        Block("presented, 3°, jumping", "jumping", 3.0, few_presented),
+    ]
+
+
+@dataclass(frozen=True)
+class Result:
+    """One row of a block. seconds: of one processor core, a body."""
+
+    row: Row
+    figures: Figures
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """bodies: of the balanced blocks; the controls have `controls`. iterations: of the longest stage."""
+
+    folder: Path
+    bodies: int = 100
+    controls: int = 40
+    iterations: int = 100
+    split: str = "test"
+
+    def run(self, block: Block, progress: Callable[[], None] = lambda: None) -> tuple[Truth, list[Result]]:
+        """`progress` is called after each row."""
+        truth = self.truth(block.kind)
+        task: Task | None = None
+        results = []
+        for row in block.rows:
+            preset = config(row, self.iterations)
+            place = self.place(block, preset)
+            task = task or self.task(block, truth)
+            if not place.exists():
+                self.fit(task, preset, place)
+            found, seconds = kept(task, place)
+            results.append(Result(row, figures(snapped(found) if row.snap else found, task, truth), seconds))
+            progress()
+        return truth, results
+
+    def count(self, kind: str) -> int:
+        return self.bodies if kind == "balanced" else self.controls
+
+    def truth(self, kind: str, progress: Callable[[int], None] | None = None) -> Truth:
+        """The people of a kind; `progress` is told how many are drawn."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        count = self.count(kind)
+        path = self.folder / f"people-{self.split}-{kind}-{count}.npz"
+        if not path.exists():
+            Truth.of(draw_scenes(count, SPLITS[self.split], kind, progress)).save(path)
+        return Truth.load(path)
+
+    def task(self, block: Block, truth: Truth) -> Task:
+        with one_thread():
+            if block.told is None:
+                return calibrated(truth, SPLITS[self.split])
+            if isinstance(block.told, str):
+                return regressed(truth, SPLITS[self.split])
+            return presented(truth, SPLITS[self.split], block.told)
+
+    def fit(self, task: Task, preset: Config, place: Path) -> None:
+        begun = time.process_time()
+        found = fit(task.problem, task.starts, preset)
+        seconds = (time.process_time() - begun) / task.problem.num_bodies
+        reasons = np.array([stage.reasons for stage in found.stages])
+        variables: dict[str, Any] = {name: value.numpy() for name, value in found.variables.items()}
+        with being_written(place) as file:
+            np.savez(file, seconds=seconds, reasons=reasons, **variables)
+
+    def place(self, block: Block, preset: Config) -> Path:
+        """The file of a fit: named by all that decides it."""
+        told = [
+            self.split,
+            self.count(block.kind),
+            block.kind,
+            block.told,
+            preset.terms,
+            [asdict(stage) for stage in preset.stages],
+        ]
+        key = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+        return self.folder / f"fit-{key}.npz"
+
+
+def kept(task: Task, place: Path) -> tuple[Fit, float]:
+    """A fit from its file, and its seconds."""
+    with np.load(place, allow_pickle=False) as stored:
+        content: Mapping[str, np.ndarray] = dict(stored)
+    variables = {name: torch.from_numpy(content[name]) for name in task.starts}
+    stages = [StageReport("", list(reasons), [], {}, variables) for reasons in content["reasons"]]
+    return Fit(task.problem, variables, stages), float(content["seconds"])

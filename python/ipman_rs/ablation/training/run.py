@@ -1,0 +1,194 @@
+"""Training of all rows on all labels, in several processes. What is done is kept in a folder, and not done again."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import torch
+
+from ipman_rs.files import being_written
+from ipman_rs.presets import get
+from ipman_rs.processes import end_with_parent
+from ipman_rs.torch.threads import one_thread
+
+from ...training.batch import Batch
+from ...training.losses import Loss
+from ...training.metrics import Figures, figures
+from ...training.tilted_labels import Lean, leaning
+from ...training.train_loop import Drill, drill, estimated
+from .shuffled_camera import shuffled_camera
+from .task import Plan, Task, key_of
+from .variants import Row, settings
+
+LEANS, DEALS = 35_000, 36_000  # seeds of the labels' leans, and of the shuffled cameras
+TILTS = {"keypoints": (0.0, 4.0, 8.0, 12.0), "images": (0.0, 8.0)}
+
+
+@dataclass(frozen=True)
+class Result:
+    """A row, and its figures for each seed."""
+
+    row: Row
+    figures: list[Figures]
+
+
+@dataclass(frozen=True)
+class Job:
+    """Training of a row; of what all rows go on from (row: None); or first learning to see (tilt: None, too)."""
+
+    seed: int
+    tilt: float | None = None
+    row: Row | None = None
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """seeds: of weights and batches. part: of the settings' steps, for trials. lean: as in `leaning`."""
+
+    folder: Path
+    task: Task
+    seeds: int = 3
+    part: float = 1.0
+    lean: Lean = "camera"
+
+    def run(
+        self, tilts: Sequence[float], workers: int = 1, progress: Callable[[int, int], None] | None = None
+    ) -> dict[float, list[Result]]:
+        """All rows with labels that lean by `tilts` degrees. progress: how many trainings of how many are done."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.task.make()
+        first = [Job(seed) for seed in range(self.seeds)] if self.plan.first else []
+        base = [Job(seed, tilt) for tilt in tilts for seed in range(self.seeds)]
+        fine = [replace(job, row=row) for job in base for row in self.rows]
+        jobs = [*first, *base, *fine]
+        for done, _ in enumerate(self._all(jobs, workers), 1):
+            if progress is not None:
+                progress(done, len(jobs))
+        return {tilt: [self._result(tilt, row) for row in self.rows] for tilt in tilts}
+
+    @cached_property
+    def plan(self) -> Plan:
+        told = settings(self.task.name).plan
+        return Plan(self._shortened(told.base), self._shortened(told.fine), told.first and self._shortened(told.first))
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        return settings(self.task.name).rows
+
+    def _shortened(self, plan: Drill) -> Drill:
+        return replace(plan, steps=max(1, round(plan.steps * self.part)))
+
+    def do(self, job: Job) -> None:
+        """One training; the file of what came out."""
+        place = self._place(job)
+        if place.exists():
+            return
+        with one_thread(), being_written(place) as file:
+            if job.tilt is None:
+                assert self.plan.first
+                self.task.see(job.seed, self.plan.first, file)
+            else:
+                self._train(job, job.tilt, file)
+
+    def _all(self, jobs: Sequence[Job], workers: int) -> Iterable[None]:
+        waiting = [job for job in jobs if not self._place(job).exists()]
+        yield from (None for _ in range(len(jobs) - len(waiting)))
+        if workers == 1:
+            yield from map(self.do, waiting)
+            return
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(workers, context, _in_process, (self,)) as pool:
+            try:
+                running: set[Future[None]] = set()
+                while waiting or running:
+                    ready = [job for job in waiting if self._can_begin(job)]
+                    waiting = [job for job in waiting if job not in ready]
+                    finished, running = wait(running | {pool.submit(_do, job) for job in ready}, None, FIRST_COMPLETED)
+                    yield from (future.result() for future in finished)
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+
+    def _can_begin(self, job: Job) -> bool:
+        """Whether what it goes on from is there."""
+        if job.row is not None:
+            return self._place(replace(job, row=None)).exists()
+        seen = self._seen(job.seed)
+        return job.tilt is None or seen is None or seen.exists()
+
+    def _train(self, job: Job, tilt: float, file: BinaryIO) -> None:
+        """The file gets weights, or figures of a row."""
+        model, data, posing = self.task.lifter(job.seed), self._data(job.seed, tilt), self.task.posing()
+        if job.row is not None:
+            model.load_state_dict(torch.load(self._place(replace(job, row=None)), weights_only=True))
+        physics = None if job.row is None else job.row.physics(posing.body.template)
+        loss = Loss(posing, physics)
+        if job.row is not None and job.row.shuffled:
+            data = shuffled_camera(data, DEALS)
+        plan, seed = (self.plan.base, job.seed) if job.row is None else (self.plan.fine, 1000 + job.seed)
+        drill(model, lambda batch: loss(model(batch.inputs), batch)[0], data, self.task.noisy, plan, seed)
+        if job.row is None:
+            torch.save(model.state_dict(), file)
+        else:
+            truth = self._truth(job.seed)
+            figures(estimated(model, truth.inputs), truth, posing).save(file)
+
+    def _data(self, seed: int, tilt: float) -> Batch:
+        """The last one is kept."""
+        seen = self._seen(seed)
+        if (seen, tilt) not in self._kept:
+            self._kept.clear()
+            self._kept[seen, tilt] = leaning(self.task.training(seen), tilt, LEANS, self.lean)
+        return self._kept[seen, tilt]
+
+    @cached_property
+    def _kept(self) -> dict[tuple[Path | None, float], Batch]:
+        return {}
+
+    def _truth(self, seed: int) -> Batch:
+        """Kept for each seed."""
+        seen = self._seen(seed)
+        if seen not in self._truths:
+            self._truths[seen] = self.task.truth(seen)
+        return self._truths[seen]
+
+    @cached_property
+    def _truths(self) -> dict[Path | None, Batch]:
+        return {}
+
+    def _seen(self, seed: int) -> Path | None:
+        """The file of what the first stage sees."""
+        return self._place(Job(seed)) if self.plan.first else None
+
+    def _result(self, tilt: float, row: Row) -> Result:
+        return Result(row, [Figures.load(self._place(Job(seed, tilt, row))) for seed in range(self.seeds)])
+
+    def _place(self, job: Job) -> Path:
+        """The file of a result: named by all that decides it."""
+        told: list[Any] = [self.task.trained_on(), job.seed, self.plan.first and asdict(self.plan.first)]
+        if job.tilt is not None:
+            told += [job.tilt, job.tilt and self.lean, asdict(self.plan.base)]
+        if job.row is not None:
+            row = job.row
+            told += [asdict(self.plan.fine), row.preset and asdict(get(row.preset)), dict(row.weights), row.shuffled]
+            told.append(self.task.tested_on())
+        return self.folder / (f"base-{key_of(told)}.pt" if job.row is None else f"figures-{key_of(told)}.npz")
+
+
+# The benchmark of a working process, which keeps the data of its last tilt.
+_BENCHMARK: list[Benchmark] = []
+
+
+def _in_process(benchmark: Benchmark) -> None:
+    end_with_parent()
+    _BENCHMARK[:] = [benchmark]
+
+
+def _do(job: Job) -> None:
+    _BENCHMARK[0].do(job)

@@ -1,0 +1,1 @@
+"""Sums over frames and shards, and what of a difference is chance."""

@@ -1,0 +1,1 @@
+"""Mesh files. `read_mesh.read_mesh(path)` reads .obj, .ply, .stl, .glb and .gltf files."""

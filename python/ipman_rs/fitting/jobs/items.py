@@ -1,0 +1,190 @@
+"""What `ipman fit` is given: files and folders of them, as items that are fitted each on its own."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...files import regular
+from ...files.errors import FileError
+
+if TYPE_CHECKING:
+    from ...data.keypoints.detections import Detections
+
+IMAGES = (".png", ".jpg", ".jpeg")
+KEYPOINTS = (".json",)
+MARKERS = (".trc", ".c3d")
+ENDINGS = (*KEYPOINTS, *IMAGES, *MARKERS)
+
+
+@dataclass
+class Item:
+    """One person to fit. `failure` says why there is no body; `photo` is what the report shows under it."""
+
+    name: str
+    path: Path
+    source: str
+    seen: Detections | None = None  # of one row; photos are looked at when their turn comes
+    photo: Path | None = None
+    notes: list[str] = field(default_factory=list)
+    flags: list[str] = field(default_factory=list)
+    failure: str | None = None
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The options that say how inputs are read."""
+
+    person: int | None = None
+    image_size: tuple[float, float] | None = None
+    photo: Path | None = None
+    sequence: bool = False  # the images of a file are frames of one person
+    force: bool = False  # take what cannot be a person, too
+
+
+def expand(inputs: Iterable[Path]) -> list[Path]:
+    """The files, and those in the folders, by name. Raises FileError for a folder without any."""
+    files: list[Path] = []
+    for path in inputs:
+        if not os.path.isdir(path):
+            files.append(path)
+            continue
+        inside = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in ENDINGS and entry.is_file())
+        if not inside:
+            raise FileError(path, f"no input in this folder; expected files ending in {' '.join(ENDINGS)}")
+        files += inside
+    return files
+
+
+def items(path: Path, reading: Reading) -> list[Item]:
+    """The people of one file: one an image, and none of a photo yet. Raises FileError."""
+    kind = path.suffix.lower()
+    try:
+        regular(path)
+    except ValueError as error:
+        raise FileError(path, str(error)) from None
+    if kind in IMAGES:
+        return [Item(path.stem, path, str(path), photo=path)]
+    if kind not in KEYPOINTS:
+        raise FileError(path, f"unknown kind {kind or 'without ending'!r}; expected {' '.join(ENDINGS)}")
+    from ...data import keypoints
+
+    try:
+        size, odd = _size(reading)
+        found = keypoints.read(path, person=reading.person, image_size=size)
+    except ValueError as error:
+        raise FileError(path, _advice(str(error))) from error
+    if found.image_size is None:
+        raise FileError(path, "does not say how large its image is; give --image-size WIDTHxHEIGHT, or --image PHOTO")
+    people, notes = _admitted(path, [_one(found, row) for row in range(len(found))], reading.force)
+    many = len(found) > 1
+    if many and not reading.sequence:
+        notes.append(f"{path}: {len(found)} images, each fitted on its own; --sequence fits one person over time")
+    made = [
+        Item(
+            f"{path.stem}_{number}" if many else path.stem,
+            path,
+            one.sources[0],
+            one,
+            reading.photo,
+            list(one.notes),
+            list(flags),
+        )
+        for number, (one, flags) in enumerate(people)
+    ]
+    made[0].notes += notes + odd
+    return made
+
+
+def _admitted(
+    path: Path, people: list[Detections], force: bool
+) -> tuple[list[tuple[Detections, tuple[str, ...]]], list[str]]:
+    """Those whose points can be a person in the image, each with what is odd; and who was left out.
+
+    Raises FileError where nobody's can.
+    """
+    from ...data import judge
+
+    kept: list[tuple[Detections, tuple[str, ...]]] = []
+    notes: list[str] = []
+    refused: list[str] = []
+    for one in people:
+        assert one.image_size is not None
+        points = np.column_stack([one.points[0], one.confidence[0]])
+        try:
+            odd = judge.admit(one.sources[0], judge.keypoints(points, one.image_size[0]), force)
+        except judge.NoPerson as error:
+            refused.append(str(error))
+            continue
+        kept.append((one, odd))
+    if not kept:
+        raise FileError(path, refused[0])
+    if refused:
+        first = refused[0].removeprefix(f"{path}: ")
+        notes.append(f"{path}: {len(refused)} of {len(people)} images refused; first of all: {first}")
+    return kept, notes
+
+
+def look(item: Item) -> None:
+    """Find the person in a photo. Raises FileError."""
+    from .. import photo
+
+    try:
+        item.seen = photo.detect([item.path])
+    except (ValueError, ImportError) as error:
+        raise FileError(item.path, str(error)) from error
+    item.notes += item.seen.notes
+
+
+def _size(reading: Reading) -> tuple[tuple[float, float] | None, list[str]]:
+    """The image's size as given, or the photo's, and a note where the two differ."""
+    if reading.photo is None:
+        return reading.image_size, []
+    from .. import photo
+
+    height, width = photo.read(reading.photo).shape[:2]
+    size, given = (float(width), float(height)), reading.image_size
+    if given is None or given == size:
+        return size, []
+    said = f"{reading.photo}: the photo has {width} × {height} pixels, --image-size says {given[0]:g} × {given[1]:g}"
+    return given, [said]
+
+
+def _advice(what: str) -> str:
+    if "image_size" in what and "need it" in what:
+        return f"{what}; give --image-size WIDTHxHEIGHT, or --image PHOTO"
+    return what
+
+
+def _one(found: Detections, row: int) -> Detections:
+    from ...data.keypoints.detections import Detections
+
+    def part(value: np.ndarray | None) -> np.ndarray | None:
+        return None if value is None else value[row : row + 1]
+
+    points, confidence = found.points[row : row + 1], found.confidence[row : row + 1]
+    others = (part(found.image_size), part(found.points_3d), part(found.confidence_3d))
+    others_notes = tuple(f"{source}:" for source in found.sources if source != found.sources[row])
+    own = f"{found.sources[row]}:"
+    notes = tuple(  # what is said of the whole file goes to its first image
+        note for note in found.notes if note.startswith(own) or (row == 0 and not note.startswith(others_notes))
+    )
+    return Detections(found.names, points, confidence, (found.sources[row],), *others, notes)
+
+
+def identity(item: Item, options: str) -> str:
+    """What a fit depends on, as a hash: the input's bytes, which person of it, and all options."""
+    digest = hashlib.sha256()
+    for part in (options.encode(), item.name.encode(), _bytes(item.path), _bytes(item.photo)):
+        digest.update(hashlib.sha256(part).digest())
+    return digest.hexdigest()
+
+
+def _bytes(path: Path | None) -> bytes:
+    return b"" if path is None else regular(path).read_bytes()

@@ -1,0 +1,135 @@
+"""What `ipman fit` leaves of each item in its folder, parameters, mesh, how the fit went; and back to a study.
+
+`fit.json` is written last and says what the fit depended on: where it is and fits, the item is complete.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import ipman_rs as ip
+
+from ...body import BodyModel
+from ...body.pose_arrays import joints_of
+from ...files import read_json, safe_npz, write_whole
+from ...io import write_mesh
+from ...study import Fitted, Study, camera_of, study
+from .items import Item
+
+if TYPE_CHECKING:
+    from ..result import Result
+
+RECORD = "fit.json"
+_BEFORE = "before_"
+
+
+def write_item(
+    item: Item, result: Result, body: BodyModel, folder: Path, told: dict[str, Any], obj: bool
+) -> dict[str, Any]:
+    """Write one fitted body; the record that a later run reads back. Raises OSError."""
+    arrays = result.arrays()
+    vertices = posed(body, arrays)
+    files: dict[str, Any] = {f"{item.name}.npz": arrays, f"{item.name}.glb": write_mesh.glb(vertices, body.faces)}
+    if obj:
+        files[f"{item.name}.obj"] = write_mesh.obj(vertices, body.faces)
+    return write_files(folder, files, {"name": item.name, "source": item.source, **told})
+
+
+def write_files(folder: Path, files: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
+    """Write files, bytes or arrays for an .npz, and then the record, with their names, that makes the folder complete;
+    that record. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / RECORD).unlink(missing_ok=True)  # incomplete from here on
+    for name, content in files.items():
+        write_whole(folder / name, content if isinstance(content, bytes) else npz(content))
+    record = {**record, "files": sorted(files)}
+    write_whole(folder / RECORD, json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1) + "\n")
+    return record
+
+
+def complete(folder: Path, identity: str) -> dict[str, Any] | None:
+    """The record of a fit that was finished with the same input and options and has all its files, or None."""
+    try:
+        record = read_json(folder / RECORD)
+        fits = record["identity"] == identity
+        there = all((folder / name).is_file() for name in record["files"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return record if fits and there else None
+
+
+def posed(body: BodyModel, arrays: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
+    """The vertices (V, 3) of stored parameters."""
+    pose = np.zeros((body.num_joints, 3))
+    for name, columns in joints_of(body).items():
+        pose[columns] = arrays[prefix + name].reshape(-1, 3)
+    betas, transl, expression = (arrays.get(prefix + name) for name in ("betas", "transl", "expression"))
+    rows = (None if each is None else each[0] for each in (betas, transl, expression))
+    return np.asarray(body(pose, *rows).vertices)
+
+
+def study_of(
+    item: Item,
+    body: BodyModel,
+    folder: Path,
+    record: dict[str, Any],
+    pictured: bool,
+    pixels: Callable[[Path], np.ndarray],
+) -> Study:
+    """The analysed body of a finished item; `pixels` reads a photo."""
+    path = folder / f"{item.name}.npz"
+    arrays = {name: safe_npz.read(path, name) for name in safe_npz.names(path)}
+    vertices = posed(body, arrays)
+    normal = arrays.get("ground_normal", np.array([[0.0, 1.0, 0.0]]))[0]
+    height = arrays["ground_height"][0] if "ground_height" in arrays else (vertices @ normal).min()
+    ground = ip.Ground(normal, height)
+    before = None
+    if pictured and f"{_BEFORE}betas" in arrays:
+        before = study("Before the physics terms", posed(body, arrays, _BEFORE), body.template, ground)
+    fitted = Fitted(
+        camera=camera_of(*(arrays[name][0] for name in ("camera_rotation", "camera_translation", "focal", "center"))),
+        size=tuple(arrays["image_size"][0]),
+        seen=arrays["keypoints"][0],
+        projected=arrays["projected"][0],
+        photo=pixels(item.photo) if pictured and item.photo is not None else None,
+        before=before,
+        pictured=pictured,
+        record={key: value for key, value in record.items() if key not in ("name", "source")},
+    )
+    found = study(item.name, vertices, body.template, ground, source=item.source, notes=notes(record))
+    return replace(found, flags=tuple(record["flags"]), fitted=fitted)
+
+
+def notes(record: dict[str, Any]) -> list[str]:
+    """What the report says under a body's name."""
+    said = "converged" if record["converged"] else f"did not converge ({record['reason']})"
+    lines = [f"fit: preset {record['preset']}, {said} after {record['iterations']} iterations"]
+    if "presented" in record:
+        lines.append(_presented(record["presented"]))
+    errors = record["reprojection"]
+    lines += [f"reprojection: median {errors['median_px']:.1f} px, {errors['median_percent']:.1f} % of the height"]
+    for stage in record["stages"]:
+        terms = ", ".join(f"{name} {cost:.4g}" for name, cost in stage["terms"].items() if cost is not None)
+        lines.append(f"stage {stage['name']}, {stage['iterations']} iterations: {terms}")
+    return [*lines, *record["notes"]]
+
+
+def _presented(shown: dict[str, Any]) -> str:
+    by = {"mesh": "found on it", "file": "by its file", "given": "as given"}[shown["contact_from"]]
+    height, above = shown["body_height_m"], 1000 * shown["lowest_above_floor_m"]
+    said = f"presented pose: {shown['source']}, {height:.2f} m tall, its lowest point {above:.0f} mm above its floor"
+    return f"{said}; {shown['contact_vertices']} vertices touch ({by})"
+
+
+def npz(arrays: dict[str, np.ndarray]) -> bytes:
+    """The file of these arrays."""
+    stream = io.BytesIO()
+    np.savez(stream, allow_pickle=False, **arrays)
+    return stream.getvalue()

@@ -1,0 +1,199 @@
+"""Fitting a body to recorded markers: start, the places of this person's markers, and all frames together.
+
+recorded = fit_tracks(ipt.BodyModel("anny"), markers.read("squats.trc"), every=5)
+recorded.fit.candidate.vertices            # (T, V, 3) m, in the laboratory
+np.nanmean(recorded.errors)                # m, from the markers
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+import ipman_rs.torch as ipt
+from ipman_rs.data import judge
+from ipman_rs.data.check import Finding
+
+from ..data import markers
+from ..data.markers import judged
+from ..data.markers.sets import Meaning
+from ..data.markers.skin_distance import mean_distances
+from .camera import Camera
+from .config import Config, load
+from .fit import Fit
+from .landmarks import Landmarks
+from .marker_calibration import calibrated, certainty
+from .problem import Problem
+from .sequence import fit_sequence
+from .start import at_points
+
+WEIGHED = 8  # bodies
+POSES = 24  # of the recording, spread over it, that say where the markers are
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """What stays of somebody from one recording to the next: the shape (1, b), and where the markers are."""
+
+    betas: Tensor
+    sites: Mapping[str, markers.Point]
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """The fit of T frames. `tracks` are their known markers (M), at these `sites` of the body; `unknown` are those that
+    nobody knows the place of, `unseen` those that are in the file and were never seen. `meanings`: of the tracks'
+    names."""
+
+    fit: Fit
+    tracks: markers.Tracks
+    sites: Mapping[str, markers.Point]
+    unknown: tuple[str, ...]
+    unseen: tuple[str, ...]
+    meanings: Mapping[str, Meaning]
+
+    @property
+    def person(self) -> Person:
+        """Whose recording it is."""
+        return Person(self.fit.variables["betas"][:1], self.sites)
+
+    @property
+    def errors(self) -> NDArray[np.float64]:
+        """Distances (T, M), m, from the markers to their places on the fitted bodies; NaN where one was not seen."""
+        with torch.no_grad():
+            away = np.linalg.norm(self.fit.candidate.landmarks.numpy() - self.tracks.points, axis=-1)
+        return np.where(self.tracks.confidence > 0, away, np.nan)
+
+    @property
+    def skin_distances(self) -> dict[str, float]:
+        """The mean distance of each marker from the skin of the fitted bodies, m, outwards; without those whose places
+        are inside the body, and without plates and wands, which stand off it."""
+        names = [name for name in self.tracks.names if judged.on_skin(self.meanings[name])]
+        some = self.tracks.select(names)
+        with torch.no_grad():
+            vertices = self.fit.candidate.vertices.numpy()
+        faces = self.fit.problem.body.body.faces
+        away = mean_distances(vertices, faces, some.points, some.confidence)
+        return {name: float(mean) for name, mean in zip(names, away, strict=True) if np.isfinite(mean)}
+
+
+def fit_tracks(
+    body: ipt.BodyModel,
+    tracks: markers.Tracks,
+    config: Config | None = None,
+    *,
+    every: int = 1,
+    calibrate: int = 2,
+    smoothness: float = 0.01,
+    ground: float = 0.0,
+    person: Person | None = None,
+    own: Mapping[str, Meaning | None] | None = None,
+    progress: Callable[[str, int], None] | None = None,
+) -> Recorded:
+    """Fit every `every`-th frame, by the preset `markers` unless another is given, on the laboratory's floor at y =
+    `ground` m.
+
+    `calibrate`: how often the markers are moved on the body to where fits of some frames see them. `person`: of another
+    recording of the same day, usually of standing still; shape and places of markers are kept. `own`: names of markers
+    and what they mean, beside the known ones (`markers.own`). Markers that were never seen are left out.
+    `smoothness` as in `fit_sequence`. ValueError if too few of the markers are known.
+    """
+    if every < 1:
+        raise ValueError(f"every: expected 1 or more, got {every}")
+    config = load("markers") if config is None else config
+    seen, unseen = judged.seen_names(tracks)
+    sites = markers.sites(body.body, seen, own=own)
+    if len(sites) < judged.FEWEST:
+        raise ValueError(
+            f"{tracks.source}: expected at least {judged.FEWEST} markers with known places, got {len(sites)} of "
+            f"{', '.join(seen)}"
+        )
+    unknown = tuple(name for name in seen if name not in sites)
+    tracks = tracks.select(list(sites))
+    if person is not None:
+        betas = person.betas
+        sites |= {name: site for name, site in person.sites.items() if name in sites}
+        config = _shape_kept(config)
+    else:
+        some = frames(tracks, np.unique(np.linspace(0, len(tracks) - 1, min(POSES, len(tracks))).round().astype(int)))
+        betas, sites = _calibrated(body, some, sites, ground, config, calibrate, progress)
+    tracks = frames(tracks, np.arange(0, len(tracks), every))
+    problem = problem_of(body, tracks, sites, ground)
+    start = at_points(problem)
+    if betas is not None:
+        start["betas"] = betas.expand(len(tracks), -1).clone()
+    rate = tracks.rate or 1.0
+    found = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
+    return Recorded(found, tracks, sites, unknown, unseen, markers.meanings(tracks.names, own))
+
+
+def judged_fit(recorded: Recorded) -> list[Finding]:
+    """What it says of the fit: the markers' mean distance from their places, and the person's mass."""
+    with torch.no_grad():
+        vertices = recorded.fit.candidate.vertices[:: max(1, len(recorded.tracks) // WEIGHED)]
+        mass = np.asarray(ipt.mass_properties(vertices, recorded.fit.problem.body.template).mass)
+    errors = recorded.errors
+    known = errors[np.isfinite(errors)]
+    found = judge.marker_error(float(known.mean())) if len(known) else []
+    return found + judge.masses(np.atleast_1d(mass), vertices.numpy())
+
+
+def _shape_kept(config: Config) -> Config:
+    stages = [replace(stage, free=tuple(name for name in stage.free if name != "betas")) for stage in config.stages]
+    return replace(config, stages=tuple(stages))
+
+
+def _calibrated(
+    body: ipt.BodyModel,
+    tracks: markers.Tracks,
+    sites: dict[str, markers.Point],
+    ground: float,
+    config: Config,
+    times: int,
+    progress: Callable[[str, int], None] | None,
+) -> tuple[Tensor | None, dict[str, markers.Point]]:
+    """The shape (1, b) and the places of the markers after that many fits of these frames; none of a shape after 0."""
+    variables: dict[str, Tensor] | None = None
+    for _ in range(times):
+        problem = problem_of(body, tracks, sites, ground)
+        start = at_points(problem) if variables is None else variables
+        found = fit_sequence(problem, start, config, smoothness=0, progress=progress)
+        variables = dict(found.variables)
+        bodies = found.candidate.full_pose, variables["betas"], variables["transl"]
+        points, confidence = torch.from_numpy(tracks.points), torch.from_numpy(tracks.confidence)
+        sites = calibrated(body, sites, bodies, points, confidence)
+    return None if variables is None else variables["betas"][:1], sites
+
+
+def problem_of(
+    body: ipt.BodyModel, tracks: markers.Tracks, sites: dict[str, markers.Point], ground: float = 0.0
+) -> Problem:
+    """The frames of `tracks`, whose markers are at `sites`, on a floor at y = `ground`; the camera is a placeholder.
+
+    A marker weighs the less the less its place is known.
+    """
+    count = len(tracks)
+
+    def each(*numbers: float) -> Tensor:
+        return torch.tensor(numbers, dtype=torch.float64).expand(count, -1).clone()
+
+    certain = np.array([certainty(site) for site in sites.values()])
+    camera = Camera(each(1, 1), each(0, 0), torch.eye(3, dtype=torch.float64).repeat(count, 1, 1), each(0, 0, 0))
+    return Problem(
+        body,
+        Landmarks(body, sites, sites),
+        camera,
+        ipt.Ground(each(0, 1, 0), each(ground)[:, 0]),
+        points_3d=torch.from_numpy(tracks.points),
+        confidence_3d=torch.from_numpy(tracks.confidence * certain),
+    )
+
+
+def frames(tracks: markers.Tracks, index: NDArray[np.integer]) -> markers.Tracks:
+    """These frames of a recording."""
+    return replace(tracks, points=tracks.points[index], confidence=tracks.confidence[index], times=tracks.times[index])

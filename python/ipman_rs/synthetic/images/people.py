@@ -1,0 +1,102 @@
+"""People at rest on the floor y = 0, turned any way, and some who are not at rest: tipped over, or in the air.
+
+As in `ipman_rs.synthetic.at_rest`, of which the families of poses, their perturbation and the settling come, but
+the people have the embedded body's own betas.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ipman_rs.body import BodyModel, load_body, poses
+from ipman_rs.body.landmarks import skin_points
+from ipman_rs.synthetic.at_rest import FAMILIES, TRIES, Scene, disturbed, perturbed, settle
+
+Array = NDArray[np.floating]
+
+LARGEST_BETA = 2.5
+PLACE = 1.0  # m, the pelvis is within this square of the world's origin
+KINDS = ("static", "tipped", "jumping")
+UPSET = {"standing", "one leg", "lunge", "crouch"}  # families that can be tipped over or jump
+
+
+@dataclasses.dataclass(frozen=True)
+class Figure:
+    """A person: float32 pose (24, 3) with the root in the world (y up, the floor at y = 0), betas (10,), transl (3,) m.
+
+    kind: "static", "tipped" or "jumping".
+    """
+
+    body: str
+    family: str
+    pose_name: str
+    kind: str
+    pose: Array
+    betas: Array
+    transl: Array
+
+    def posed(self) -> tuple[Array, Array]:
+        """Vertices (V, 3) and joints (24, 3), float64 m, of the parameters as they are written."""
+        found = load_body(self.body)(*(np.float64(value) for value in (self.pose, self.betas, self.transl)))
+        return found.vertices, found.joints
+
+
+def draw_figure(draw: np.random.Generator, body: str, family: str, moving: float) -> Figure:
+    """A new person in a pose of the family; `moving` is the probability that it is not at rest, where it can be."""
+    model = load_body(body)
+    scene = None
+    while scene is None:  # a shape that does not find its balance is drawn again, pose and all
+        betas = draw.standard_normal(model.num_betas).clip(-LARGEST_BETA, LARGEST_BETA).astype(np.float32)
+        scene = at_rest(draw, shaped(model, betas.astype(np.float64)), family)
+    upset = draw.random() < moving and family in UPSET
+    kind = KINDS[draw.integers(1, len(KINDS))] if upset else "static"
+    scene = disturbed(scene, kind, draw)
+    heading = Rotation.from_rotvec([0.0, draw.uniform(-np.pi, np.pi), 0.0])
+    pose, transl = scene.full_pose.copy(), scene.transl.copy()
+    pose[0] = (heading * Rotation.from_rotvec(pose[0])).as_rotvec()
+    transl[[0, 2]] += draw.uniform(-PLACE, PLACE, 2)
+    return Figure(body, family, scene.name, kind, pose.astype(np.float32), betas, transl.astype(np.float32))
+
+
+def at_rest(draw: np.random.Generator, person: BodyModel, family: str) -> Scene | None:
+    """The person in a pose of the family; None if many tries do not stand."""
+    template = load_body(person.name).template
+    name = FAMILIES[family][draw.integers(len(FAMILIES[family]))]
+    for _ in range(TRIES):
+        settled = settle(perturbed(poses.pose_of(person, name), person, draw), person, template)
+        if settled is not None:
+            return Scene(person, template, family, name, *settled)
+    return None
+
+
+def shaped(model: BodyModel, betas: Array) -> BodyModel:
+    """The model with this shape and no betas any more."""
+    return dataclasses.replace(
+        model,
+        v_template=model.v_template + model.shapedirs @ betas,
+        shapedirs=np.zeros((model.num_vertices, 3, 0)),
+        J_template=model.J_template + model.J_shapedirs @ betas,
+        J_shapedirs=np.zeros((model.num_joints, 3, 0)),
+    )
+
+
+@cache
+def keypoint_names(body: str) -> tuple[str, ...]:
+    """The 24 joints, then the named points of the skin (`ipman_rs.body.landmarks`)."""
+    return (*load_body(body).joint_names, *skin_vertices(body))
+
+
+@cache
+def skin_vertices(body: str) -> dict[str, int]:
+    model = load_body(body)
+    return {name: vertex for name, vertex in skin_points(model).items() if name not in model.joint_names}
+
+
+def keypoints(body: str, vertices: Array, joints: Array) -> Array:
+    """The points (K, 3) m in the order of `keypoint_names`."""
+    return np.concatenate([joints, vertices[list(skin_vertices(body).values())]])

@@ -1,0 +1,116 @@
+"""The figures of estimated bodies in the world against true ones, an entry a body; metres where nothing is said.
+
+NaN where there is no truth: errors and tilt need labelled parameters, what concerns the ground needs the world.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+import ipman_rs.torch as ipt
+from ipman_rs.evaluation import mpjpe, pa_mpjpe, pve, root_tilt
+
+from .batch import Batch
+from .model import Estimate
+from .posed_estimate import Posed, Posing
+from .world import to_world
+
+Array = NDArray[np.floating]
+
+STRICT = 0.025  # m, of contact
+
+
+@dataclass(frozen=True, eq=False)
+class Figures:
+    """Errors: pelvis on pelvis. bose: the paper's, its centre of mass within the base of support at 10 cm, the hips
+    where the true ones are. strict: the exact centre of mass, 2.5 cm, the body moved onto the floor. lowest: of the
+    vertices above the floor. tilt: radians between true and estimated "up", seen from the pelvis."""
+
+    mpjpe: Array
+    pa_mpjpe: Array
+    pve: Array
+    bose: Array
+    strict: Array
+    lowest: Array
+    tilt: Array
+
+    def save(self, file: BinaryIO) -> None:
+        np.savez_compressed(file, **vars(self))
+
+    @classmethod
+    def load(cls, path: Path) -> Figures:
+        with np.load(path, allow_pickle=False) as stored:
+            return cls(**{field.name: stored[field.name] for field in dataclasses.fields(cls)})
+
+
+@torch.no_grad()
+def figures(estimate: Estimate, truth: Batch, posing: Posing) -> Figures:
+    """Of estimates for inputs that were not augmented, whose labels are true."""
+    estimate, truth = _on_cpu(estimate), truth.to("cpu")
+    posing = posing.to("cpu")
+    known = Estimate(_columns(truth.pose), truth.betas, estimate.camera)
+    vertices, joints = _in_world(posing(estimate), truth)
+    true_vertices, true_joints = _in_world(posing(known), truth)
+    template, ground = posing.body.template, truth.ground
+    lowest = ground.signed_height(vertices).amin(dim=1)
+    snapped = vertices - lowest[:, None, None] * truth.up[:, None].double()
+    balanced = ipt.support_margin(vertices, template, ground) >= 0
+    strict = ipt.support_margin(snapped, template, ground, STRICT, "exact") >= 0
+    roots = joints[:, 0].numpy(), true_joints[:, 0].numpy()
+    body, world = truth.has_body.numpy(), truth.has_world.numpy()
+    return Figures(
+        mpjpe=np.where(body, mpjpe(joints.numpy(), true_joints.numpy()), np.nan),
+        pa_mpjpe=np.where(body, pa_mpjpe(joints.numpy(), true_joints.numpy()), np.nan),
+        pve=np.where(body, pve(vertices.numpy(), true_vertices.numpy(), *roots), np.nan),
+        bose=np.where(world, balanced.numpy(), np.nan),
+        strict=np.where(world, strict.numpy(), np.nan),
+        lowest=np.where(world, lowest.numpy(), np.nan),
+        tilt=np.where(body & world, _tilt(estimate.rotations[:, 0].double(), truth), np.nan),
+    )
+
+
+def _on_cpu(estimate: Estimate) -> Estimate:
+    return Estimate(*(value.float().cpu() for value in (estimate.pose, estimate.betas, estimate.camera)))
+
+
+def _in_world(posed: Posed, truth: Batch) -> tuple[Tensor, Tensor]:
+    hips = posed.hips(truth.regressed)
+    return to_world(posed.vertices, hips, truth).double(), to_world(posed.joints, hips, truth).double()
+
+
+def _columns(rotations: Tensor) -> Tensor:
+    return torch.cat([rotations[..., 0], rotations[..., 1]], dim=-1)
+
+
+def _tilt(root: Tensor, truth: Batch) -> Array:
+    """Radians (B,) between true and estimated up, as seen by pelvises that turn (B, 3, 3) in camera axes."""
+    to_world = truth.camera.double().transpose(1, 2)
+    estimated, true = ((to_world @ turn).numpy() for turn in (root, truth.pose[:, 0].double()))
+    return np.asarray(root_tilt(estimated, true, truth.ground))
+
+
+COLUMNS = {
+    "MPJPE": 1, "PA-MPJPE": 1, "PVE": 1, "BoSE": 1, "strict BoSE": 1, "tilt": 2, "penetration": 1, "hover": 1,
+}  # fmt: skip
+
+
+def columns(figures: Figures) -> dict[str, Array]:
+    """The figures as tables show them, an entry a body: millimetres, degrees, and shares as 0 or 100 %."""
+    return {
+        "MPJPE": 1e3 * figures.mpjpe,
+        "PA-MPJPE": 1e3 * figures.pa_mpjpe,
+        "PVE": 1e3 * figures.pve,
+        "BoSE": 100.0 * figures.bose,
+        "strict BoSE": 100.0 * figures.strict,
+        "tilt": np.degrees(figures.tilt),
+        "penetration": 1e3 * (-figures.lowest).clip(min=0),
+        "hover": 1e3 * figures.lowest.clip(min=0),
+    }

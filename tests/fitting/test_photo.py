@@ -1,0 +1,104 @@
+"""MediaPipe on a photo, its landmarks in the package, and images without a person."""
+
+from __future__ import annotations
+
+import sys
+from importlib import resources
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ipman_rs.data import keypoints
+from ipman_rs.fitting import photo
+
+EXAMPLE = resources.files("ipman_rs.fitting") / "examples" / "basketball.json"
+
+
+@pytest.fixture
+def pose():
+    pytest.importorskip("mediapipe", reason="mediapipe is the extra photo")
+
+
+def test_example_is_the_photo(pose, shared):
+    found = photo.detect([shared("photo") / "basketball1.png"])
+    with resources.as_file(EXAMPLE) as path:
+        stored = keypoints.read(path)
+    assert stored.names == found.names
+    np.testing.assert_array_equal(stored.image_size, [[640, 480]])
+    # Pixels and metres: other processors round the network's single precision differently.
+    np.testing.assert_allclose(stored.points, found.points, atol=1)
+    np.testing.assert_allclose(stored.points_3d, found.points_3d, atol=0.01)
+
+
+def test_example_is_a_person():
+    with resources.as_file(EXAMPLE) as path:
+        found = keypoints.read(path)
+    height = dict(zip(found.names, found.points[0, :, 1], strict=True))
+    order = ["nose", "left_shoulder", "left_hip", "left_knee", "left_ankle", "left_big_toe"]
+    assert sorted(order, key=height.__getitem__) == order
+    depth = dict(zip(found.names, found.points_3d[0], strict=True))
+    assert 0.15 < np.linalg.norm(depth["left_hip"] - depth["right_hip"]) < 0.3  # metres
+    assert found.confidence.min() > 0.5
+
+
+def test_two_photos_are_two_rows(pose, shared, tmp_path):
+    path = shared("photo") / "basketball1.png"
+    with Image.open(path) as image:
+        image.crop((0, 40, 300, 480)).save(tmp_path / "part.png")
+    found = photo.detect([path, tmp_path / "part.png"])
+    assert found.sources == (str(path), str(tmp_path / "part.png"))
+    np.testing.assert_array_equal(found.image_size, [[640, 480], [300, 440]])
+    shift = found.points[0, :12] - found.points[1, :12]
+    assert np.abs(np.median(shift, axis=0) - [0, 40]).max() < 5
+
+
+def test_nobody_in_the_photo(pose, tmp_path):
+    Image.new("RGB", (200, 300), (90, 120, 60)).save(tmp_path / "meadow.png")
+    with pytest.raises(ValueError, match="meadow.png: expected a person, found none"):
+        photo.detect([tmp_path / "meadow.png"])
+
+
+def test_box_around_landmarks():
+    points = np.array([[10.0, 20.0], [30.0, 120.0], [20.0, 60.0]])
+    assert photo.around(points) == pytest.approx((6, 16, 28, 108))  # 4 % of 100 around
+
+
+def test_boxes_of_several_images(pose, shared, tmp_path):
+    path = shared("photo") / "basketball1.png"
+    pixels = photo.read(path)
+    with photo.boxes() as box:
+        whole, part = box(path, pixels), box("part", pixels[40:, :300])
+        with pytest.raises(ValueError, match="meadow: expected a person, found none"):
+            box("meadow", np.full((300, 200, 3), (90, 120, 60), np.uint8))
+    assert whole == photo.around(photo.detect([path]).points[0])
+    np.testing.assert_allclose(np.subtract(whole, part), [0, 40, 0, 0], atol=8)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda path: Image.new("L", (1, 1)).save(path), "expected an image of at least 32 × 32 pixels, got 1 × 1"),
+        (lambda path: path.write_bytes(b"no image"), "expected an image: "),
+        (lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), "expected an image: "),
+        (lambda path: path.mkdir(), "is a folder"),
+    ],
+)
+def test_images_that_are_none(tmp_path, make, message):
+    make(tmp_path / "bad.png")
+    with pytest.raises(ValueError, match=f"bad.png: {message}"):
+        photo.read(tmp_path / "bad.png")
+
+
+def test_upright_as_exif_says(tmp_path):
+    image = Image.new("RGB", (60, 40))
+    exif = image.getexif()
+    exif[0x0112] = 6  # turned by a quarter
+    image.save(tmp_path / "turned.jpg", exif=exif)
+    assert photo.read(tmp_path / "turned.jpg").shape == (60, 40, 3)
+
+
+def test_without_the_extra(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
+    with pytest.raises(ImportError, match=r'pip install "ipman_rs\[photo\]"'):
+        photo.detect([tmp_path / "a.png"])

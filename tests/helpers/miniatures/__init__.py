@@ -1,0 +1,1 @@
+"""Small files of every data set, written from its description."""
