@@ -47,7 +47,7 @@ help:
 	@echo 'make lint     formats and lints checked, nothing changed'
 	@echo 'make format   sources formatted'
 	@echo 'make wheel    one wheel for all Pythons >= 3.10 in dist/, tried alone in a clean environment'
-	@echo 'make bench    every peer, into docs/performance.md (QUICK=1: the most important ones, in three minutes)'
+	@echo 'make bench    every peer, into docs/results/performance.md (QUICK=1: the most important ones, in three minutes)'
 	@echo 'make fuzz     damaged files and odd calls, Rust and Python: FUZZ_SECONDS=60 of each, FUZZ_SEED=0; hours by hand'
 	@echo 'make lock     requirements.lock, the versions of all that the other targets install, written anew (needs a network)'
 	@echo 'make audit    known faults, licences and sources of what is installed and linked: pip-audit and cargo deny'

@@ -1,6 +1,6 @@
-"""`make bench`: runs every peer and writes docs/performance.md, .svg and .json.
+"""`make bench`: runs every peer and writes docs/results/performance.md, .svg and .json.
 
-python -m benchmarks [--quick] [--out docs]
+python -m benchmarks [--quick] [--out docs/results]
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ import click
 
 from . import bodies, cases, measure, report
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+RESULTS = Path(__file__).resolve().parents[1] / "docs" / "results"
 MEMORY_BATCH = 64
 
 
 @click.group(invoke_without_command=True)
 @click.option("--quick", is_flag=True, help="Only the body of SMPL's size, one thread, B = 1, 8, 64.")
 @click.option("--seconds", type=float, help="Measuring time of each case.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=DOCS, show_default=True)
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=RESULTS, show_default=True)
 @click.pass_context
 def main(context: click.Context, quick: bool, seconds: float | None, out: Path) -> None:
     """Run the benchmarks and write performance.md, performance.svg and performance.json to OUT."""
@@ -64,7 +64,7 @@ def main(context: click.Context, quick: bool, seconds: float | None, out: Path) 
 @click.pass_context
 def again(context: click.Context) -> None:
     """Write the page again from performance.json, after the frame in benchmarks/performance.md.j2 was edited."""
-    out = context.parent.params["out"] if context.parent else DOCS
+    out = context.parent.params["out"] if context.parent else RESULTS
     report.write(json.loads((out / "performance.json").read_text()), out)
 
 

@@ -112,7 +112,7 @@ def steps(template: ip.BodyTemplate, vertices: Tensor) -> dict[str, Step]:
 
 
 def _captured(step: Step) -> Step:
-    """The step as one CUDA graph; see docs/devices.md."""
+    """The step as one CUDA graph; see docs/understand/devices.md."""
     stream = torch.cuda.Stream()
     with torch.cuda.stream(stream):
         for _ in range(3):

@@ -1,6 +1,6 @@
 """How many frames a second `ipman evaluate` measures, and in how much memory; shards, Ray and kill -9 change no bit.
 
-python -m benchmarks.evaluation [--frames 1000000] [--out docs] [--folder TMP]
+python -m benchmarks.evaluation [--frames 1000000] [--out docs/results] [--folder TMP]
 
 The truth is made of named poses of the small embedded body with noise, and the predictions are the truth with noise.
 """
@@ -166,7 +166,9 @@ def fingerprints(out: Path) -> dict[str, str]:
 @click.command()
 @click.option("--frames", default=1_000_000, show_default=True, help="Of the largest run; a tenth of it is run, too.")
 @click.option("--same", "same", default=100_000, show_default=True, help="Frames of the runs that must agree.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=ROOT / "docs", show_default=True)
+@click.option(
+    "--out", type=click.Path(file_okay=False, path_type=Path), default=ROOT / "docs" / "results", show_default=True
+)
 @click.option("--folder", type=click.Path(file_okay=False, path_type=Path), help="For the made files.")
 @click.option("--ray", is_flag=True, help="On Ray, too.")
 def main(frames: int, same: int, out: Path, folder: Path | None, ray: bool) -> None:

@@ -1,6 +1,6 @@
 """How many bodies a second `ipman analyze` reads, poses and analyses from a parameter file, and in how much memory.
 
-python -m benchmarks.million [--bodies 1000000] [--threads 2] [--out docs]
+python -m benchmarks.million [--bodies 1000000] [--threads 2] [--out docs/results]
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ STAGED = 2048  # bodies whose stages are timed one by one
 @click.group(invoke_without_command=True)
 @click.option("--bodies", default=1_000_000, show_default=True, help="Bodies of the largest file.")
 @click.option("--threads", default=2, show_default=True)
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=ROOT / "docs", show_default=True)
+@click.option(
+    "--out", type=click.Path(file_okay=False, path_type=Path), default=ROOT / "docs" / "results", show_default=True
+)
 @click.pass_context
 def main(context: click.Context, bodies: int, threads: int, out: Path) -> None:
     """Analyse files of bodies//100, bodies//10 and all bodies, each in a process of its own; write OUT/million.json."""

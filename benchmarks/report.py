@@ -148,7 +148,7 @@ def _plot(rows: Rows, path: Path) -> None:
         axes.set_xticks([1, 8, 64, 512], ["1", "8", "64", "512"])
         axes.minorticks_off()
         axes.grid(alpha=0.3)
-    figure.axes[0].set_ylabel("µs a body, forward and backward")
+    figure.axes[0].set_ylabel("µs per body, forward and backward")
     figure.axes[0].legend(frameon=False)
     figure.suptitle("6,890 vertices, 20,000 samples, float32, one thread")
     figure.savefig(path, metadata={"Date": None})

@@ -1,6 +1,6 @@
 """What the intuitive-physics terms cost in a training step: ours, and the paper's formulas as research code has them.
 
-python -m benchmarks.training [--rounds 7] [--out docs/training_cost.json]
+python -m benchmarks.training [--rounds 7] [--out docs/results/training_cost.json]
 
 Milliseconds of processor time of one thread for an image: of whole steps (encoder, regressor, body, SPIN's terms,
 backward pass, Adam) without the terms and with them, in turns, and of the terms alone, with the way to the world and

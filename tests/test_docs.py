@@ -10,11 +10,11 @@ import pytest
 import ipman_rs as ip
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 
 
 def conventions() -> str:
-    return (ROOT / "docs" / "conventions.md").read_text()
+    return (ROOT / "docs" / "understand" / "conventions.md").read_text()
 
 
 def test_table_of_presets():
@@ -47,22 +47,28 @@ def test_table_of_statuses():
     assert stated == {"OK": 0, **{flag.name: flag.value for flag in ip.Status}}
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_links(document):
     links = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", document.read_text())
     assert [link for link in links if not (document.parent / link).exists()] == []
 
 
+def test_the_index_lists_every_page():
+    index = ROOT / "docs" / "README.md"
+    linked = [(index.parent / link).resolve() for link in re.findall(r"\]\(([^)#]+)", index.read_text())]
+    assert {page for page in DOCUMENTS if page.is_relative_to(index.parent)} - {index} <= set(linked)
+
+
 def test_guide_names_real_files():
     """Every path in the guide exists, but for the two files that its reader is to write."""
-    guide = (ROOT / "docs" / "adding_a_loss.md").read_text()
+    guide = (ROOT / "docs" / "extending" / "adding_a_loss.md").read_text()
     paths = re.findall(r"`((?:rust|python|tests)/[\w/.]+)`", guide)
     assert len(paths) > 8
     assert {path for path in paths if not (ROOT / path).exists()} == {"rust/core/src/losses/height.rs"}
 
 
 def paper() -> str:
-    return (ROOT / "docs" / "paper.md").read_text()
+    return (ROOT / "docs" / "understand" / "paper.md").read_text()
 
 
 FILE = re.compile(r"`((?:rust|python|tests|docs|examples|tools|benchmarks)/[\w/.-]+)`")
@@ -81,7 +87,7 @@ def numbers_of(text: str) -> set[int]:
 
 
 def test_paper_names_real_files():
-    """Every path in docs/paper.md is a file of this repository."""
+    """Every path in docs/understand/paper.md is a file of this repository."""
     paths = FILE.findall(paper())
     assert len(set(paths)) > 60
     assert [path for path in paths if not (ROOT / path).is_file()] == []
@@ -113,4 +119,4 @@ def test_symbols_name_their_equations():
 
 def test_the_recipe_of_the_paper_is_the_file():
     recipe = (ROOT / "python/ipman_rs/training/recipes/ipman-r.yaml").read_text()
-    assert f"```yaml\n# ipman-r.yaml\n{recipe}```" in (ROOT / "docs/training.md").read_text()
+    assert f"```yaml\n# ipman-r.yaml\n{recipe}```" in (ROOT / "docs/use/training.md").read_text()

@@ -1,7 +1,7 @@
 """What can be said against outside judges without a fit: real bodies against trimesh, force plates against OpenSim.
 
     python tools/validate_bodies.py            prints the tables
-    python tools/validate_bodies.py --write    and puts them into docs/validation.md
+    python tools/validate_bodies.py --write    and puts them into docs/results/validation.md
 
 The data are read from $IPMAN_SHARED_DATA or ../shared/data; what is not there is left out, saying so.
 """
@@ -24,13 +24,13 @@ from ipman_rs.validation.zero_moment_point import GRAVITY
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("IPMAN_SHARED_DATA") or ROOT.parent / "shared" / "data")
-DOCUMENT = ROOT / "docs" / "validation.md"
+DOCUMENT = ROOT / "docs" / "results" / "validation.md"
 Array = NDArray[np.float64]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true", help="put the tables into docs/validation.md")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/results/validation.md")
     arguments = parser.parse_args()
     for make, folders in ((bodies, ["mhr_bodies"]), (plates, ["squat_forceplates", "gait2354"])):
         if missing := [folder for folder in folders if not (DATA / folder).is_dir()]:

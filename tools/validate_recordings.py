@@ -1,7 +1,7 @@
 """Bodies fitted to recorded markers, against force plates and OpenSim: `ipman validate` of the measured data.
 
     python tools/validate_recordings.py            prints the tables, many minutes; fits are kept in out/validation
-    python tools/validate_recordings.py --write    and puts them into docs/validation.md, the pictures beside it
+    python tools/validate_recordings.py --write    and puts tables and pictures into docs/results
     python tools/validate_recordings.py --short    without the fine body and every recording's own shape
 
 The data are read from $IPMAN_SHARED_DATA or ../shared/data.
@@ -24,7 +24,7 @@ from validate_bodies import DATA, ROOT, put
 from ipman_rs.validation import report
 
 OUT = ROOT / "out" / "validation"
-IMAGES = ROOT / "docs" / "images"
+IMAGES = ROOT / "docs" / "results" / "images"
 # The recordings of each person, whatever folders they came in.
 PEOPLE = {
     "Subject4": ["squat_forceplates", "motion/drop_jump", "motion/walking_forces"],
@@ -60,7 +60,7 @@ TABLES = {
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true", help="put the tables and pictures into docs")
+    parser.add_argument("--write", action="store_true", help="put the tables and pictures into docs/results")
     parser.add_argument("--short", action="store_true", help="without the fine body and every recording's own shape")
     arguments = parser.parse_args()
     if missing := [name for names in PEOPLE.values() for name in names if not (DATA / name).is_dir()]:

@@ -1,7 +1,7 @@
 """Stiff bodies let go in three engines, and the tip test, on people at rest and near the limit.
 
     python tools/validate_simulation.py            prints the tables, some minutes
-    python tools/validate_simulation.py --write    and puts them into docs/simulation.md
+    python tools/validate_simulation.py --write    and puts them into docs/results/simulation.md
     python tools/validate_simulation.py --people 2 --poses 4    fewer
 
 Needs torch (the people are made by the fitting benchmark), pybullet and mujoco.
@@ -34,7 +34,7 @@ from ipman_rs.synthetic import at_rest as resting
 from ipman_rs.synthetic.people import person as new_person
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "simulation.md"
+PAGE = ROOT / "docs" / "results" / "simulation.md"
 FLOOR = ip.Ground.y_up()
 TIMES = (100 / 240, 2.0, 5.0)
 NEAR = 0.020  # m
@@ -161,7 +161,7 @@ def engines(found: People, runs: dict[str, Simulation], seconds: dict[str, float
     stays = still(runs)
     rows = [
         "| engine | Spearman with MuJoCo, moved in 0.417 s | … in 2 s | near the limit, 0.417 s "
-        "| moved between 2 s and 5 s, of those that stand: median, largest | CPU a body, 5 s |",
+        "| moved between 2 s and 5 s, of those that stand: median, largest | CPU per body, 5 s |",
         "|---|---|---|---|---|---|",
     ]
     for name, run in runs.items():
@@ -219,8 +219,8 @@ def tips(tip: TipTest, rapier: Simulation, mujoco: Simulation, found: People) ->
     fall = rank(predicted, mujoco.displacement[falling, 0])
     push = rank(tip.push, -mujoco.displacement[:, 0])
     return "\n".join(rows) + (
-        f"\n\nOf the {falling.sum()} with their centre of mass outside, d(0.417 s) has a Spearman of {fall:.3f} with "
-        f"MuJoCo's displacement; the least push of all bodies one of {push:.3f} with its negative."
+        f"\n\nSpearman's correlation with MuJoCo's displacement: {fall:.3f} for d(0.417 s) of the {falling.sum()} "
+        f"bodies with their centre of mass outside; {push:.3f} for the least push of all bodies, sign reversed."
     )
 
 
@@ -251,7 +251,7 @@ def times(found: People, tip: TipTest) -> str:
             rows.append(f"| bodies that {name} | {1e6 * of_tip:.0f} µs | " + " | ".join(cells) + " |")
     finally:
         ip.set_num_threads(None)
-    head = "| CPU time a body, one thread | tip test | rapier, 2 s | Bullet, 2 s | MuJoCo, 2 s |\n|---|---|---|---|---|"
+    head = "| CPU time per body, one thread | tip test | rapier, 2 s | Bullet, 2 s | MuJoCo, 2 s |\n" + "|---" * 5 + "|"
     vertices = found.vertices.shape[1]
     return "\n".join([head, *rows]) + (
         f"\n\n{vertices:,} vertices, float32; {1e6 * of_mass:.0f} µs of the tip test are mass, centre and inertia. "
@@ -279,7 +279,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--people", type=int, default=10)
     parser.add_argument("--poses", type=int, default=20)
-    parser.add_argument("--write", action="store_true", help="put the tables into docs/simulation.md")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/results/simulation.md")
     asked = parser.parse_args()
     with console.progress("posing", asked.people * asked.poses) as step:
         found = people(asked.people, asked.poses, step.one)

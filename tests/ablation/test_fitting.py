@@ -131,7 +131,7 @@ def test_command(tmp_path):
     assert names == [row.name for row in variants.CALIBRATED]
     with (tmp_path / "fitting_benchmark.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 4 * len(names) + 2 * len(run.CONTROLS)
-    assert "## What was to be shown" in (tmp_path / "fitting_benchmark.md").read_text()
+    assert "## Hypotheses" in (tmp_path / "fitting_benchmark.md").read_text()
     assert (tmp_path / "fitting_benchmark.svg").stat().st_size > 0
     fits = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.npz")}
     page = (tmp_path / "fitting_benchmark.md").read_text()
@@ -142,9 +142,9 @@ def test_command(tmp_path):
 
 
 def test_the_page_in_docs_is_that_of_its_record():
-    docs = Path(__file__).parents[2] / "docs"
-    record = json.loads((docs / "fitting_benchmark.json").read_text())
-    assert report.page(record) == (docs / "fitting_benchmark.md").read_text()
+    results = Path(__file__).parents[2] / "docs" / "results"
+    record = json.loads((results / "fitting_benchmark.json").read_text())
+    assert report.page(record) == (results / "fitting_benchmark.md").read_text()
 
 
 def test_claims_of_the_paper():

@@ -76,7 +76,7 @@ def test_the_library_loads_nothing_heavy():
 
 def test_numbers_of_the_paper_s_figures(figure):
     """Fig. 6 of the published paper is the pressure; the guide's table says the same."""
-    docs = (Path(__file__).parents[2] / "docs" / "figures.md").read_text(encoding="utf-8")
+    docs = (Path(__file__).parents[2] / "docs" / "use" / "figures.md").read_text(encoding="utf-8")
     for name in paper_figures.FIGURES:
         (row,) = (line for line in docs.splitlines() if line.startswith(f"| `{name}` |"))
         numbers = re.findall(r"Fig\. \w+(?:\.\d)?", row)

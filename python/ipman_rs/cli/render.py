@@ -43,7 +43,7 @@ def render(
 
     People of varied shape, dressed in varied colours, in the named poses perturbed and laid to rest on the floor, in
     rooms, outdoors and in studios; drawn without GPU or display, about ten a second on each core. The folder gets
-    shards in WebDataset's layout and index.json; docs/rendered.md says what a sample consists of.
+    shards in WebDataset's layout and index.json; docs/use/rendered.md says what a sample consists of.
 
     \b
     ipman data render -o out/images -n 4000 --seed 1

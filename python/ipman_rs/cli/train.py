@@ -15,7 +15,7 @@ import click
 def train(config: Path, changes: tuple[str, ...], output: Path) -> None:
     """Train a regressor of bodies with the intuitive-physics losses.
 
-    CONFIG is a YAML file (docs/training.md lists its entries), or the name of one of the paper's runs: ipman-r,
+    CONFIG is a YAML file (docs/use/training.md lists its entries), or the name of one of the paper's runs: ipman-r,
     hmr-star, ipman-r-human36m. NAME=VALUE takes precedence over it. Interrupted, the same command goes on where it was,
     with the same losses as if it had not been. Needs the extra `train`.
 

@@ -50,7 +50,7 @@ def markdown(records: Sequence[Record], source: str, notes: Sequence[str], pictu
 
 def recordings(records: Iterable[Record]) -> Iterator[str]:
     yield (
-        "| recording | kind | body | shape from | frames | a second | markers, mm | volume × 985, kg "
+        "| recording | kind | body | shape from | frames | per second | markers, mm | volume × 985, kg "
         "| by the plates, kg | standing still, kg | off | upward force, rms |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|---|---|"
@@ -172,21 +172,21 @@ def shares(records: Iterable[Record]) -> Iterator[str]:
 TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...] = (
     (
         "Weight",
-        "Volume × 985 kg/m³ is the posed mesh's, mean over the frames and range. The plates' mass is the upward force "
-        "over g + the CoM's acceleration, ± over the frames (!: not to be trusted, see above), standing still that of "
-        "the same person's quiet standing, which goes first; off: the volume's against it. The last column: m (g + "
-        "acceleration) against the force, and the weight m g alone (at rest).",
+        "Volume × 985 kg/m³: of the posed mesh, mean over the frames and range. By the plates: upward force over g + "
+        "the CoM's acceleration, ± over the frames (!: not reliable, see above). Standing still: from the same "
+        "person's quiet standing, which takes precedence. Off: the volume's mass compared with it. Last column: error "
+        "of m (g + acceleration) compared with the force, and of the weight m g alone (at rest).",
         recordings,
     ),
     (
         "Centre of mass",
-        "Of the whole volume against the reference, mm: forward, to the left and upwards of the person's pelvis.",
+        "Of the whole volume, compared with the reference, mm: forward, left and up as the person's pelvis faces.",
         centers_of_mass,
     ),
     (
         "Formulations of the centre of mass",
-        "Mean distance in space from the reference, mm; in brackets how much too high on average. The paper's figures "
-        "are of another data set.",
+        "Mean distance in space from the reference, mm; in brackets the mean vertical offset. The paper's values are "
+        "for another data set.",
         formulations,
     ),
     (
@@ -196,16 +196,18 @@ TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...]
     ),
     (
         "Centre of pressure",
-        "Mean distance on the floor from the measured centre of pressure, mm: to where it is of a body at rest; to the "
-        "zero-moment point (ZMP), where dynamics puts it, by the acceleration of the fitted centre of mass, and by "
-        "those of the ten parts, so that swinging limbs count; to where the measured force's line through the centre "
-        "of mass meets the floor; and to the paper's for each γ (1/m). In walking, one plate and two plates apart.",
+        "Mean distance on the floor, mm, between the measured centre of pressure and: its place for a body at rest; "
+        "the zero-moment point (ZMP), its place by dynamics, from the acceleration of the fitted centre of mass, and "
+        "from those of the ten parts, which includes swinging limbs; the point where the measured force's line "
+        "through the centre of mass meets the floor; the paper's for each γ (1/m). In walking, separately for one and "
+        "two plates.",
         centers_of_pressure,
     ),
-    ("The same of the reference's centre of mass", "On the frames that have one, mm.", references),
+    ("The same for the reference's centre of mass", "On the frames that have one, mm.", references),
     (
         "Load of the first plate",
-        "Its part of the load where two plates carry one, and of the paper's pressure (γ = 10) on its side.",
+        "Its share of the load while two plates are loaded, and the share of the paper's pressure (γ = 10) on its "
+        "side.",
         shares,
     ),
 )

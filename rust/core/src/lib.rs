@@ -1,7 +1,7 @@
 //! Intuitive physics of human bodies (Tripathi et al., *3D Human Pose Estimation via Intuitive Physics*, CVPR 2023), in
 //! the paper's order: a body mesh over a ground, its parts closed and filled, its surface sampled, its centre of mass,
 //! pressure and base of support, and the losses made of them. Every formula is written once, for any [`number::Real`].
-//! (Eq. N) is the paper's equation N; `docs/paper.md` lists them with all the places that hold them.
+//! (Eq. N) is the paper's equation N; `docs/understand/paper.md` lists them with all the places that hold them.
 
 /// What can be wrong with a call, and with one body of a batch.
 pub mod error;
