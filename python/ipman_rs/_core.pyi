@@ -133,7 +133,7 @@ class Skin:
     ) -> None:
         """Fills the gradients' derivatives along a direction of the parameters."""
 
-# A quantity is a name and its options; the list is `named` in rust/core/src/quantity.rs.
+# A quantity is a name and its options; the list is `named` in rust/core/src/registry.rs.
 
 def output_size(template: Template, quantity: str, options: Sequence[float]) -> int:
     """K: how many numbers the quantity has for one body."""

@@ -6,16 +6,19 @@ use crate::losses::balance::{BalanceCost, Wrap};
 use crate::losses::ground::{GroundLoss, Tanh};
 use crate::losses::stability::distance_on_ground;
 use crate::mass::{Centre, Method};
+use crate::mass_properties::MassProperties;
 use crate::memory;
+use crate::moments::part_moments;
 use crate::number::vector::{Vec3, sub};
 use crate::number::{Real, Scalar};
+use crate::points::Points;
 use crate::pressure::{CenterOfPressure, Cop, LoadSums, PressureCurve};
 use crate::quantity::Quantity;
-use crate::sampling::{CHUNK, Points};
+use crate::sampling::CHUNK;
 use crate::scene::{self, Scene};
 use crate::support::{BaseOfSupport, Contact, ContactRule};
 use crate::template::Template;
-use crate::volume::{MassProperties, PartVolumes, part_moments};
+use crate::volume::PartVolumes;
 
 /// The constants of all figures.
 pub struct Analysis {
@@ -32,7 +35,7 @@ pub type Polygon = Vec<Vec3<f64>>;
 
 /// Where the figures lie in a body's row: single numbers first, then points, then the solid, then the parts' volumes.
 mod at {
-    use crate::volume::MassProperties;
+    use crate::mass_properties::MassProperties;
 
     pub const STATUS: usize = 0;
     pub const NUM_CONTACTS: usize = 1;

@@ -1,13 +1,14 @@
 //! The centre of mass: the paper's pCoM, the alternatives of its supplement, and the exact integral.
 
-use crate::error::Result;
+use crate::error::{Result, unknown_choice};
 use crate::memory;
+use crate::moments::{Moments, part_moments, part_moments_backward};
 use crate::number::vector::{Vec3, add, add_scaled, add_to, cross, dot, narrow, over, scale, sub, widen};
 use crate::number::{BLOCK, Real, Room};
-use crate::quantity::{Quantity, unknown_choice};
+use crate::quantity::Quantity;
 use crate::scene::Scene;
+use crate::signed_volume::{SignedVolumes, absolute};
 use crate::template::Template;
-use crate::volume::{Moments, SignedVolumes, absolute, part_moments, part_moments_backward};
 
 /// How a body's mass is spread.
 #[derive(Clone, Copy, Debug, PartialEq)]

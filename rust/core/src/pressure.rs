@@ -5,8 +5,9 @@ use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, add_to, dot, narrow, over, scale, widen};
 use crate::number::{BLOCK, Real, Room};
 use crate::options::not_negative;
+use crate::points::{Place, Points};
 use crate::quantity::Quantity;
-use crate::sampling::{CHUNK, Place, Points, Row, Walk, sum_row};
+use crate::sampling::{CHUNK, Row, Walk, sum_row};
 use crate::scene::{self, Scene};
 use crate::template::Template;
 

@@ -6,8 +6,7 @@
 use crate::ground::{Ground, Plane};
 use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, narrow};
-use crate::number::{Real, Room, Scalar};
-use crate::sampling::SUMS;
+use crate::number::{Real, Room, SUMS, Scalar};
 use crate::template::Template;
 
 pub struct Scene<'a, R: Real> {

@@ -1,11 +1,12 @@
 //! A posed body as one stiff solid: its mass, its centre, its inertia, and how high it hovers over its ground.
 
 use crate::error::status;
+use crate::mass_properties::MassProperties;
 use crate::memory;
+use crate::moments::part_moments;
 use crate::number::vector::{Vec3, add, sub};
 use crate::number::{Real, Scalar};
 use crate::scene::{self, Scene};
-use crate::volume::{MassProperties, part_moments};
 
 /// m/s²
 pub const GRAVITY: f64 = 9.81;

@@ -2,11 +2,11 @@
 //! Jacobian that its backward needs, in one pass.
 
 use crate::batch::Batch;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, unknown_choice};
 use crate::losses::terms::{NUM_TERMS, Terms};
 use crate::memory;
 use crate::number::Data;
-use crate::quantity::{Quantity, unknown_choice};
+use crate::quantity::Quantity;
 use crate::threads;
 
 /// How bodies are put together.

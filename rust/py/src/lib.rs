@@ -46,7 +46,7 @@ mod _core {
 
 mod threads {
     use crate::error::python_error;
-    use ipman::number::gate::Level;
+    use ipman::number::simd_level::Level;
     use pyo3::exceptions::PyValueError;
     use pyo3::prelude::*;
 

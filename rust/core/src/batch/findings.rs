@@ -3,14 +3,15 @@
 use super::lanes::OnLanes;
 use crate::error::status;
 use crate::mass::Method;
+use crate::mass_properties::MassProperties;
 use crate::memory;
 use crate::number::vector::{Vec3, sub};
 use crate::number::{Data, Real, Scalar};
 use crate::scene::Scene;
+use crate::signed_volume::SignedVolumes;
 use crate::solid::{Extent, Solid};
 use crate::support::{BaseOfSupport, Contact};
 use crate::tipping::{Footing, TipTest};
-use crate::volume::{MassProperties, SignedVolumes};
 
 /// What is found of a body besides quantities.
 pub(super) trait Finding: Sync {

@@ -11,8 +11,9 @@ use crate::error::{Error, Result, status};
 use crate::ground::Ground;
 use crate::losses::terms::Terms;
 use crate::mass::Method;
+use crate::mass_properties::MassProperties;
 use crate::memory;
-use crate::number::gate::Level;
+use crate::number::simd_level::Level;
 use crate::number::vector::Vec3;
 use crate::number::{Data, Dual, Real, Scalar, all_finite};
 use crate::options::positive;
@@ -23,7 +24,6 @@ use crate::support::{BaseOfSupport, Contact};
 use crate::template::Template;
 use crate::threads::{self, num_threads};
 use crate::tipping::{Footing, TipTest, Tipping};
-use crate::volume::MassProperties;
 #[cfg(feature = "lp")]
 use findings::SupportedLp;
 use findings::{Find, Finding, Solids, Status, Support};

@@ -15,10 +15,10 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::mesh::Mesh;
 use crate::number::Data;
-use crate::number::gate::Level;
+use crate::number::simd_level::Level;
 use crate::number::vector::{Vec3, add_scaled, cross, dot, scale, sub, zero};
 use crate::threads;
-use contact::SelfContact;
+use contact::{SelfContact, Touch};
 use geodesic::Neighbourhoods;
 use nearest::{Nearest, nearest};
 use tree::{Aabb, Tree};
@@ -42,14 +42,6 @@ pub struct Collision {
     num_vertices: usize,
     tree: Tree,
     neighbourhoods: Neighbourhoods,
-}
-
-/// A vertex with opposite surface around it, or near.
-#[derive(Clone, Copy, Debug)]
-pub struct Touch {
-    pub vertex: u32,
-    pub inside: bool,
-    pub nearest: Nearest,
 }
 
 impl Collision {

@@ -7,9 +7,9 @@
 
 use super::tree::{Aabb, Tree};
 use crate::memory;
-use crate::number::gate::{Level, Work};
+use crate::number::simd_level::Level;
 use crate::number::vector::{Vec3, cross, dot, sub};
-use crate::number::{Data, Real, Room, Scalar};
+use crate::number::{Data, Real, Room, Scalar, Work};
 use std::f64::consts::TAU;
 
 /// The winding number of the whole surface at each vertex.
@@ -184,7 +184,6 @@ fn seen_from<R: Real>(at: Vec3<R>, point: Vec3<R::Data>) -> Vec3<R> {
 mod tests {
     use super::*;
     use crate::mesh::Mesh;
-    use crate::number::gate::Gates;
 
     /// A torus of 20 × 12 quads.
     fn torus() -> (Mesh, Vec<Vec3<f64>>) {

@@ -10,15 +10,15 @@
 //!
 //! Most samples bear nothing: chunks of them that cannot reach the heaviest one's load, but for rounding, are passed over.
 
-use crate::error::Result;
+use crate::error::{Result, unknown_choice};
 use crate::mass::{Centre, Method};
 use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, narrow, scale, sub, widen};
-use crate::number::{Data, Real, Room};
+use crate::number::{Data, Real, Room, SUMS};
 use crate::options::positive;
 use crate::pressure::PressureCurve;
-use crate::quantity::{Quantity, unknown_choice};
-use crate::sampling::{CHUNK, Chunk, Row, SUMS, Walk, fold};
+use crate::quantity::Quantity;
+use crate::sampling::{CHUNK, Chunk, Row, Walk, fold};
 use crate::scene::Scene;
 use crate::template::Template;
 

@@ -1,13 +1,14 @@
 //! L_ground = pull + push (Eq. 5): pull = mean of α1 tanh(h/α2)² over the points at or above the ground (Eq. 6), push =
 //! mean of β1 tanh(h/β2)² over those below it (Eq. 7). Both means run over all points.
 
-use crate::error::Result;
+use crate::error::{Result, unknown_choice};
 use crate::memory;
 use crate::number::vector::Vec3;
-use crate::number::{Real, Room};
+use crate::number::{Real, Room, SUMS};
 use crate::options::{not_negative, positive};
-use crate::quantity::{Quantity, unknown_choice};
-use crate::sampling::{CHUNK, Place, Points, Row, SUMS, fold};
+use crate::points::{Place, Points};
+use crate::quantity::Quantity;
+use crate::sampling::{CHUNK, Row, fold};
 use crate::scene::Scene;
 use crate::template::Template;
 

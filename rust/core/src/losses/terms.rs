@@ -10,9 +10,10 @@ use crate::mass::Centre;
 use crate::memory;
 use crate::number::Real;
 use crate::number::vector::Vec3;
+use crate::points::Points;
 use crate::pressure::{Cop, LoadSums};
 use crate::quantity::Quantity;
-use crate::sampling::{CHUNK, Points};
+use crate::sampling::CHUNK;
 use crate::scene::Scene;
 use crate::template::Template;
 

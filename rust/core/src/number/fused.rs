@@ -1,7 +1,7 @@
 //! One number whose operations round as the lanes do: `mul_add` is one rounding.
 
 use super::curves::{self, Format};
-use super::{Real, Room, Scalar, gate};
+use super::{Real, Room, Scalar, target};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A float of a CPU level with fused operations. Elsewhere it is correct, and slow.
@@ -100,7 +100,7 @@ macro_rules! fused {
             }
             #[inline(never)]
             fn apart<F: Room<A>, A>(arguments: A) -> F::Output {
-                gate::apart_at_current_level::<F, A>(arguments)
+                target::apart_at_current_level::<F, A>(arguments)
             }
             #[inline(always)]
             fn lane(self, _: usize) -> Self {

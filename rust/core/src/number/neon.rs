@@ -1,6 +1,7 @@
 //! Lane types on aarch64, of 128 bits: NEON is in every such CPU.
 
 use super::registers::*;
+use super::target::apart128;
 use core::arch::aarch64::*;
 
 /// One intrinsic for each operation of a register, by the operation's name.
@@ -97,12 +98,6 @@ mod double128 {
 
 double!(F64x4: 4, float64x2_t, double128, apart128);
 single!(F32x4: 4, F64x4, float32x4_t, single128, apart128, border128);
-
-#[inline(never)]
-#[target_feature(enable = "neon")]
-fn apart128<F: Room<A>, A>(arguments: A) -> F::Output {
-    F::enter(arguments)
-}
 
 border!(
     border128,

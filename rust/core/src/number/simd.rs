@@ -1,6 +1,7 @@
 //! Lane types on x86-64, of 256 and 512 bits.
 
 use super::registers::*;
+use super::target::{apart256, apart512};
 use core::arch::x86_64::*;
 
 /// One intrinsic for each operation of a register, by the operation's name.
@@ -118,18 +119,6 @@ double!(F64x16: 16, __m512d, double512, apart512);
 double!(F64x8: 8, __m256d, double256, apart256);
 single!(F32x16: 16, F64x16, __m512, single512, apart512, border512);
 single!(F32x8: 8, F64x8, __m256, single256, apart256, border256);
-
-#[inline(never)]
-#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx2,fma")]
-pub(super) fn apart512<F: Room<A>, A>(arguments: A) -> F::Output {
-    F::enter(arguments)
-}
-
-#[inline(never)]
-#[target_feature(enable = "avx2,fma")]
-pub(super) fn apart256<F: Room<A>, A>(arguments: A) -> F::Output {
-    F::enter(arguments)
-}
 
 border!(
     border512,

@@ -5,8 +5,8 @@ mod passes;
 
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::number::gate::{Level, Work};
-use crate::number::{Data, Dual, Real, Scalar, all_finite};
+use crate::number::simd_level::Level;
+use crate::number::{Data, Dual, Real, Scalar, Work, all_finite};
 use crate::skinning::blend::Tile;
 use crate::skinning::rotation::Form;
 use crate::skinning::{Body, Gradient, Parameters, Skin, Start, Wanted};

@@ -1,9 +1,26 @@
 //! The walk: the order in which passes visit the samples, and how numbers go from vertices to samples and back.
 
-use super::Weights;
 use crate::memory;
-use crate::number::{Data, Real, Room};
+use crate::number::{Data, Real, Room, SUMS};
 use std::ops::Range;
+
+/// Constants that are kept in both precisions, so that no loop has to convert them.
+#[derive(Clone, Debug, Default)]
+pub struct Weights {
+    single: Vec<f32>,
+    double: Vec<f64>,
+}
+
+impl Weights {
+    pub fn new(double: Vec<f64>) -> Self {
+        Weights { single: memory::collect(double.iter().map(|&weight| weight as f32)), double }
+    }
+
+    #[inline(always)]
+    pub fn get<R: Real>(&self, index: usize) -> R {
+        R::splat(R::Data::pick(&self.single, &self.double)[index])
+    }
+}
 
 /// The order in which passes visit the samples: faces with equally many samples one after the other, so that the loops
 /// over a face's samples have lengths that the compiler knows.
@@ -167,9 +184,6 @@ impl Weights {
         weights.as_chunks::<3>().0.as_chunks::<N>().0
     }
 }
-
-/// Running sums over a row: one body alone sums in the same order as in a lane, and yet its sums vectorise.
-pub const SUMS: usize = 8;
 
 /// Σ of a row's first `len` numbers.
 #[inline(always)]

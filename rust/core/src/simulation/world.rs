@@ -1,6 +1,5 @@
 //! One body in a world of its own, in the engine rapier.
 
-use super::Place;
 use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, scale};
 use crate::solid::{GRAVITY, Solid};
@@ -8,6 +7,23 @@ use rapier3d_f64::prelude::*;
 
 /// Of the balls at the corners, m. They touch where their corner would, for the half-space lies lower by as much.
 const RADIUS: f64 = 1e-4;
+
+/// Where a body is: its centre of mass in the world, and how it has turned since its pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    pub centre: Vec3<f64>,
+    pub rotation: [Vec3<f64>; 3],
+}
+
+impl Place {
+    pub(super) fn nowhere() -> Self {
+        Place { centre: [f64::NAN; 3], rotation: [[f64::NAN; 3]; 3] }
+    }
+
+    pub(super) fn at(centre: Vec3<f64>) -> Self {
+        Place { centre, rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }
+    }
+}
 
 pub struct Fall<'a> {
     pub solid: &'a Solid,

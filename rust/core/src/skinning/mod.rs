@@ -9,6 +9,7 @@
 pub mod blend;
 pub mod chain;
 mod jacobian;
+mod matrix;
 mod model;
 pub mod rotation;
 pub mod weights;
@@ -18,12 +19,11 @@ use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, narrow, of, sub, widen};
 use crate::number::{Real, Scalar};
 use blend::{Blend, Registers, Tile, all, load, tiles};
-use chain::{Chain, Skeleton, add_outer, apply, apply_transposed};
+use chain::{Chain, Skeleton};
+use matrix::{Mat3, add_outer, apply, apply_transposed};
 pub use model::Model;
 use rotation::Form;
 use weights::{Transform, Weights};
-
-pub type Mat3<R> = [[R; 3]; 3];
 
 /// A body model ready for skinning, its large arrays in the precision C, W vertices a tile.
 pub struct Skin<C, const W: usize> {

@@ -1,12 +1,11 @@
 //! Contact: which samples touch the ground. Double precision decides, so that single and double precision agree on the
 //! contacts; single precision is asked first, and its answer counts where it is further from τ than its rounding.
 
-use crate::error::Result;
+use crate::error::{Result, unknown_choice};
 use crate::ground::Plane;
 use crate::memory;
 use crate::number::{Data, Real, Room, Scalar, WideScalar};
 use crate::options::positive;
-use crate::quantity::unknown_choice;
 use crate::scene::Scene;
 
 /// Which samples touch the ground.

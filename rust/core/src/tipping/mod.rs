@@ -9,6 +9,7 @@ pub mod roll;
 
 use crate::error::{Error, Result};
 use crate::ground::{Ground, Plane};
+use crate::mass_properties::MassProperties;
 use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, dot, scale};
 use crate::number::{Data, Real, Room, Scalar};
@@ -19,13 +20,9 @@ use crate::solid::{Extent, GRAVITY, Solid};
 use crate::support::hull::convex_hull;
 use crate::support::margin::{Margin, Nearest};
 use crate::template::Template;
-use crate::volume::MassProperties;
+pub use roll::BAND;
 use roll::{Cloud, Place, Roller, angle};
 use std::f64::consts::TAU;
-
-/// Vertices up to this height above the lowest are collected at first, m; the higher ones are looked at when the body
-/// rolls so far that they may touch.
-pub const BAND: f64 = 0.03;
 
 /// What is asked of each body.
 pub struct TipTest {

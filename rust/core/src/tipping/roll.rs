@@ -11,8 +11,10 @@ use crate::number::vector::{Vec3, add, cross, dot, scale, sub};
 use crate::number::{Fused, Real, Room};
 use crate::support::hull::convex_hull;
 use crate::support::margin::{Margin, Nearest};
-use crate::tipping::BAND;
 
+/// Vertices up to this height above the lowest are collected at first, m; the higher ones are looked at when the body
+/// rolls so far that they may touch.
+pub const BAND: f64 = 0.03;
 /// Points within this height of the lowest touch, m.
 const TOUCH: f64 = 1e-9;
 /// The same of a body that rolls on: wide enough for some ten degrees.

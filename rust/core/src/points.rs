@@ -1,10 +1,9 @@
 //! The points that a loss looks at, samples or vertices, a row of them at a time.
 
-use super::walk::{CHUNK, Chunk, Row, Walk};
-use crate::error::Result;
+use crate::error::{Result, unknown_choice};
 use crate::memory;
 use crate::number::Real;
-use crate::quantity::unknown_choice;
+use crate::sampling::{CHUNK, Chunk, Row, Walk};
 use crate::template::Template;
 use std::ops::Range;
 
