@@ -73,8 +73,6 @@ pub mod collision;
 
 /// Linear blend skinning: from a body model's parameters to its vertices and joints.
 pub mod skinning;
-/// Many posed bodies over threads.
-pub mod posing;
 
 pub use batch::Batch;
 pub use error::{Error, Result};

@@ -1,7 +1,7 @@
 //! Skinning: the backward is the transpose of the forward's derivative, and a body's bits are its own.
 
 use ipman::number::Scalar;
-use ipman::posing::{Bodies, Posing, Rows, TILE, Upstream};
+use ipman::skinning::batch::{Bodies, Posing, Rows, TILE, Upstream};
 use ipman::skinning::{Model, Skin};
 
 const VERTICES: usize = 37; // two full tiles and a rest

@@ -1,7 +1,7 @@
 //! Skinning: arrays that do not fit are refused, and the zero pose of a model without a mean is its template.
 
 use crate::source::Source;
-use ipman::posing::{Bodies, Posing, Rows, TILE, Upstream};
+use ipman::skinning::batch::{Bodies, Posing, Rows, TILE, Upstream};
 use ipman::skinning::{Model, Skin};
 
 pub fn run(data: &[u8]) {

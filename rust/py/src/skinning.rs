@@ -3,7 +3,7 @@
 use crate::array::flat;
 use crate::error::detached;
 use ipman::number::Data;
-use ipman::posing::{Bodies, Gradients, Posing, Rows, TILE, Upstream};
+use ipman::skinning::batch::{Bodies, Gradients, Posing, Rows, TILE, Upstream};
 use ipman::skinning::{self, Model};
 use numpy::{Element, PyReadonlyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};

@@ -1,6 +1,7 @@
 //! Many posed bodies of one model, over threads. A few bodies at a time share each pass over the model's tables; the
 //! bits of a body depend neither on the number of threads nor on its neighbours.
 
+mod arguments;
 mod passes;
 
 use crate::error::{Error, Result};
@@ -11,48 +12,13 @@ use crate::skinning::blend::Tile;
 use crate::skinning::rotation::Form;
 use crate::skinning::{Body, Gradient, Parameters, Skin, Start, Wanted};
 use crate::threads::{self, num_threads};
+pub use arguments::{Bodies, Gradients, Rows, TILE, Upstream};
+use arguments::{check, check_direction, check_rows, front, fronts, gradient_widths, read, rows, triple, used};
 use passes::{Backward, Forward, Place, Shape, run};
-use std::mem::take;
 use std::ops::Range;
 
-/// Vertices a tile: one to four vector registers, by the machine.
-pub const TILE: usize = 16;
 /// Bodies that share a pass over the model's tables.
 const GROUP: usize = 16;
-
-/// One row of `width` numbers a body, or a single one that all bodies share; of width 0 where nothing is given.
-#[derive(Clone, Copy)]
-pub struct Rows<'a, T> {
-    pub numbers: &'a [T],
-    pub width: usize,
-    pub shared: bool,
-}
-
-impl<'a, T> Rows<'a, T> {
-    fn of(&self, body: usize) -> &'a [T] {
-        let start = if self.shared { 0 } else { body * self.width };
-        &self.numbers[start..start + self.width]
-    }
-}
-
-/// The parameters of all bodies, or a direction in their space.
-#[derive(Clone, Copy)]
-pub struct Bodies<'a, T> {
-    pub pose: Rows<'a, T>,       // J·3 axis-angle or J·6
-    pub betas: Rows<'a, T>,      // up to B
-    pub expression: Rows<'a, T>, // up to E
-    pub transl: Rows<'a, T>,     // 3 or none
-}
-
-/// The gradient by the posed bodies; an empty array counts as zeros.
-#[derive(Clone, Copy)]
-pub struct Upstream<'a, T> {
-    pub vertices: &'a [T], // (B, V, 3)
-    pub joints: &'a [T],   // (B, J, 3)
-}
-
-/// Gradients by pose, betas, expression and translation, one row a body; an empty one is not asked for.
-pub type Gradients<'a, T> = [&'a mut [T]; 4];
 
 /// Bodies of one model in their poses.
 pub struct Posing<'a, T> {
@@ -88,7 +54,7 @@ impl<'a, T: Data> Posing<'a, T> {
 
     /// Their derivatives along a direction.
     pub fn jvp(&self, along: &Bodies<T>, vertices: &mut [T], joints: &mut [T]) -> Result<()> {
-        self.check_direction(along)?;
+        check_direction(&self.bodies, along, self.num_bodies)?;
         let slope = |x: Dual| if x.slope.is_finite() { T::of(x.slope) } else { T::zero() };
         memory::guarded(|| {
             self.write::<Dual>(self.skin.start(), |body| self.dual(body, along), slope, vertices, joints)
@@ -102,7 +68,7 @@ impl<'a, T: Data> Posing<'a, T> {
 
     /// The derivative of that gradient along a direction.
     pub fn vjp_jvp(&self, upstream: Upstream<T>, along: &Bodies<T>, gradients: Gradients<T>) -> Result<()> {
-        self.check_direction(along)?;
+        check_direction(&self.bodies, along, self.num_bodies)?;
         let parameters = |body| self.dual(body, along);
         let (constant, number) = (|x: T| Dual::of(x.value()), |x: Dual| T::of(x.slope));
         memory::guarded(|| self.pull::<Dual>(self.skin.start(), parameters, constant, number, upstream, gradients))
@@ -176,7 +142,8 @@ impl<'a, T: Data> Posing<'a, T> {
         for (name, d, row) in [("d_vertices", upstream.vertices, points), ("d_joints", upstream.joints, count)] {
             check(name, d.len(), if d.is_empty() { 0 } else { self.num_bodies * row })?;
         }
-        let widths = self.gradient_widths(&gradients)?;
+        let given = [self.bodies.pose.width, self.skin.num_betas(), self.skin.num_expressions(), 3];
+        let widths = gradient_widths(&gradients, given, self.num_bodies)?;
         let wanted = Wanted { pose: widths[0] > 0, betas: widths[1], expression: widths[2] };
         let mut gradients = gradients;
         let groups = self.groups(|bodies| {
@@ -204,35 +171,6 @@ impl<'a, T: Data> Posing<'a, T> {
                 take: hand_out,
             });
         })
-    }
-
-    /// A direction has the shape of the parameters, as far as it is given.
-    fn check_direction(&self, along: &Bodies<T>) -> Result<()> {
-        let bodies = &self.bodies;
-        let pairs = [
-            ("along_pose", bodies.pose, along.pose),
-            ("along_betas", bodies.betas, along.betas),
-            ("along_expression", bodies.expression, along.expression),
-            ("along_transl", bodies.transl, along.transl),
-        ];
-        for (name, values, slopes) in pairs {
-            check(name, slopes.width, slopes.width.min(1) * values.width)?;
-            check(name, slopes.numbers.len(), slopes.width * if slopes.shared { 1 } else { self.num_bodies })?;
-        }
-        Ok(())
-    }
-
-    /// Numbers a body in each of the gradients.
-    fn gradient_widths(&self, gradients: &Gradients<T>) -> Result<[usize; 4]> {
-        let given = [self.bodies.pose.width, self.skin.num_betas(), self.skin.num_expressions(), 3];
-        let names = ["d_pose", "d_betas", "d_expression", "d_transl"];
-        let mut widths = [0; 4];
-        for (k, numbers) in gradients.iter().enumerate() {
-            let width = numbers.len() / self.num_bodies.max(1);
-            check(names[k], numbers.len(), width.min(given[k]) * self.num_bodies)?;
-            widths[k] = width;
-        }
-        Ok(widths)
     }
 
     fn parameters<R: Scalar<Data = T>>(&self, body: usize) -> Parameters<R> {
@@ -342,61 +280,4 @@ fn hand_out<R: Scalar, T: Scalar>(
             *out = if good { number(d) } else { T::zero() };
         }
     }
-}
-
-/// How many leading columns have a number other than zero.
-fn used<T: Scalar>(rows: Rows<T>) -> usize {
-    let last = |row: &[T]| row.iter().rposition(|x| x.value() != 0.0).map_or(0, |last| last + 1);
-    rows.numbers.chunks_exact(rows.width.max(1)).map(last).max().unwrap_or(0)
-}
-
-fn read<R: Scalar>(numbers: &[R::Data]) -> Vec<R> {
-    numbers.iter().map(|&x| R::read(x)).collect()
-}
-
-fn triple<R: Real>(numbers: &[R]) -> [R; 3] {
-    std::array::from_fn(|axis| numbers.get(axis).copied().unwrap_or(R::zero()))
-}
-
-/// The rows of some bodies, if there are any.
-fn rows<T>(numbers: &[T], bodies: Range<usize>, row: usize) -> &[T] {
-    numbers.get(bodies.start * row..bodies.end * row).unwrap_or_default()
-}
-
-/// Cuts off the first n.
-fn front<'a, T>(rest: &mut &'a mut [T], n: usize) -> &'a mut [T] {
-    let (front, back) = take(rest).split_at_mut(n);
-    *rest = back;
-    front
-}
-
-fn fronts<'a, T>(rest: &mut Gradients<'a, T>, sizes: [usize; 4]) -> Gradients<'a, T> {
-    std::array::from_fn(|k| front(&mut rest[k], sizes[k]))
-}
-
-fn check(name: &'static str, got: usize, expected: usize) -> Result<()> {
-    match got == expected {
-        true => Ok(()),
-        false => Err(Error::Argument { name, expected: format!("{expected} numbers"), got: got.to_string() }),
-    }
-}
-
-fn check_rows<T: Scalar>(skin: &Skin<T, TILE>, num_bodies: usize, bodies: &Bodies<T>) -> Result<()> {
-    let joints = skin.num_joints();
-    let form = Form::of_width(bodies.pose.width / joints);
-    if form.is_none() || !bodies.pose.width.is_multiple_of(joints) {
-        let expected = format!("{joints} joints of 3 or 6 numbers");
-        return Err(Error::Argument { name: "pose", expected, got: format!("{} numbers", bodies.pose.width) });
-    }
-    let rows = [
-        ("pose", bodies.pose, bodies.pose.width),
-        ("betas", bodies.betas, bodies.betas.width.min(skin.num_betas())),
-        ("expression", bodies.expression, bodies.expression.width.min(skin.num_expressions())),
-        ("transl", bodies.transl, if bodies.transl.width == 0 { 0 } else { 3 }),
-    ];
-    for (name, rows, width) in rows {
-        check(name, rows.width, width)?;
-        check(name, rows.numbers.len(), width * if rows.shared { 1 } else { num_bodies })?;
-    }
-    Ok(())
 }

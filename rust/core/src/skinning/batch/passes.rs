@@ -1,6 +1,6 @@
 //! The passes over a model's tiles: every tile is read once for a group of bodies.
 
-use super::{TILE, rows};
+use super::arguments::{TILE, rows};
 use crate::number::{Data, Real, Room, Scalar};
 use crate::skinning::blend::{Registers, Tile};
 use crate::skinning::{Block, Body, Gradient, Parameters, Pulls, Skin, Start, Sums, Totals, Wanted};
