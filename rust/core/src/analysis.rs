@@ -12,10 +12,10 @@ use crate::moments::part_moments;
 use crate::number::vector::{Vec3, sub};
 use crate::number::{Real, Scalar};
 use crate::points::Points;
+use crate::posed::{self, PosedBody};
 use crate::pressure::{CenterOfPressure, Cop, LoadSums, PressureCurve};
 use crate::quantity::Quantity;
 use crate::sampling::CHUNK;
-use crate::scene::{self, Scene};
 use crate::support::{BaseOfSupport, Contact, ContactRule};
 use crate::template::Template;
 use crate::volume::PartVolumes;
@@ -56,7 +56,7 @@ mod at {
 }
 
 /// What a look at all samples finds.
-struct Looked<R: Real> {
+struct SampleResults<R: Real> {
     cop: Cop<R>,
     pressure_sum: R,
     pressure_max: R,
@@ -103,36 +103,36 @@ impl Analysis {
     }
 
     /// Writes the numbers and gives the polygon of each lane.
-    pub fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Vec<Polygon> {
-        let heights = scene.heights();
-        out[at::LOWEST] = scene::lowest(&heights);
-        let looked = self.look(scene, &heights, &mut out[at::GROUND..at::BALANCE]);
-        out[at::PRESSURE_SUM] = looked.pressure_sum;
-        out[at::PRESSURE_MAX] = looked.pressure_max;
+    pub fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Vec<Polygon> {
+        let heights = posed.heights();
+        out[at::LOWEST] = posed::lowest(&heights);
+        let samples = self.pass_over_samples(posed, &heights, &mut out[at::GROUND..at::BALANCE]);
+        out[at::PRESSURE_SUM] = samples.pressure_sum;
+        out[at::PRESSURE_MAX] = samples.pressure_max;
 
-        let parts = part_moments(&scene.template.closing, scene.points);
+        let parts = part_moments(&posed.template.closing, posed.points);
         let exact = Centre::<R>::exact(&parts);
-        let centre = self.method.forward(scene);
+        let centre = self.method.forward(posed);
         match centre.signed_volumes() {
             Some(volumes) => {
                 for (out, volume) in out[at::PART_VOLUMES..].iter_mut().zip(volumes) {
                     *out = R::narrow(volume.abs());
                 }
             }
-            None => drop(PartVolumes.forward(scene, &mut out[at::PART_VOLUMES..])),
+            None => drop(PartVolumes.forward(posed, &mut out[at::PART_VOLUMES..])),
         }
-        self.mass.write(scene, &parts, &mut out[at::SOLID..at::PART_VOLUMES]);
-        scene.put(centre.point, &mut out[at::CENTER_OF_MASS..][..3]);
-        scene.put(exact.point, &mut out[at::CENTER_OF_MASS_EXACT..][..3]);
-        scene.put(looked.cop.point, &mut out[at::CENTER_OF_PRESSURE..][..3]);
-        out[at::STABILITY] = R::narrow(distance_on_ground(scene, &centre, &looked.cop).0);
-        let supports = BaseOfSupport::new(scene, &self.contact, &centre);
-        self.balance.forward_about(scene, centre, &mut out[at::BALANCE..][..1]);
+        self.mass.write(posed, &parts, &mut out[at::SOLID..at::PART_VOLUMES]);
+        posed.write_world(centre.point, &mut out[at::CENTER_OF_MASS..][..3]);
+        posed.write_world(exact.point, &mut out[at::CENTER_OF_MASS_EXACT..][..3]);
+        posed.write_world(samples.cop.point, &mut out[at::CENTER_OF_PRESSURE..][..3]);
+        out[at::STABILITY] = R::narrow(distance_on_ground(posed, &centre, &samples.cop).0);
+        let supports = BaseOfSupport::new(posed, &self.contact, &centre);
+        self.balance.forward_about(posed, centre, &mut out[at::BALANCE..][..1]);
         let number = |of: &dyn Fn(usize) -> f64| R::narrow(R::Wide::from_lanes(|lane| Real::of(of(lane))));
         out[at::NUM_CONTACTS] = number(&|lane| supports[lane].num_contacts as f64);
         out[at::AREA] = number(&|lane| supports[lane].area);
         out[at::MARGIN] = number(&|lane| supports[lane].margin);
-        let [low, high] = scene.bounds();
+        let [low, high] = posed.bounds();
         out[at::STATUS] = number(&|lane| {
             let volumes = memory::collect(parts.iter().map(|part| part.volume.lane(lane).value()));
             let corner = |corner: Vec3<R>| corner.map(|x| x.lane(lane).value());
@@ -142,23 +142,23 @@ impl Analysis {
     }
 
     /// Pressure and ground losses.
-    fn look<R: Real>(&self, scene: &Scene<R>, heights: &[R], ground: &mut [R]) -> Looked<R> {
-        let mut loads = LoadSums::new(self.pressure, scene.template, heights);
+    fn pass_over_samples<R: Real>(&self, posed: &PosedBody<R>, heights: &[R], ground: &mut [R]) -> SampleResults<R> {
+        let mut loads = LoadSums::new(self.pressure, posed.template, heights);
         let mut sums = self.ground.sums();
         let mut lowest = R::of(1e30);
         let mut row = [R::zero(); CHUNK];
-        for place in Points::Samples.places(scene.template) {
-            place.read(heights, &mut row);
-            loads.read(&place, &row);
-            sums.read(&place, &row);
-            lowest = lowest.at_most(scene::lowest(&row[..place.len()]));
+        for chunk in Points::Samples.chunks(posed.template) {
+            chunk.gather(heights, &mut row);
+            loads.add(&chunk, &row);
+            sums.add(&chunk, &row);
+            lowest = lowest.at_most(posed::lowest(&row[..chunk.len()]));
         }
-        sums.finish(scene.template, ground);
-        Looked {
+        sums.finish(posed.template, ground);
+        SampleResults {
             pressure_sum: R::narrow(loads.total_pressure()),
             // ρ falls with the height.
             pressure_max: self.pressure.curve.density(lowest, R::zero()),
-            cop: loads.finish(scene),
+            cop: loads.finish(posed),
         }
     }
 }

@@ -46,7 +46,7 @@ pub mod losses;
 /// Everything about a body's surface that is computed once.
 pub mod template;
 /// One closed body over its ground, in local coordinates.
-pub mod scene;
+pub mod posed;
 /// All figures of a body at one look.
 pub mod analysis;
 /// What a differentiable module offers.
@@ -56,7 +56,7 @@ pub mod registry;
 /// Many bodies over lanes and threads.
 pub mod batch;
 /// The weighted total of a training step, reduced over a batch, with its gradient.
-pub mod weighted;
+pub mod reduction;
 /// How many threads, and the pool.
 pub mod threads;
 

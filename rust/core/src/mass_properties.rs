@@ -6,8 +6,8 @@ use crate::moments::{Moments, PAIRS, part_moments, part_moments_backward};
 use crate::number::Real;
 use crate::number::vector::{Vec3, dot};
 use crate::options::positive;
+use crate::posed::PosedBody;
 use crate::quantity::Quantity;
-use crate::scene::Scene;
 use crate::template::Template;
 
 /// Exact volume (m³), mass (kg), centre (m) and inertia about the centre (kg m²) of the body and of each part.
@@ -76,7 +76,7 @@ impl Quantity for MassProperties {
     /// The moments of each part.
     type Saved<R: Real> = Vec<Moments<R::Wide>>;
 
-    fn len(&self, template: &Template) -> usize {
+    fn num_outputs(&self, template: &Template) -> usize {
         Self::ROW * (1 + template.mesh.num_parts)
     }
 
@@ -84,15 +84,15 @@ impl Quantity for MassProperties {
         self.check_densities(template.mesh.num_parts)
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Vec<Moments<R::Wide>> {
-        let parts = part_moments(&scene.template.closing, scene.points);
-        self.write(scene, &parts, out);
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Vec<Moments<R::Wide>> {
+        let parts = part_moments(&posed.template.closing, posed.points);
+        self.write(posed, &parts, out);
         parts
     }
 
     fn backward<R: Real>(
         &self,
-        scene: &Scene<R>,
+        posed: &PosedBody<R>,
         parts: &Vec<Moments<R::Wide>>,
         d_out: &[R],
         d_points: &mut [Vec3<R>],
@@ -109,24 +109,24 @@ impl Quantity for MassProperties {
             d_moments.volume = d_moments.volume + d_out[0] + d_row[0];
             d_moments
         }));
-        part_moments_backward(&scene.template.closing, scene.points, &d_parts, d_points);
+        part_moments_backward(&posed.template.closing, posed.points, &d_parts, d_points);
     }
 }
 
 impl MassProperties {
     /// As many rows as `out` holds.
-    pub fn write<R: Real>(&self, scene: &Scene<R>, parts: &[Moments<R::Wide>], out: &mut [R]) {
+    pub fn write<R: Real>(&self, posed: &PosedBody<R>, parts: &[Moments<R::Wide>], out: &mut [R]) {
         let (volumes, weighted) = self.weigh(parts);
         for (out, (volume, weighted)) in out.chunks_exact_mut(Self::ROW).zip(volumes.into_iter().zip(weighted)) {
             let mut wide = [R::Wide::zero(); Self::ROW];
-            row(volume, &weighted, scene.origin, &mut wide);
+            row(volume, &weighted, posed.origin, &mut wide);
             for (out, wide) in out.iter_mut().zip(wide) {
                 *out = R::narrow(wide);
             }
         }
     }
 
-    /// The whole body's row, in the scene's own coordinates.
+    /// The whole body's row, in the posed's own coordinates.
     pub fn whole<W: Real>(&self, parts: &[Moments<W>]) -> [W; Self::ROW] {
         let (volumes, weighted) = self.weigh(parts);
         let mut out = [W::zero(); Self::ROW];

@@ -4,7 +4,7 @@
 use crate::closing::Closing;
 use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, cross, dot, narrow, widen, widen_in_line};
-use crate::number::{Real, Room};
+use crate::number::{Kernel, Real};
 
 /// Integrals over a solid: ∫1, ∫x and the second moments ∫xxᵀ as (xx, yy, zz, xy, xz, yz).
 #[derive(Clone, Copy)]
@@ -97,19 +97,19 @@ impl<W: Real> Moments<W> {
     }
 }
 
-/// The moments of each closed part, about the scene's origin.
+/// The moments of each closed part, about the posed's origin.
 pub fn part_moments<R: Real>(closing: &Closing, points: &[Vec3<R>]) -> Vec<Moments<R::Wide>> {
-    R::apart::<MomentsForward, _>((closing, points))
+    R::dispatch::<MomentsForward, _>((closing, points))
 }
 
 /// [`part_moments`]
 struct MomentsForward;
 
-impl<R: Real> Room<(&Closing, &[Vec3<R>])> for MomentsForward {
+impl<R: Real> Kernel<(&Closing, &[Vec3<R>])> for MomentsForward {
     type Output = Vec<Moments<R::Wide>>;
 
     #[inline(always)]
-    fn enter((closing, points): (&Closing, &[Vec3<R>])) -> Vec<Moments<R::Wide>> {
+    fn run((closing, points): (&Closing, &[Vec3<R>])) -> Vec<Moments<R::Wide>> {
         let mut all = memory::with_capacity(closing.parts.len());
         for part in &closing.parts {
             let mut sum = Moments::zero();
@@ -133,17 +133,17 @@ pub fn part_moments_backward<R: Real>(
     d_moments: &[Moments<R::Wide>],
     d_points: &mut [Vec3<R>],
 ) {
-    R::apart::<MomentsBackward, _>((closing, points, d_moments, d_points));
+    R::dispatch::<MomentsBackward, _>((closing, points, d_moments, d_points));
 }
 
 /// [`part_moments_backward`]
 struct MomentsBackward;
 
-impl<R: Real> Room<(&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>])> for MomentsBackward {
+impl<R: Real> Kernel<(&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>])> for MomentsBackward {
     type Output = ();
 
     #[inline(always)]
-    fn enter((closing, points, d_moments, d_points): (&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>])) {
+    fn run((closing, points, d_moments, d_points): (&Closing, &[Vec3<R>], &[Moments<R::Wide>], &mut [Vec3<R>])) {
         let points = widen_all(points);
         let mut d_wide = memory::filled([R::Wide::zero(); 3], points.len());
         for (part, d_part) in closing.parts.iter().zip(d_moments) {

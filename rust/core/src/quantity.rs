@@ -4,7 +4,7 @@
 use crate::error::Result;
 use crate::number::Real;
 use crate::number::vector::Vec3;
-use crate::scene::Scene;
+use crate::posed::PosedBody;
 use crate::template::Template;
 
 pub trait Quantity: Send + Sync {
@@ -12,19 +12,25 @@ pub trait Quantity: Send + Sync {
     type Saved<R: Real>;
 
     /// How many numbers it has for one body.
-    fn len(&self, template: &Template) -> usize;
+    fn num_outputs(&self, template: &Template) -> usize;
 
     /// An error names the option that is out of its range.
     fn check(&self, template: &Template) -> Result<()>;
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R>;
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Self::Saved<R>;
 
     /// Adds Σ d_out · ∂out/∂points to `d_points`, the virtual vertices' included.
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]);
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]);
 
     /// Both, for a quantity that can share work between them.
-    fn forward_and_backward<R: Real>(&self, scene: &Scene<R>, d_out: &[R], out: &mut [R], d_points: &mut [Vec3<R>]) {
-        let saved = self.forward(scene, out);
-        self.backward(scene, &saved, d_out, d_points);
+    fn forward_and_backward<R: Real>(
+        &self,
+        posed: &PosedBody<R>,
+        d_out: &[R],
+        out: &mut [R],
+        d_points: &mut [Vec3<R>],
+    ) {
+        let saved = self.forward(posed, out);
+        self.backward(posed, &saved, d_out, d_points);
     }
 }

@@ -1,13 +1,13 @@
 //! Signed volumes of the closed parts: tetrahedra from the origin to each face (the paper's "fill", section 3.2).
 //!
-//! A closed part's volume does not depend on the origin; the coordinates are local to the body ([`crate::scene`]), which
+//! A closed part's volume does not depend on the origin; the coordinates are local to the body ([`crate::posed`]), which
 //! is the paper's "translate". The volumes are summed by rings around the points ([`crate::rings`]), which is the same
 //! sum in another order and gives the gradient on the way.
 
 use crate::closing::Closing;
 use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, dot};
-use crate::number::{BLOCK, Real, Room};
+use crate::number::{BLOCK, Kernel, Real};
 use crate::rings::Rings;
 
 /// Signed volume of each part, m³, and what its gradient is made of.
@@ -20,23 +20,23 @@ pub struct SignedVolumes<R: Real> {
 impl<R: Real> SignedVolumes<R> {
     /// vol^P = Σ_v v·A_v / 9 over the rings of the part ([`crate::rings`]).
     pub fn forward(closing: &Closing, points: &[Vec3<R>]) -> Self {
-        R::apart::<Forward, _>((closing, points))
+        R::dispatch::<Forward, _>((closing, points))
     }
 
     /// Adds Σ_p d_volumes[p] ∂vol_p/∂points, where ∂vol/∂v = A_v / 3.
     pub fn backward(&self, closing: &Closing, d_volumes: &[R::Wide], d_points: &mut [Vec3<R>]) {
-        R::apart::<Backward, _>((self, closing, d_volumes, d_points));
+        R::dispatch::<Backward, _>((self, closing, d_volumes, d_points));
     }
 }
 
 /// [`SignedVolumes::forward`]
 struct Forward;
 
-impl<R: Real> Room<(&Closing, &[Vec3<R>])> for Forward {
+impl<R: Real> Kernel<(&Closing, &[Vec3<R>])> for Forward {
     type Output = SignedVolumes<R>;
 
     #[inline(always)]
-    fn enter((closing, points): (&Closing, &[Vec3<R>])) -> SignedVolumes<R> {
+    fn run((closing, points): (&Closing, &[Vec3<R>])) -> SignedVolumes<R> {
         let mut of_parts = memory::with_capacity(closing.rings.len());
         let mut all_doubled = memory::with_capacity(closing.rings.iter().map(Rings::len).sum());
         let mut doubled = [[R::zero(); 3]; BLOCK];
@@ -60,11 +60,11 @@ impl<R: Real> Room<(&Closing, &[Vec3<R>])> for Forward {
 /// [`SignedVolumes::backward`]
 struct Backward;
 
-impl<R: Real> Room<(&SignedVolumes<R>, &Closing, &[R::Wide], &mut [Vec3<R>])> for Backward {
+impl<R: Real> Kernel<(&SignedVolumes<R>, &Closing, &[R::Wide], &mut [Vec3<R>])> for Backward {
     type Output = ();
 
     #[inline(always)]
-    fn enter((signed, closing, d_volumes, d_points): (&SignedVolumes<R>, &Closing, &[R::Wide], &mut [Vec3<R>])) {
+    fn run((signed, closing, d_volumes, d_points): (&SignedVolumes<R>, &Closing, &[R::Wide], &mut [Vec3<R>])) {
         let mut all_doubled = signed.doubled.iter();
         for (rings, &d_volume) in closing.rings.iter().zip(d_volumes) {
             let factor = R::narrow(d_volume * R::Wide::of(1.0 / 6.0));

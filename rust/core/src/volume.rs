@@ -4,8 +4,8 @@ use crate::error::Result;
 use crate::memory;
 use crate::number::Real;
 use crate::number::vector::Vec3;
+use crate::posed::PosedBody;
 use crate::quantity::Quantity;
-use crate::scene::Scene;
 use crate::signed_volume::{SignedVolumes, absolute};
 use crate::template::Template;
 
@@ -16,7 +16,7 @@ impl Quantity for PartVolumes {
     /// The volumes before the absolute value, and the sign of each.
     type Saved<R: Real> = (SignedVolumes<R>, Vec<R::Wide>);
 
-    fn len(&self, template: &Template) -> usize {
+    fn num_outputs(&self, template: &Template) -> usize {
         template.mesh.num_parts
     }
 
@@ -24,8 +24,8 @@ impl Quantity for PartVolumes {
         Ok(())
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
-        let signed = SignedVolumes::forward(&scene.template.closing, scene.points);
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Self::Saved<R> {
+        let signed = SignedVolumes::forward(&posed.template.closing, posed.points);
         let (volumes, signs) = absolute(&signed.of_parts);
         for (out, volume) in out.iter_mut().zip(volumes) {
             *out = R::narrow(volume);
@@ -33,9 +33,9 @@ impl Quantity for PartVolumes {
         (signed, signs)
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
         let (signed, signs) = saved;
         let d_volumes = memory::collect(d_out.iter().zip(signs).map(|(d, &sign)| d.widen() * sign));
-        signed.backward(&scene.template.closing, &d_volumes, d_points);
+        signed.backward(&posed.template.closing, &d_volumes, d_points);
     }
 }

@@ -12,8 +12,8 @@ use ipman::mass_properties::MassProperties;
 use ipman::number::simd_level::Level;
 use ipman::points::Points;
 use ipman::pressure::{CenterOfPressure, PressureCurve};
+use ipman::reduction::{Pool, Reduction};
 use ipman::support::{Contact, ContactRule, SupportMargin};
-use ipman::weighted::{Pool, Reduction};
 use ipman::{Batch, Error, Template};
 
 fn terms() -> StabilityTerms {

@@ -68,7 +68,7 @@ struct Size<'a>(&'a Template);
 impl Visitor for Size<'_> {
     type Output = usize;
     fn visit<Q: Quantity>(self, quantity: Q) -> usize {
-        quantity.len(&self.0.inner)
+        quantity.num_outputs(&self.0.inner)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::memory;
 use crate::number::simd_level::Level;
 use crate::number::vector::Vec3;
 use crate::number::{Data, Dual, Real, Work, all_finite};
-use crate::scene::{self, Scene};
+use crate::posed::{self, PosedBody};
 use crate::template::Template;
 use crate::threads::{self, num_threads};
 use std::mem::MaybeUninit;
@@ -97,19 +97,19 @@ impl<'a, T: Data> Batch<'a, T> {
     }
 
     /// Shows one body to `f` as dual numbers along `d_vertices`, if it is finite.
-    pub(super) fn on_dual(&self, body: usize, d_vertices: &[T], f: impl FnOnce(&Scene<Dual>)) {
+    pub(super) fn on_dual(&self, body: usize, d_vertices: &[T], f: impl FnOnce(&PosedBody<Dual>)) {
         let Some(origin) = self.origin(body) else { return };
         let row = 3 * self.template.mesh.num_vertices;
         let mut slopes = d_vertices[body * row..][..row].iter();
         let dual = |x: T, o: f64| Dual::new(x.value() - o, slopes.next().expect("as long as the vertices").value());
         let points = self.points(body, dual, origin);
-        f(&Scene::new(self.template, &points, &[self.grounds[body]], &[origin]));
+        f(&PosedBody::new(self.template, &points, &[self.grounds[body]], &[origin]));
     }
 
     /// The body's local origin, if all its vertices are finite.
     pub(super) fn origin(&self, body: usize) -> Option<Vec3<f64>> {
         let vertices = self.vertices_of(body);
-        all_finite(vertices).then(|| scene::origin(std::array::from_fn(|k| vertices[k].value())))
+        all_finite(vertices).then(|| posed::origin(std::array::from_fn(|k| vertices[k].value())))
     }
 
     pub(crate) fn vertices_of(&self, body: usize) -> &[T] {
@@ -214,7 +214,7 @@ impl<'a, T: Data> Batch<'a, T> {
 
     /// Shows a group of bodies, one a lane, to `work`.
     pub(super) fn on_lanes<W: OnLanes<T>>(&self, group: &Group, work: W) {
-        T::enter(group.level, group.width, ReadBodies { batch: self, group, work });
+        T::run_on_lanes(group.level, group.width, ReadBodies { batch: self, group, work });
     }
 }
 
@@ -235,7 +235,7 @@ impl Group {
 
 /// What is done with bodies on lanes.
 pub(super) trait OnLanes<T> {
-    fn run<R: Real<Data = T>>(self, scene: &Scene<R>);
+    fn run<R: Real<Data = T>>(self, posed: &PosedBody<R>);
 }
 
 /// Turns the bodies of a group into lanes.
@@ -268,6 +268,6 @@ impl<T: Data, W: OnLanes<T>> Work<T> for ReadBodies<'_, T, W> {
             points.set_len(count);
         }
         template.closing.forward(&mut points);
-        work.run(&Scene::new(template, &points, &grounds, &origins));
+        work.run(&PosedBody::new(template, &points, &grounds, &origins));
     }
 }

@@ -10,8 +10,8 @@ use crate::memory;
 use crate::number::vector::{Vec3, sub};
 use crate::number::{Data, Real, Scalar};
 use crate::options::positive;
+use crate::posed::PosedBody;
 use crate::quantity::Quantity;
-use crate::scene::Scene;
 use crate::signed_volume::SignedVolumes;
 use crate::solid::{Extent, Solid};
 use crate::support::{BaseOfSupport, Contact};
@@ -22,7 +22,7 @@ impl<T: Data> Batch<'_, T> {
     pub fn base_of_support(&self, contact: &Contact, method: Method) -> Result<Vec<BaseOfSupport>> {
         contact.check()?;
         let nowhere = BaseOfSupport { polygon: Vec::new(), area: f64::NAN, margin: f64::NAN, num_contacts: 0 };
-        self.find(nowhere, &Support { contact, method })
+        self.per_body(nowhere, &Support { contact, method })
     }
 
     /// All figures of each body ([`Analysis`]): B·K numbers, and the corners of the base of support.
@@ -40,7 +40,7 @@ impl<T: Data> Batch<'_, T> {
             }
             self.each_group(bodies, |group, rows| {
                 let (out, polygons) = rows.into_iter().unzip();
-                self.on_lanes(group, Figures { analysis, size, out, polygons });
+                self.on_lanes(group, WriteAnalysis { analysis, size, out, polygons });
             })?;
             Ok(polygons)
         })
@@ -50,20 +50,20 @@ impl<T: Data> Batch<'_, T> {
     #[cfg(feature = "lp")]
     pub fn is_supported_lp(&self, contact: &Contact, method: Method) -> Result<Vec<bool>> {
         contact.check()?;
-        self.find(false, &SupportedLp { contact, method })
+        self.per_body(false, &SupportedLp { contact, method })
     }
 
     /// The bits of [`status`].
     pub fn status(&self, contact: &Contact) -> Result<Vec<u32>> {
         contact.check()?;
-        self.find(status::NON_FINITE, &Status { contact })
+        self.per_body(status::NON_FINITE, &Status { contact })
     }
 
     /// Each body as one solid. One with its lowest vertex higher than `contact` metres is in the air.
     pub fn solids(&self, densities: &MassProperties, contact: f64) -> Result<Vec<Solid>> {
         densities.check(self.template)?;
         positive("contact", contact)?;
-        self.find(Solid::nowhere(), &Solids { densities, contact })
+        self.per_body(Solid::nowhere(), &Solids { densities, contact })
     }
 
     /// The tip test of each body.
@@ -73,7 +73,7 @@ impl<T: Data> Batch<'_, T> {
             let mut out = memory::filled(Tipping::nowhere(), self.len());
             self.each_group(self.finite(&mut out), |group, out| {
                 let mut footings = vec![Footing::nowhere(); out.len()];
-                self.on_lanes(group, Find { finding: test, out: footings.iter_mut().collect() });
+                self.on_lanes(group, WritePerBody { result: test, out: footings.iter_mut().collect() });
                 for ((out, footing), &body) in out.into_iter().zip(footings).zip(&group.bodies) {
                     *out = test.of_body(footing, self.vertices_of(body));
                 }
@@ -82,31 +82,31 @@ impl<T: Data> Batch<'_, T> {
         })
     }
 
-    /// What is found of each body; `bad` for a body that is not finite.
-    fn find<F: Finding>(&self, bad: F::Of, finding: &F) -> Result<Vec<F::Of>> {
+    /// The result of each body; `bad` for a body that is not finite.
+    fn per_body<F: PerBody>(&self, bad: F::Output, result: &F) -> Result<Vec<F::Output>> {
         memory::guarded(|| {
             let mut out = memory::filled(bad, self.len());
-            self.each_group(self.finite(&mut out), |group, out| self.on_lanes(group, Find { finding, out }))?;
+            self.each_group(self.finite(&mut out), |group, out| self.on_lanes(group, WritePerBody { result, out }))?;
             Ok(out)
         })
     }
 }
 
-/// What is found of a body besides quantities.
-trait Finding: Sync {
-    type Of: Clone + Send;
-    /// That of each lane.
-    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<Self::Of>;
+/// A result per body that is no [`Quantity`].
+trait PerBody: Sync {
+    type Output: Clone + Send;
+    /// One per lane.
+    fn of_lanes<R: Real>(&self, posed: &PosedBody<R>) -> Vec<Self::Output>;
 }
 
-struct Find<'a, F: Finding> {
-    finding: &'a F,
-    out: Vec<&'a mut F::Of>,
+struct WritePerBody<'a, F: PerBody> {
+    result: &'a F,
+    out: Vec<&'a mut F::Output>,
 }
 
-impl<T: Data, F: Finding> OnLanes<T> for Find<'_, F> {
-    fn run<R: Real<Data = T>>(self, scene: &Scene<R>) {
-        self.out.into_iter().zip(self.finding.find(scene)).for_each(|(out, found)| *out = found);
+impl<T: Data, F: PerBody> OnLanes<T> for WritePerBody<'_, F> {
+    fn run<R: Real<Data = T>>(self, posed: &PosedBody<R>) {
+        self.out.into_iter().zip(self.result.of_lanes(posed)).for_each(|(out, own)| *out = own);
     }
 }
 
@@ -115,10 +115,10 @@ struct Support<'a> {
     method: Method,
 }
 
-impl Finding for Support<'_> {
-    type Of = BaseOfSupport;
-    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<BaseOfSupport> {
-        BaseOfSupport::new(scene, self.contact, &self.method.forward(scene))
+impl PerBody for Support<'_> {
+    type Output = BaseOfSupport;
+    fn of_lanes<R: Real>(&self, posed: &PosedBody<R>) -> Vec<BaseOfSupport> {
+        BaseOfSupport::new(posed, self.contact, &self.method.forward(posed))
     }
 }
 
@@ -129,10 +129,10 @@ struct SupportedLp<'a> {
 }
 
 #[cfg(feature = "lp")]
-impl Finding for SupportedLp<'_> {
-    type Of = bool;
-    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<bool> {
-        crate::support::is_supported_lp(scene, self.contact, self.method)
+impl PerBody for SupportedLp<'_> {
+    type Output = bool;
+    fn of_lanes<R: Real>(&self, posed: &PosedBody<R>) -> Vec<bool> {
+        crate::support::is_supported_lp(posed, self.contact, self.method)
     }
 }
 
@@ -140,11 +140,11 @@ struct Status<'a> {
     contact: &'a Contact,
 }
 
-impl Finding for Status<'_> {
-    type Of = u32;
-    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<u32> {
-        let contacts = self.contact.find(scene);
-        (0..R::LANES).map(|lane| status_of(scene, lane, contacts.count(lane))).collect()
+impl PerBody for Status<'_> {
+    type Output = u32;
+    fn of_lanes<R: Real>(&self, posed: &PosedBody<R>) -> Vec<u32> {
+        let contacts = self.contact.find(posed);
+        (0..R::LANES).map(|lane| status_of(posed, lane, contacts.count(lane))).collect()
     }
 }
 
@@ -153,44 +153,44 @@ struct Solids<'a> {
     contact: f64,
 }
 
-impl Finding for Solids<'_> {
-    type Of = Solid;
-    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<Solid> {
-        let origin = |lane: usize| scene.origin.map(|x| x.lane(lane).value());
-        let solids = Solid::of_lanes(scene, &Extent::of(scene), self.densities, self.contact);
+impl PerBody for Solids<'_> {
+    type Output = Solid;
+    fn of_lanes<R: Real>(&self, posed: &PosedBody<R>) -> Vec<Solid> {
+        let origin = |lane: usize| posed.origin.map(|x| x.lane(lane).value());
+        let solids = Solid::of_lanes(posed, &Extent::of(posed), self.densities, self.contact);
         solids.into_iter().enumerate().map(|(lane, solid)| solid.moved(origin(lane)).or_nowhere()).collect()
     }
 }
 
-impl Finding for TipTest {
-    type Of = Footing;
-    fn find<R: Real>(&self, scene: &Scene<R>) -> Vec<Footing> {
-        self.footings(scene)
+impl PerBody for TipTest {
+    type Output = Footing;
+    fn of_lanes<R: Real>(&self, posed: &PosedBody<R>) -> Vec<Footing> {
+        self.footings(posed)
     }
 }
 
 /// The bits of one lane. Whether a volume is nothing or less is decided in double precision.
-fn status_of<R: Real>(scene: &Scene<R>, lane: usize, num_contacts: usize) -> u32 {
-    let vertices = &scene.points[..scene.template.mesh.num_vertices];
-    let mut points: Vec<Vec3<f64>> = memory::with_capacity(scene.points.len());
+fn status_of<R: Real>(posed: &PosedBody<R>, lane: usize, num_contacts: usize) -> u32 {
+    let vertices = &posed.points[..posed.template.mesh.num_vertices];
+    let mut points: Vec<Vec3<f64>> = memory::with_capacity(posed.points.len());
     points.extend(vertices.iter().map(|v| v.map(|x| x.lane(lane).value())));
-    let [low, high] = scene.bounds().map(|corner| corner.map(|x| x.lane(lane).value()));
-    scene.template.closing.forward(&mut points);
-    let volumes = SignedVolumes::forward(&scene.template.closing, &points).of_parts;
+    let [low, high] = posed.bounds().map(|corner| corner.map(|x| x.lane(lane).value()));
+    posed.template.closing.forward(&mut points);
+    let volumes = SignedVolumes::forward(&posed.template.closing, &points).of_parts;
     status::bits(&volumes, sub(high, low), num_contacts > 0)
 }
 
-struct Figures<'a, T> {
+struct WriteAnalysis<'a, T> {
     analysis: &'a Analysis,
     size: usize,
     out: Vec<&'a mut [T]>,
     polygons: Vec<&'a mut Polygon>,
 }
 
-impl<T: Data> OnLanes<T> for Figures<'_, T> {
-    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
+impl<T: Data> OnLanes<T> for WriteAnalysis<'_, T> {
+    fn run<R: Real<Data = T>>(mut self, posed: &PosedBody<R>) {
         let mut out = memory::filled(R::zero(), self.size);
-        let polygons = self.analysis.forward(scene, &mut out);
+        let polygons = self.analysis.forward(posed, &mut out);
         self.polygons.into_iter().zip(polygons).for_each(|(own, polygon)| *own = polygon);
         R::write_rows(&out, &mut self.out);
     }

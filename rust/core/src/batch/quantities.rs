@@ -6,15 +6,15 @@ use crate::error::Result;
 use crate::losses::terms::Terms;
 use crate::memory;
 use crate::number::{Data, Dual, Real, Scalar, all_finite};
+use crate::posed::PosedBody;
 use crate::quantity::Quantity;
-use crate::scene::Scene;
 use crate::template::Template;
 
 impl<T: Data> Batch<'_, T> {
     /// The quantity of each body: B·K numbers.
     pub fn value_into<Q: Quantity>(&self, quantity: &Q, out: &mut [T]) -> Result<()> {
         quantity.check(self.template)?;
-        let size = quantity.len(self.template);
+        let size = quantity.num_outputs(self.template);
         self.each([(out, size)], |group, [out]| {
             self.on_lanes(group, Forward { quantity, size, out });
         })
@@ -29,7 +29,7 @@ impl<T: Data> Batch<'_, T> {
         d_vertices: &mut [T],
     ) -> Result<()> {
         quantity.check(self.template)?;
-        let (size, row) = (quantity.len(self.template), 3 * self.template.mesh.num_vertices);
+        let (size, row) = (quantity.num_outputs(self.template), 3 * self.template.mesh.num_vertices);
         self.each([(out, size), (d_vertices, row)], |group, [out, d_vertices]| {
             let d_out = group.bodies.iter().map(|&body| &d_out[body * size..][..size]).collect();
             let work = ForwardAndBackward { template: self.template, quantity, size, d_out, out, d_vertices };
@@ -47,7 +47,7 @@ impl<T: Data> Batch<'_, T> {
     /// those of pull and of push by the vertices' heights, V each.
     pub fn value_and_jacobian_into<Q: Terms>(&self, quantity: &Q, out: &mut [T], jacobian: &mut [T]) -> Result<()> {
         quantity.check(self.template)?;
-        let (size, row) = (quantity.len(self.template), 5 * self.template.mesh.num_vertices);
+        let (size, row) = (quantity.num_outputs(self.template), 5 * self.template.mesh.num_vertices);
         self.each([(out, size), (jacobian, row)], |group, [out, jacobian]| {
             self.on_lanes(group, ForwardAndJacobian { template: self.template, quantity, size, out, jacobian });
         })
@@ -56,12 +56,12 @@ impl<T: Data> Batch<'_, T> {
     /// The derivative of the value along `d_vertices`: B·K numbers.
     pub fn jvp_into<Q: Quantity>(&self, quantity: &Q, d_vertices: &[T], out: &mut [T]) -> Result<()> {
         quantity.check(self.template)?;
-        let size = quantity.len(self.template);
+        let size = quantity.num_outputs(self.template);
         self.each_body((out, size), |body, out| {
             out.fill(T::zero());
-            self.on_dual(body, d_vertices, |scene| {
+            self.on_dual(body, d_vertices, |posed| {
                 let mut value = memory::filled(Dual::zero(), size);
-                quantity.forward(scene, &mut value);
+                quantity.forward(posed, &mut value);
                 for (out, value) in out.iter_mut().zip(value) {
                     *out = finite_or_zero(T::of(value.slope));
                 }
@@ -72,14 +72,14 @@ impl<T: Data> Batch<'_, T> {
     /// The derivative of `vjp(d_out)` along `d_vertices`, a Hessian-vector product: B·V·3 numbers.
     pub fn vjp_jvp_into<Q: Quantity>(&self, quantity: &Q, d_out: &[T], d_vertices: &[T], out: &mut [T]) -> Result<()> {
         quantity.check(self.template)?;
-        let (size, row) = (quantity.len(self.template), 3 * self.template.mesh.num_vertices);
+        let (size, row) = (quantity.num_outputs(self.template), 3 * self.template.mesh.num_vertices);
         self.each_body((out, row), |body, out| {
             out.fill(T::zero());
-            self.on_dual(body, d_vertices, |scene| {
+            self.on_dual(body, d_vertices, |posed| {
                 let d_out = memory::collect(d_out[body * size..][..size].iter().map(|d| Dual::of(d.value())));
-                let mut d_points = memory::filled([Dual::zero(); 3], scene.points.len());
-                quantity.forward_and_backward(scene, &d_out, &mut memory::filled(Dual::zero(), size), &mut d_points);
-                scene.template.closing.backward(&mut d_points);
+                let mut d_points = memory::filled([Dual::zero(); 3], posed.points.len());
+                quantity.forward_and_backward(posed, &d_out, &mut memory::filled(Dual::zero(), size), &mut d_points);
+                posed.template.closing.backward(&mut d_points);
                 for (out, d) in out.iter_mut().zip(d_points.as_flattened()) {
                     *out = T::of(d.slope);
                 }
@@ -90,13 +90,13 @@ impl<T: Data> Batch<'_, T> {
 
     /// [`Batch::value_into`] a new vector.
     pub fn value<Q: Quantity>(&self, quantity: &Q) -> Result<Vec<T>> {
-        let mut out = self.rows(quantity.len(self.template))?;
+        let mut out = self.rows(quantity.num_outputs(self.template))?;
         self.value_into(quantity, &mut out).map(|()| out)
     }
 
     /// [`Batch::value_and_vjp_into`] new vectors.
     pub fn value_and_vjp<Q: Quantity>(&self, quantity: &Q, d_out: &[T]) -> Result<(Vec<T>, Vec<T>)> {
-        let (mut out, mut d_vertices) = (self.rows(quantity.len(self.template))?, self.rows(self.row())?);
+        let (mut out, mut d_vertices) = (self.rows(quantity.num_outputs(self.template))?, self.rows(self.row())?);
         self.value_and_vjp_into(quantity, d_out, &mut out, &mut d_vertices).map(|()| (out, d_vertices))
     }
 
@@ -108,7 +108,7 @@ impl<T: Data> Batch<'_, T> {
 
     /// [`Batch::jvp_into`] a new vector.
     pub fn jvp<Q: Quantity>(&self, quantity: &Q, d_vertices: &[T]) -> Result<Vec<T>> {
-        let mut out = self.rows(quantity.len(self.template))?;
+        let mut out = self.rows(quantity.num_outputs(self.template))?;
         self.jvp_into(quantity, d_vertices, &mut out).map(|()| out)
     }
 
@@ -126,9 +126,9 @@ struct Forward<'a, T, Q> {
 }
 
 impl<T: Data, Q: Quantity> OnLanes<T> for Forward<'_, T, Q> {
-    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
+    fn run<R: Real<Data = T>>(mut self, posed: &PosedBody<R>) {
         let mut out = memory::filled(R::zero(), self.size);
-        self.quantity.forward(scene, &mut out);
+        self.quantity.forward(posed, &mut out);
         R::write_rows(&out, &mut self.out);
     }
 }
@@ -143,15 +143,15 @@ struct ForwardAndBackward<'a, T, Q> {
 }
 
 impl<T: Data, Q: Quantity> OnLanes<T> for ForwardAndBackward<'_, T, Q> {
-    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
+    fn run<R: Real<Data = T>>(mut self, posed: &PosedBody<R>) {
         let last = self.d_out.len() - 1;
         let mut d_out = memory::with_capacity(self.size);
         for k in 0..self.size {
             d_out.push(R::from_lanes(|lane| R::Scalar::read(self.d_out[lane.min(last)][k])));
         }
         let mut out = memory::filled(R::zero(), self.size);
-        let mut d_points = memory::filled([R::zero(); 3], scene.points.len());
-        self.quantity.forward_and_backward(scene, &d_out, &mut out, &mut d_points);
+        let mut d_points = memory::filled([R::zero(); 3], posed.points.len());
+        self.quantity.forward_and_backward(posed, &d_out, &mut out, &mut d_points);
         self.template.closing.backward(&mut d_points);
         R::write_rows(&out, &mut self.out);
         let d_vertices = &d_points[..self.template.mesh.num_vertices];
@@ -171,12 +171,12 @@ struct ForwardAndJacobian<'a, T, Q> {
 }
 
 impl<T: Data, Q: Terms> OnLanes<T> for ForwardAndJacobian<'_, T, Q> {
-    fn run<R: Real<Data = T>>(mut self, scene: &Scene<R>) {
+    fn run<R: Real<Data = T>>(mut self, posed: &PosedBody<R>) {
         let count = self.template.mesh.num_vertices;
         let mut out = memory::filled(R::zero(), self.size);
-        let mut d_first = memory::filled([R::zero(); 3], scene.points.len());
+        let mut d_first = memory::filled([R::zero(); 3], posed.points.len());
         let (mut d_pull, mut d_push) = (memory::filled(R::zero(), count), memory::filled(R::zero(), count));
-        self.quantity.forward_and_jacobian(scene, &mut out, &mut d_first, [&mut d_pull, &mut d_push]);
+        self.quantity.forward_and_jacobian(posed, &mut out, &mut d_first, [&mut d_pull, &mut d_push]);
         self.template.closing.backward(&mut d_first);
         R::write_rows(&out, &mut self.out);
         let mut start = 0;

@@ -179,7 +179,7 @@ struct Posed<'a> {
 
 impl<'a> Posed<'a> {
     fn new<T: Data>(collision: &'a Collision, vertices: &[T], level: Level) -> Self {
-        let origin = crate::scene::origin(std::array::from_fn(|k| vertices[k].value()));
+        let origin = crate::posed::origin(std::array::from_fn(|k| vertices[k].value()));
         let local = |vertex: &[T; 3]| [0, 1, 2].map(|k| vertex[k].value() - origin[k]);
         let points = memory::collect(vertices.as_chunks::<3>().0.iter().map(local));
         let boxes = collision.tree.boxes(&points);
@@ -191,7 +191,7 @@ impl<'a> Posed<'a> {
         let Posed { collision, points, boxes, level, .. } = self;
         let rounded = memory::collect(points.iter().map(|point| point.map(T::of)));
         let work = winding::AtVertices { tree: &collision.tree, boxes, points, rounded: &rounded };
-        T::enter(*level, T::widths(*level)[0], work)
+        T::run_on_lanes(*level, T::widths(*level)[0], work)
     }
 
     /// Whether a vertex with this winding number is inside another part.

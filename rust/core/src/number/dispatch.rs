@@ -19,7 +19,7 @@ impl Data for f32 {
         }
     }
 
-    fn enter<W: Work<f32>>(level: Level, width: usize, work: W) -> W::Output {
+    fn run_on_lanes<W: Work<f32>>(level: Level, width: usize, work: W) -> W::Output {
         level.expect_here();
         assert!(Self::widths(level).contains(&width), "{} has no {width} lanes", level.name());
         match (level, width) {
@@ -34,8 +34,8 @@ impl Data for f32 {
         }
     }
 
-    fn enter_registers<W: Work<f32>>(level: Level, work: W) -> W::Output {
-        Self::enter(level, Self::widths(level)[0], work)
+    fn run_on_registers<W: Work<f32>>(level: Level, work: W) -> W::Output {
+        Self::run_on_lanes(level, Self::widths(level)[0], work)
     }
 }
 
@@ -51,7 +51,7 @@ impl Data for f64 {
         &[1]
     }
 
-    fn enter<W: Work<f64>>(level: Level, _: usize, work: W) -> W::Output {
+    fn run_on_lanes<W: Work<f64>>(level: Level, _: usize, work: W) -> W::Output {
         level.expect_here();
         match level {
             Level::Scalar => work.run::<f64>(),
@@ -59,7 +59,7 @@ impl Data for f64 {
         }
     }
 
-    fn enter_registers<W: Work<f64>>(level: Level, work: W) -> W::Output {
+    fn run_on_registers<W: Work<f64>>(level: Level, work: W) -> W::Output {
         level.expect_here();
         match level {
             #[cfg(target_arch = "x86_64")]
@@ -93,12 +93,12 @@ mod tests {
         for (level, _) in Level::ALL {
             let widths = if level.is_here() { f32::widths(level) } else { &[] };
             for width in [0, 1, 2, 4, 8, 16, 32] {
-                let entered = catch_unwind(|| f32::enter(level, width, Nothing)).ok();
+                let entered = catch_unwind(|| f32::run_on_lanes(level, width, Nothing)).ok();
                 assert_eq!(entered, widths.contains(&width).then_some(width), "{level:?}, {width} lanes");
             }
-            assert_eq!(catch_unwind(|| f32::enter_registers(level, Nothing)).is_ok(), level.is_here());
-            assert_eq!(catch_unwind(|| f64::enter_registers(level, Nothing)).is_ok(), level.is_here());
-            assert_eq!(catch_unwind(|| f64::enter(level, 1, Nothing)).is_ok(), level.is_here());
+            assert_eq!(catch_unwind(|| f32::run_on_registers(level, Nothing)).is_ok(), level.is_here());
+            assert_eq!(catch_unwind(|| f64::run_on_registers(level, Nothing)).is_ok(), level.is_here());
+            assert_eq!(catch_unwind(|| f64::run_on_lanes(level, 1, Nothing)).is_ok(), level.is_here());
         }
     }
 }

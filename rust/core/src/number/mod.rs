@@ -28,4 +28,4 @@ pub mod vector;
 
 pub use dual::Dual;
 pub use fused::Fused;
-pub use real::{BLOCK, Data, Real, Room, SUMS, Scalar, WideScalar, Work, all_finite};
+pub use real::{BLOCK, Data, Kernel, Real, SUMS, Scalar, WideScalar, Work, all_finite};

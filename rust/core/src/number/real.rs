@@ -1,4 +1,4 @@
-//! The traits of numbers ([`Real`], [`Scalar`], [`Data`]) and of what is computed with them ([`Room`], [`Work`]).
+//! The traits of numbers ([`Real`], [`Scalar`], [`Data`]) and of what is computed with them ([`Kernel`], [`Work`]).
 
 use super::simd_level::Level;
 use std::mem::MaybeUninit;
@@ -17,11 +17,11 @@ pub trait Work<D> {
     fn run<R: Real<Data = D>>(self) -> Self::Output;
 }
 
-/// A function that is compiled once for each number, see [`Real::apart`].
-pub trait Room<Arguments> {
+/// A function that is compiled once for each number, see [`Real::dispatch`].
+pub trait Kernel<Arguments> {
     type Output;
     /// To be marked `#[inline(always)]`.
-    fn enter(arguments: Arguments) -> Self::Output;
+    fn run(arguments: Arguments) -> Self::Output;
 }
 
 /// A number, or one number for each lane.
@@ -79,8 +79,8 @@ pub trait Real:
     /// Enters `F` in a function of its own that may use the CPU's instructions for this number. Gates inline all that they
     /// lead to; a large room that many quantities enter is compiled once behind this door.
     #[inline(never)]
-    fn apart<F: Room<A>, A>(arguments: A) -> F::Output {
-        F::enter(arguments)
+    fn dispatch<F: Kernel<A>, A>(arguments: A) -> F::Output {
+        F::run(arguments)
     }
     fn lane(self, lane: usize) -> Self::Scalar;
     fn from_lanes(lane: impl FnMut(usize) -> Self::Scalar) -> Self;
@@ -160,10 +160,10 @@ pub trait Data: Scalar<Data = Self> {
     fn widths(level: Level) -> &'static [usize];
     /// Runs `work` on the number with `width` lanes, one of [`Data::widths`] of the level. Panics unless it is, and the CPU
     /// has the level: this is the only way to the lane types, whose operations rely on its instructions.
-    fn enter<W: Work<Self>>(level: Level, width: usize, work: W) -> W::Output;
+    fn run_on_lanes<W: Work<Self>>(level: Level, width: usize, work: W) -> W::Output;
     /// Runs `work` on the number with the most lanes that the level has in this format, for work on many numbers of one
     /// body. Panics unless the CPU has the level.
-    fn enter_registers<W: Work<Self>>(level: Level, work: W) -> W::Output;
+    fn run_on_registers<W: Work<Self>>(level: Level, work: W) -> W::Output;
 }
 
 /// See [`Real::read_rows`].

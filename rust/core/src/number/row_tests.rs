@@ -65,7 +65,7 @@ fn each_width(mut check: impl FnMut(Level, usize)) {
 fn a_lane_computes_as_one_number() {
     let alone = Operations.run::<Fused<f32>>();
     each_width(|level, width| {
-        for (i, (got, want)) in f32::enter(level, width, Operations).iter().zip(&alone).enumerate() {
+        for (i, (got, want)) in f32::run_on_lanes(level, width, Operations).iter().zip(&alone).enumerate() {
             assert_eq!(got, want, "{level:?}, {width} lanes, numbers {i}");
         }
     });
@@ -105,5 +105,5 @@ impl Work<f32> for Rows {
 
 #[test]
 fn rows_turn_into_lanes_and_back() {
-    each_width(|level, width| f32::enter(level, width, Rows));
+    each_width(|level, width| f32::run_on_lanes(level, width, Rows));
 }

@@ -17,7 +17,7 @@ use crate::options::{not_negative, positive};
 use crate::solid::Solid;
 use crate::threads;
 use contact::Shape;
-pub use world::Place;
+pub use world::Placement;
 
 /// How bodies are put on their ground and let go.
 pub struct Simulation {
@@ -39,7 +39,7 @@ pub struct Simulation {
 pub struct Motion {
     pub status: u32,
     /// Where it was let go, then one place a look; NaN for a body that is not simulated.
-    pub places: Vec<Place>,
+    pub places: Vec<Placement>,
 }
 
 impl Simulation {
@@ -57,7 +57,7 @@ impl Simulation {
     }
 
     fn unknown(&self, status: u32) -> Motion {
-        Motion { status, places: memory::filled(Place::nowhere(), 1 + self.looks.len()) }
+        Motion { status, places: memory::filled(Placement::nowhere(), 1 + self.looks.len()) }
     }
 
     /// Whatever the engine may do to one body, the others must not notice.
@@ -71,7 +71,7 @@ impl Simulation {
                 add_scaled(&mut centre, up, normal);
             }
             let fall = world::Fall { solid, normal, height, points: &points, friction: self.friction, step: self.step };
-            let mut places = vec![Place::at(centre)];
+            let mut places = vec![Placement::at(centre)];
             places.extend(fall.run(centre, &self.looks)?);
             Some(places)
         });

@@ -2,7 +2,7 @@
 
 use super::blend::{Registers, plus};
 use super::matrix::{add_outer, apply_transposed};
-use super::{Block, Body, Directions, Gradient, Pulls, Rigid, Skin, Start, Sums, Totals, Wanted, Wide};
+use super::{Block, Body, Directions, Gradient, Rigid, Skin, Start, Sums, Totals, VertexGradient, Wanted, Wide};
 use crate::number::vector::{Vec3, add, narrow, sub, widen};
 use crate::number::{Real, Scalar};
 
@@ -27,7 +27,7 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
         start: Start<C, W>,
         first: usize,
         block: &Block<V::Scalar, N>,
-        upstream: &impl Pulls<V, P>,
+        upstream: &impl VertexGradient<V, P>,
         sums: &mut Sums<V, P, N>,
     ) {
         let blends = sums.betas.len() + sums.expression.len() + sums.features.len() > 0;

@@ -120,7 +120,7 @@ pub struct Totals<R: Real> {
 type Wide<V> = <<V as Real>::Scalar as Real>::Wide;
 
 /// Tells the gradient by a body's vertices in a tile.
-pub trait Pulls<V, const P: usize> {
+pub trait VertexGradient<V, const P: usize> {
     fn of(&self, body: usize, tile: usize) -> Registers<V, P>;
 }
 

@@ -4,10 +4,10 @@
 
 use crate::memory;
 use crate::number::vector::{Vec3, add, narrow, sub, widen};
-use crate::number::{Data, Real, Room, SUMS};
+use crate::number::{Data, Kernel, Real, SUMS};
+use crate::posed::PosedBody;
 use crate::pressure::PressureCurve;
 use crate::sampling::{CHUNK, Chunk, Row, Walk, fold};
-use crate::scene::Scene;
 
 /// What the samples' numbers are interpolated from, and where each chunk of samples reaches.
 pub(super) struct Supports<R> {
@@ -52,24 +52,24 @@ pub(super) fn negligible<R: Real>() -> R {
 
 impl<R: Real> Supports<R> {
     #[inline(always)]
-    pub(super) fn new(scene: &Scene<R>, centre: Vec3<R::Wide>) -> Self {
-        let (heights, arms) = (scene.heights(), R::apart::<Arms, _>((scene, centre)));
-        let walk = &scene.template.samples.walk;
+    pub(super) fn new(posed: &PosedBody<R>, centre: Vec3<R::Wide>) -> Self {
+        let (heights, arms) = (posed.heights(), R::dispatch::<Arms, _>((posed, centre)));
+        let walk = &posed.template.samples.walk;
         let mut reaches = memory::with_capacity(walk.chunks.len());
         let mut rows = [[R::zero(); CHUNK]; 3];
         for chunk in &walk.chunks {
             walk.interpolate(chunk, &heights, &mut rows[0]);
             walk.interpolate(chunk, &arms[0], &mut rows[1]);
             walk.interpolate(chunk, &arms[1], &mut rows[2]);
-            reaches.push(R::apart::<Reaches, _>((&rows, chunk.len())));
+            reaches.push(R::dispatch::<Reaches, _>((&rows, chunk.len())));
         }
         Supports { heights, arms, reaches }
     }
 
     /// The same supports seen from another point, `by` further in the plane: arms are exact where they are short.
     #[inline(always)]
-    pub(super) fn seen_from(&self, scene: &Scene<R>, centre: Vec3<R::Wide>, by: [R::Wide; 2]) -> Self {
-        let arms = R::apart::<Arms, _>((scene, add(centre, scene.plane.raise(by))));
+    pub(super) fn seen_from(&self, posed: &PosedBody<R>, centre: Vec3<R::Wide>, by: [R::Wide; 2]) -> Self {
+        let arms = R::dispatch::<Arms, _>((posed, add(centre, posed.plane.raise(by))));
         let by = [R::narrow(by[0]), R::narrow(by[1])];
         let mut reaches = memory::with_capacity(self.reaches.len());
         for &Reach { lowest, arms: [x, y], first } in &self.reaches {
@@ -86,13 +86,13 @@ impl<R: Real> Supports<R> {
 /// Arms of the vertices from a point. The point's rounding is taken off, too: a shift of all arms moves λ.
 pub(super) struct Arms;
 
-impl<R: Real> Room<(&Scene<'_, R>, Vec3<R::Wide>)> for Arms {
+impl<R: Real> Kernel<(&PosedBody<'_, R>, Vec3<R::Wide>)> for Arms {
     type Output = [Vec<R>; 2];
 
     #[inline(always)]
-    fn enter((scene, from): (&Scene<R>, Vec3<R::Wide>)) -> [Vec<R>; 2] {
-        let vertices = &scene.points[..scene.template.mesh.num_vertices];
-        let plane = scene.narrow_plane();
+    fn run((posed, from): (&PosedBody<R>, Vec3<R::Wide>)) -> [Vec<R>; 2] {
+        let vertices = &posed.points[..posed.template.mesh.num_vertices];
+        let plane = posed.narrow_plane();
         let near = narrow::<R>(from);
         let rest = narrow::<R>(sub(from, widen(near)));
         let mut arms = [memory::filled(R::zero(), vertices.len()), memory::filled(R::zero(), vertices.len())];
@@ -107,11 +107,11 @@ impl<R: Real> Room<(&Scene<'_, R>, Vec3<R::Wide>)> for Arms {
 /// The reach of a chunk from its rows of heights and arms.
 pub(super) struct Reaches;
 
-impl<R: Real> Room<(&[Row<R>; 3], usize)> for Reaches {
+impl<R: Real> Kernel<(&[Row<R>; 3], usize)> for Reaches {
     type Output = Reach<R>;
 
     #[inline(always)]
-    fn enter(([heights, x, y], len): (&[Row<R>; 3], usize)) -> Reach<R> {
+    fn run(([heights, x, y], len): (&[Row<R>; 3], usize)) -> Reach<R> {
         let (lowest, _) = range(heights, len);
         let (x_least, x_most) = range(x, len);
         let (y_least, y_most) = range(y, len);
@@ -195,11 +195,11 @@ pub(super) fn factor<R: Real>(fall: R, height: R) -> R {
 /// negative `idle` do not need it and make no chunk worth a visit.
 pub(super) struct Weigh;
 
-impl<R: Real> Room<(&Supports<R>, &Walk, &PressureCurve, Exponent<R>, R)> for Weigh {
+impl<R: Real> Kernel<(&Supports<R>, &Walk, &PressureCurve, Exponent<R>, R)> for Weigh {
     type Output = (Load<R>, [R::Wide; 5]);
 
     #[inline(always)]
-    fn enter(
+    fn run(
         (supports, walk, curve, exponent, idle): (&Supports<R>, &Walk, &PressureCurve, Exponent<R>, R),
     ) -> (Load<R>, [R::Wide; 5]) {
         let mut top = exponent.high(&supports.reaches);
@@ -211,7 +211,7 @@ impl<R: Real> Room<(&Supports<R>, &Walk, &PressureCurve, Exponent<R>, R)> for We
                 continue;
             }
             read(supports, walk, chunk, &mut rows);
-            R::apart::<WeighChunk, _>((curve, exponent, chunk.len(), clearance, &mut rows, &mut top, &mut sums));
+            R::dispatch::<WeighChunk, _>((curve, exponent, chunk.len(), clearance, &mut rows, &mut top, &mut sums));
         }
         let [total, x, y, xx, xy, yy] = sums;
         (Load { top, total }, [x, y, xx, xy, yy])
@@ -239,11 +239,11 @@ pub(super) struct WeighChunk;
 pub(super) type ChunkToWeigh<'a, R> =
     (&'a PressureCurve, Exponent<R>, usize, R, &'a mut [Row<R>; 4], &'a mut R, &'a mut [<R as Real>::Wide; 6]);
 
-impl<R: Real> Room<ChunkToWeigh<'_, R>> for WeighChunk {
+impl<R: Real> Kernel<ChunkToWeigh<'_, R>> for WeighChunk {
     type Output = ();
 
     #[inline(always)]
-    fn enter((curve, exponent, len, clearance, rows, top, sums): ChunkToWeigh<'_, R>) {
+    fn run((curve, exponent, len, clearance, rows, top, sums): ChunkToWeigh<'_, R>) {
         let [heights, x, y, exponents] = rows;
         for (((height, x), y), own) in heights.iter().zip(&mut *x).zip(&mut *y).zip(&mut *exponents) {
             *x = *x - exponent.anchor[0];

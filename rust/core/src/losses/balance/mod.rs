@@ -14,12 +14,12 @@ use crate::error::{Result, unknown_choice};
 use crate::mass::{Centre, Method};
 use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, narrow, scale};
-use crate::number::{Real, Room};
+use crate::number::{Kernel, Real};
 use crate::options::positive;
+use crate::posed::PosedBody;
 use crate::pressure::PressureCurve;
 use crate::quantity::Quantity;
 use crate::sampling::{CHUNK, Row};
-use crate::scene::Scene;
 use crate::template::Template;
 use loads::{Exponent, Reach, Weigh, all_lanes, factor, negligible, read};
 use newton::{Solution, Solve};
@@ -73,8 +73,8 @@ pub struct Balance<R: Real> {
 
 impl BalanceCost {
     /// The forward about a centre of mass that is known already.
-    pub fn forward_about<R: Real>(&self, scene: &Scene<R>, centre: Centre<R>, out: &mut [R]) -> Balance<R> {
-        let solution = R::apart::<Solve, _>((&self.curve, self.sigma, scene, centre.point));
+    pub fn forward_about<R: Real>(&self, posed: &PosedBody<R>, centre: Centre<R>, out: &mut [R]) -> Balance<R> {
+        let solution = R::dispatch::<Solve, _>((&self.curve, self.sigma, posed, centre.point));
         out[0] = R::narrow(self.wrap.value_and_slope(solution.cost).0);
         Balance { centre, solution }
     }
@@ -83,7 +83,7 @@ impl BalanceCost {
 impl Quantity for BalanceCost {
     type Saved<R: Real> = Balance<R>;
 
-    fn len(&self, _: &Template) -> usize {
+    fn num_outputs(&self, _: &Template) -> usize {
         1
     }
 
@@ -92,33 +92,33 @@ impl Quantity for BalanceCost {
         positive("sigma", self.sigma)
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Balance<R> {
-        self.forward_about(scene, self.method.forward(scene), out)
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Balance<R> {
+        self.forward_about(posed, self.method.forward(posed), out)
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Balance<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        R::apart::<Backward, _>((self, scene, saved, d_out[0], d_points));
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Balance<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+        R::dispatch::<Backward, _>((self, posed, saved, d_out[0], d_points));
     }
 }
 
 /// The backward of the cost. Its supports are seen from the loaded mean, so that the weights are exact.
 struct Backward;
 
-impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>, &Balance<R>, R, &mut [Vec3<R>])> for Backward {
+impl<R: Real> Kernel<(&BalanceCost, &PosedBody<'_, R>, &Balance<R>, R, &mut [Vec3<R>])> for Backward {
     type Output = ();
 
     #[inline(always)]
-    fn enter((of, scene, saved, d_out, d_points): (&BalanceCost, &Scene<R>, &Balance<R>, R, &mut [Vec3<R>])) {
+    fn run((of, posed, saved, d_out, d_points): (&BalanceCost, &PosedBody<R>, &Balance<R>, R, &mut [Vec3<R>])) {
         let Balance { centre, solution: Solution { supports, still, lambda, mean, cost } } = saved;
         let d_cost = d_out.widen() * of.wrap.value_and_slope(*cost).1;
-        let pull = scene.plane.raise([d_cost * lambda[0], d_cost * lambda[1]]);
-        of.method.backward(scene, centre, pull, d_points);
+        let pull = posed.plane.raise([d_cost * lambda[0], d_cost * lambda[1]]);
+        of.method.backward(posed, centre, pull, d_points);
 
-        let walk = &scene.template.samples.walk;
+        let walk = &posed.template.samples.walk;
         let (curve, here) = (&of.curve, [R::zero(); 2]);
-        let supports = supports.seen_from(scene, centre.point, *mean);
+        let supports = supports.seen_from(posed, centre.point, *mean);
         let exponent = Exponent::new(curve, *lambda, here);
-        let (load, _) = R::apart::<Weigh, _>((&supports, walk, curve, exponent, R::zero()));
+        let (load, _) = R::dispatch::<Weigh, _>((&supports, walk, curve, exponent, R::zero()));
         let spread = Side { exponent, top: load.top, share: R::narrow(R::Wide::of(1.0) / load.total) };
         let exponent = Exponent::new(curve, [R::Wide::zero(); 2], here);
         let still = Side { exponent, top: still.top, share: R::narrow(R::Wide::of(1.0) / still.total) };
@@ -132,12 +132,12 @@ impl<R: Real> Room<(&BalanceCost, &Scene<'_, R>, &Balance<R>, R, &mut [Vec3<R>])
                 continue;
             }
             read(&supports, walk, chunk, &mut rows);
-            R::apart::<Shares, _>((curve, &spread, &still, clearances, &mut rows));
+            R::dispatch::<Shares, _>((curve, &spread, &still, clearances, &mut rows));
             walk.scatter(chunk, &rows[0], &mut d_arms);
             walk.scatter(chunk, &rows[1], &mut d_heights);
         }
         let (pull, d_cost) = (narrow::<R>(pull), R::narrow(d_cost));
-        let up = scale(-d_cost, scene.narrow_ground().normal);
+        let up = scale(-d_cost, posed.narrow_ground().normal);
         for ((d_point, &weight), &d_height) in d_points.iter_mut().zip(&d_arms).zip(&d_heights) {
             add_scaled(d_point, -weight, pull);
             add_scaled(d_point, d_height, up);
@@ -170,11 +170,11 @@ impl<R: Real> Side<R> {
 /// From heights and arms to w and, in the second row, (w − p) d log ρ/dh.
 struct Shares;
 
-impl<R: Real> Room<(&PressureCurve, &Side<R>, &Side<R>, [R; 2], &mut [Row<R>; 4])> for Shares {
+impl<R: Real> Kernel<(&PressureCurve, &Side<R>, &Side<R>, [R; 2], &mut [Row<R>; 4])> for Shares {
     type Output = ();
 
     #[inline(always)]
-    fn enter((curve, spread, still, clearances, rows): (&PressureCurve, &Side<R>, &Side<R>, [R; 2], &mut [Row<R>; 4])) {
+    fn run((curve, spread, still, clearances, rows): (&PressureCurve, &Side<R>, &Side<R>, [R; 2], &mut [Row<R>; 4])) {
         let [heights, x, y, _] = rows;
         let slopes = [R::of(-curve.alpha), R::of(-curve.gamma)];
         for ((height, x), y) in heights.iter_mut().zip(x).zip(y) {

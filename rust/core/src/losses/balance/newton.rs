@@ -2,10 +2,10 @@
 
 use super::loads::{Exponent, Load, Supports, Weigh};
 use crate::number::vector::Vec3;
-use crate::number::{Data, Real, Room};
+use crate::number::{Data, Kernel, Real};
+use crate::posed::PosedBody;
 use crate::pressure::PressureCurve;
 use crate::sampling::Walk;
-use crate::scene::Scene;
 
 /// The solved problem.
 pub(super) struct Solution<R: Real> {
@@ -49,7 +49,7 @@ fn objective<R: Real>(
     idle: R,
 ) -> (Objective<R::Wide>, Load<R>) {
     let exponent = Exponent::new(curve, lambda, anchor);
-    let (load, sums) = R::apart::<Weigh, _>((supports, walk, curve, exponent, idle));
+    let (load, sums) = R::dispatch::<Weigh, _>((supports, walk, curve, exponent, idle));
     let inverse = R::Wide::of(1.0) / load.total;
     let [x, y] = [sums[0] * inverse, sums[1] * inverse];
     let [xx, xy, yy] = [sums[2] * inverse, sums[3] * inverse, sums[4] * inverse];
@@ -71,13 +71,13 @@ fn objective<R: Real>(
 /// derivative of λ. Arms are taken from the mean of the last step, for exponents are exact where they are short.
 pub(super) struct Solve;
 
-impl<R: Real> Room<(&PressureCurve, f64, &Scene<'_, R>, Vec3<R::Wide>)> for Solve {
+impl<R: Real> Kernel<(&PressureCurve, f64, &PosedBody<'_, R>, Vec3<R::Wide>)> for Solve {
     type Output = Solution<R>;
 
     #[inline(always)]
-    fn enter((curve, sigma, scene, centre): (&PressureCurve, f64, &Scene<R>, Vec3<R::Wide>)) -> Solution<R> {
-        let supports = Supports::new(scene, centre);
-        let walk = &scene.template.samples.walk;
+    fn run((curve, sigma, posed, centre): (&PressureCurve, f64, &PosedBody<R>, Vec3<R::Wide>)) -> Solution<R> {
+        let supports = Supports::new(posed, centre);
+        let walk = &posed.template.samples.walk;
         let one = R::Wide::of(1.0);
         let epsilon = (8.0 * R::Data::EPSILON).max(1e-13);
         let mut lambda = [R::Wide::zero(); 2];

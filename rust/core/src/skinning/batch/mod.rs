@@ -14,14 +14,14 @@ use crate::skinning::{Body, Gradient, Parameters, Skin, Start, Wanted};
 use crate::threads::{self, num_threads};
 pub use arguments::{Bodies, Gradients, Rows, TILE, Upstream};
 use arguments::{check, check_direction, check_rows, front, fronts, gradient_widths, read, rows, triple, used};
-use passes::{Backward, Forward, Place, Shape, run};
+use passes::{Backward, Forward, PlaceJoints, Shape, run};
 use std::ops::Range;
 
 /// Bodies that share a pass over the model's tables.
 const GROUP: usize = 16;
 
 /// Bodies of one model in their poses.
-pub struct Posing<'a, T> {
+pub struct PosedBatch<'a, T> {
     skin: &'a Skin<T, TILE>,
     num_bodies: usize,
     form: Form,
@@ -33,7 +33,7 @@ pub struct Posing<'a, T> {
     interrupted: &'a (dyn Fn() -> bool + Sync + 'a),
 }
 
-impl<'a, T: Data> Posing<'a, T> {
+impl<'a, T: Data> PosedBatch<'a, T> {
     pub fn new(
         skin: &'a Skin<T, TILE>,
         num_bodies: usize,
@@ -44,12 +44,12 @@ impl<'a, T: Data> Posing<'a, T> {
         let level = Level::current()?;
         let form = Form::of_width(bodies.pose.width / skin.num_joints()).expect("checked");
         let used = [bodies.betas, bodies.expression].map(used);
-        Ok(Posing { skin, num_bodies, form, level, bodies, used, interrupted })
+        Ok(PosedBatch { skin, num_bodies, form, level, bodies, used, interrupted })
     }
 
     /// Vertices (B, V, 3) and joints (B, J, 3).
     pub fn forward(&self, vertices: &mut [T], joints: &mut [T]) -> Result<()> {
-        memory::guarded(|| T::enter_registers(self.level, Pose { posing: self, vertices, joints }))
+        memory::guarded(|| T::run_on_registers(self.level, ForwardWork { batch: self, vertices, joints }))
     }
 
     /// Their derivatives along a direction.
@@ -63,7 +63,7 @@ impl<'a, T: Data> Posing<'a, T> {
 
     /// The gradient of Σ d_vertices · vertices + Σ d_joints · joints.
     pub fn vjp(&self, upstream: Upstream<T>, gradients: Gradients<T>) -> Result<()> {
-        memory::guarded(|| T::enter_registers(self.level, Pull { posing: self, upstream, gradients }))
+        memory::guarded(|| T::run_on_registers(self.level, BackwardWork { batch: self, upstream, gradients }))
     }
 
     /// The derivative of that gradient along a direction.
@@ -74,7 +74,7 @@ impl<'a, T: Data> Posing<'a, T> {
         memory::guarded(|| self.pull::<Dual>(self.skin.start(), parameters, constant, number, upstream, gradients))
     }
 
-    /// Numbers of [`Posing::jacobian`] a body.
+    /// Numbers of [`PosedBatch::jacobian`] a body.
     pub fn jacobian_width(&self) -> usize {
         let parameters = 3 * self.skin.num_joints() + self.bodies.betas.width;
         parameters * (self.skin.num_vertices + self.skin.num_joints()) * 3
@@ -122,7 +122,7 @@ impl<'a, T: Data> Posing<'a, T> {
         });
         self.run(groups, |(bodies, vertices, joints)| {
             let bodies: Vec<_> =
-                bodies.map(|body| V::Scalar::apart::<Place, _>((self.skin, parameters(body)))).collect();
+                bodies.map(|body| V::Scalar::dispatch::<PlaceJoints, _>((self.skin, parameters(body)))).collect();
             let places = bodies.iter().flat_map(Body::joints).flatten();
             joints.iter_mut().zip(places).for_each(|(out, x)| *out = number(x));
             run::<V, _>(Forward { skin: self.skin, start, bodies: &bodies, vertices, number });
@@ -151,14 +151,16 @@ impl<'a, T: Data> Posing<'a, T> {
             (bodies, gradients)
         });
         self.run(groups, |(range, mut gradients)| {
-            let bodies: Vec<_> =
-                range.clone().map(|body| V::Scalar::apart::<Place, _>((self.skin, parameters(body)))).collect();
+            let bodies: Vec<_> = range
+                .clone()
+                .map(|body| V::Scalar::dispatch::<PlaceJoints, _>((self.skin, parameters(body))))
+                .collect();
             let d_vertices = rows(upstream.vertices, range.clone(), points);
             let d_joints = rows(upstream.joints, range, count);
-            let hand_out = |i: usize, body: &Body<V::Scalar>, gradient: Gradient<V::Scalar>| {
+            let write_gradient = |i: usize, body: &Body<V::Scalar>, gradient: Gradient<V::Scalar>| {
                 let finite =
                     || all_finite(rows(d_vertices, i..i + 1, points)) && all_finite(rows(d_joints, i..i + 1, count));
-                hand_out(body, &gradient, fronts(&mut gradients, widths), number, finite);
+                write_gradient(body, &gradient, fronts(&mut gradients, widths), number, finite);
             };
             run::<V, _>(Backward {
                 skin: self.skin,
@@ -168,7 +170,7 @@ impl<'a, T: Data> Posing<'a, T> {
                 d_joints,
                 constant,
                 wanted,
-                take: hand_out,
+                take: write_gradient,
             });
         })
     }
@@ -230,42 +232,42 @@ impl<'a, T: Data> Posing<'a, T> {
     }
 }
 
-struct Pose<'a, T> {
-    posing: &'a Posing<'a, T>,
+struct ForwardWork<'a, T> {
+    batch: &'a PosedBatch<'a, T>,
     vertices: &'a mut [T],
     joints: &'a mut [T],
 }
 
-impl<T: Data> Work<T> for Pose<'_, T> {
+impl<T: Data> Work<T> for ForwardWork<'_, T> {
     type Output = Result<()>;
 
     fn run<V: Real<Data = T>>(self) -> Result<()> {
-        let Pose { posing, vertices, joints } = self;
-        let shaped = posing.shaped::<V>();
-        let parameters = |body| posing.parameters::<V::Scalar>(body);
-        posing.write::<V>(posing.start(&shaped), parameters, Scalar::data, vertices, joints)
+        let ForwardWork { batch, vertices, joints } = self;
+        let shaped = batch.shaped::<V>();
+        let parameters = |body| batch.parameters::<V::Scalar>(body);
+        batch.write::<V>(batch.start(&shaped), parameters, Scalar::data, vertices, joints)
     }
 }
 
-struct Pull<'a, 'b, T> {
-    posing: &'a Posing<'a, T>,
+struct BackwardWork<'a, 'b, T> {
+    batch: &'a PosedBatch<'a, T>,
     upstream: Upstream<'a, T>,
     gradients: Gradients<'b, T>,
 }
 
-impl<T: Data> Work<T> for Pull<'_, '_, T> {
+impl<T: Data> Work<T> for BackwardWork<'_, '_, T> {
     type Output = Result<()>;
 
     fn run<V: Real<Data = T>>(self) -> Result<()> {
-        let Pull { posing, upstream, gradients } = self;
-        let shaped = posing.shaped::<V>();
-        let parameters = |body| posing.parameters::<V::Scalar>(body);
-        posing.pull::<V>(posing.start(&shaped), parameters, V::Scalar::read, Scalar::data, upstream, gradients)
+        let BackwardWork { batch, upstream, gradients } = self;
+        let shaped = batch.shaped::<V>();
+        let parameters = |body| batch.parameters::<V::Scalar>(body);
+        batch.pull::<V>(batch.start(&shaped), parameters, V::Scalar::read, Scalar::data, upstream, gradients)
     }
 }
 
 /// Writes one body's gradient: zero for a body that is not finite, unless the upstream gradient is to blame.
-fn hand_out<R: Scalar, T: Scalar>(
+fn write_gradient<R: Scalar, T: Scalar>(
     body: &Body<R>,
     gradient: &Gradient<R>,
     outs: Gradients<T>,
