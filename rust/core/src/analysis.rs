@@ -33,7 +33,7 @@ pub struct Analysis {
 /// The corners of a base of support, see [`BaseOfSupport::polygon`].
 pub type Polygon = Vec<Vec3<f64>>;
 
-/// Where the figures lie in a body's row: single numbers first, then points, then the solid, then the parts' volumes.
+/// The first column of each result in a body's row: single numbers, then points, then the solid, then the parts' volumes.
 mod at {
     use crate::mass_properties::MassProperties;
 
@@ -45,8 +45,8 @@ mod at {
     pub const PRESSURE_SUM: usize = 5;
     pub const PRESSURE_MAX: usize = 6;
     pub const STABILITY: usize = 7;
-    /// Pull and push.
-    pub const GROUND: usize = 8;
+    pub const PULL: usize = 8;
+    pub const PUSH: usize = 9;
     pub const BALANCE: usize = 10;
     pub const CENTER_OF_MASS: usize = 11;
     pub const CENTER_OF_MASS_EXACT: usize = 14;
@@ -54,6 +54,29 @@ mod at {
     pub const SOLID: usize = 20;
     pub const PART_VOLUMES: usize = SOLID + MassProperties::ROW;
 }
+
+/// Name and first column of each result in a body's row. Points take three columns, the inertia nine (row by row), the
+/// parts' volumes one per part, all others one.
+pub const COLUMNS: [(&str, usize); 18] = [
+    ("status", at::STATUS),
+    ("num_contacts", at::NUM_CONTACTS),
+    ("area", at::AREA),
+    ("margin", at::MARGIN),
+    ("lowest", at::LOWEST),
+    ("pressure_sum", at::PRESSURE_SUM),
+    ("pressure_max", at::PRESSURE_MAX),
+    ("stability", at::STABILITY),
+    ("pull", at::PULL),
+    ("push", at::PUSH),
+    ("balance", at::BALANCE),
+    ("center_of_mass", at::CENTER_OF_MASS),
+    ("center_of_mass_exact", at::CENTER_OF_MASS_EXACT),
+    ("center_of_pressure", at::CENTER_OF_PRESSURE),
+    ("volume", at::SOLID + MassProperties::VOLUME),
+    ("mass", at::SOLID + MassProperties::MASS),
+    ("inertia", at::SOLID + MassProperties::INERTIA),
+    ("part_volumes", at::PART_VOLUMES),
+];
 
 /// What a look at all samples finds.
 struct SampleResults<R: Real> {
@@ -106,7 +129,7 @@ impl Analysis {
     pub fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Vec<Polygon> {
         let heights = posed.heights();
         out[at::LOWEST] = posed::lowest(&heights);
-        let samples = self.pass_over_samples(posed, &heights, &mut out[at::GROUND..at::BALANCE]);
+        let samples = self.pass_over_samples(posed, &heights, &mut out[at::PULL..at::BALANCE]);
         out[at::PRESSURE_SUM] = samples.pressure_sum;
         out[at::PRESSURE_MAX] = samples.pressure_max;
 

@@ -18,7 +18,13 @@ pub struct MassProperties {
 }
 
 impl MassProperties {
+    /// Numbers per solid.
     pub const ROW: usize = 14;
+    /// Where a solid's row has its volume, mass, centre and inertia.
+    pub const VOLUME: usize = 0;
+    pub const MASS: usize = 1;
+    pub const CENTER: usize = 2;
+    pub const INERTIA: usize = 5;
 
     /// An error unless there is one positive number, or one for each part.
     pub fn check_densities(&self, num_parts: usize) -> Result<()> {
@@ -45,12 +51,12 @@ fn row<W: Real>(volume: W, weighted: &Moments<W>, origin: Vec3<W>, out: &mut [W]
         *value = *value - mass * centre[i] * centre[j];
     }
     let [xx, yy, zz, xy, xz, yz] = spread;
-    out[0] = volume;
-    out[1] = mass;
+    out[MassProperties::VOLUME] = volume;
+    out[MassProperties::MASS] = mass;
     for k in 0..3 {
-        out[2 + k] = centre[k] + origin[k];
+        out[MassProperties::CENTER + k] = centre[k] + origin[k];
     }
-    out[5..14].copy_from_slice(&[yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy]);
+    out[MassProperties::INERTIA..].copy_from_slice(&[yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy]);
 }
 
 /// The gradient of [`row`] by the weighted moments.
