@@ -192,12 +192,13 @@ def _analyze(
     )
     corners = corners.astype(rows.dtype, copy=False)
     value = _Figures(bodies, rows)
-    finite = ~np.isnan(rows[:, _STATUS])
-    margin = value(_MARGIN)
-    num_contacts = bodies.unfold(np.where(finite, rows[:, _NUM_CONTACTS], 0).astype(np.int64))
+    status, contacts = (rows[:, _core.ANALYSIS_COLUMNS[name]] for name in ("status", "num_contacts"))
+    finite = ~np.isnan(status)
+    margin = value("margin")
+    num_contacts = bodies.unfold(np.where(finite, contacts, 0).astype(np.int64))
     support = BaseOfSupport(
         polygon=nest(of_each(corners, counts), bodies.shape),
-        area=value(_AREA),
+        area=value("area"),
         margin=margin,
         inside=margin >= 0.0,
         has_contact=num_contacts > 0,
@@ -209,30 +210,25 @@ def _analyze(
         preset=constants.name,
         part_names=template.part_names,
         com_method=com_method,
-        status=bodies.unfold(np.where(finite, rows[:, _STATUS], Status.NON_FINITE).astype(np.int64)),
-        part_volumes=value(_PART_VOLUMES, template.num_parts),
-        volume=value(_SOLID),
-        mass=value(_SOLID + 1),
-        inertia=value(_SOLID + 5, 3, 3),
-        center_of_mass=value(_CENTER_OF_MASS, 3),
-        center_of_mass_exact=value(_CENTER_OF_MASS_EXACT, 3),
+        status=bodies.unfold(np.where(finite, status, Status.NON_FINITE).astype(np.int64)),
+        part_volumes=value("part_volumes", template.num_parts),
+        volume=value("volume"),
+        mass=value("mass"),
+        inertia=value("inertia", 3, 3),
+        center_of_mass=value("center_of_mass", 3),
+        center_of_mass_exact=value("center_of_mass_exact", 3),
         pressure=pressure(vertices, template, ground, **curve) if with_pressure else None,
-        pressure_sum=value(_PRESSURE_SUM),
-        pressure_max=value(_PRESSURE_MAX),
-        center_of_pressure=value(_CENTER_OF_PRESSURE, 3),
+        pressure_sum=value("pressure_sum"),
+        pressure_max=value("pressure_max"),
+        center_of_pressure=value("center_of_pressure", 3),
         base_of_support=support,
         bose=support.inside,
-        stability=value(_STABILITY),
-        pull=value(_GROUND),
-        push=value(_GROUND + 1),
-        balance=value(_BALANCE),
-        lowest=value(_LOWEST),
+        stability=value("stability"),
+        pull=value("pull"),
+        push=value("push"),
+        balance=value("balance"),
+        lowest=value("lowest"),
     )
-
-
-# Where the core's rows have each figure: rust/core/src/analysis.rs.
-_STATUS, _NUM_CONTACTS, _AREA, _MARGIN, _LOWEST, _PRESSURE_SUM, _PRESSURE_MAX, _STABILITY, _GROUND = range(9)
-_BALANCE, _CENTER_OF_MASS, _CENTER_OF_MASS_EXACT, _CENTER_OF_PRESSURE, _SOLID, _PART_VOLUMES = 10, 11, 14, 17, 20, 34
 
 
 @dataclass(frozen=True)
@@ -242,7 +238,8 @@ class _Figures:
     bodies: Bodies
     rows: NDArray[Any]
 
-    def __call__(self, start: int, *shape: int) -> Any:
+    def __call__(self, name: str, *shape: int) -> Any:
+        start = _core.ANALYSIS_COLUMNS[name]
         size = int(np.prod(shape, dtype=int))
         return self.bodies.unfold(self.rows[:, start : start + size].copy(), *shape)
 

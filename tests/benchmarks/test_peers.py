@@ -135,8 +135,8 @@ def test_page(tmp_path, monkeypatch):
     assert (tmp_path / "performance.svg").read_text().startswith("<?xml")
 
 
-def test_widths_flag_a_room_out_of_line():
-    times = {room: {"scalar": 1000.0, "avx512": 100.0} for room in ("volume", "mass", "ground")}
+def test_widths_flag_a_quantity_out_of_line():
+    times = {name: {"scalar": 1000.0, "avx512": 100.0} for name in ("volume", "mass", "ground")}
     times["pressure"] = {"scalar": 1000.0, "avx512": 125.0}
     lines, flagged = widths.table(times, ["scalar", "avx512"], batch=1)
     assert flagged == ["pressure"]

@@ -223,7 +223,8 @@ def speed(what: str, positions: Array, seconds: Array | None) -> list[Finding]:
     """Whether people at positions (T, 3) m move as people do; `seconds` (T,) where they are known."""
     if seconds is None or len(positions) < 2 or len(positions) != len(seconds):
         return []
-    moved = np.linalg.norm(np.diff(np.asarray(positions, np.float64), axis=0), axis=-1) / np.diff(seconds)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # steps that are not finite are left out
+        moved = np.linalg.norm(np.diff(np.asarray(positions, np.float64), axis=0), axis=-1) / np.diff(seconds)
     usual = float(np.median(moved[np.isfinite(moved)])) if np.isfinite(moved).any() else 0.0
     if usual <= USUAL_SPEED:
         return []

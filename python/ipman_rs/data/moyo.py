@@ -353,8 +353,10 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
     numbers = np.array(
         [[_cell(row, column, f"{path}: row {number}") for column in columns] for number, row in enumerate(table)]
     )
-    maps = np.rint(numbers[:, 0] * rate)
-    if not np.isfinite(maps).all() or (np.diff(maps) != 1).any():
+    with np.errstate(over="ignore", invalid="ignore"):  # refused below
+        maps = np.rint(numbers[:, 0] * rate)
+        steps = np.diff(maps)
+    if not np.isfinite(maps).all() or (steps != 1).any():
         raise ValueError(f"{path}: time: expected steps of 1/{rate:g} s, without a gap")
     return Trace(maps.astype(np.int64), numbers[:, 1], numbers[:, 2:] / 1000, rate)
 

@@ -5,10 +5,10 @@
 use ipman::losses::ground::{GroundLoss, Tanh};
 use ipman::losses::stability::StabilityLoss;
 use ipman::mass::{CenterOfMass, Method};
+use ipman::mass_properties::MassProperties;
+use ipman::points::Points;
 use ipman::pressure::{CenterOfPressure, PressureCurve};
-use ipman::sampling::Points;
 use ipman::support::{Contact, ContactRule};
-use ipman::volume::MassProperties;
 use ipman::{Batch, Template};
 use std::error::Error;
 

@@ -6,16 +6,19 @@ use crate::losses::balance::{BalanceCost, Wrap};
 use crate::losses::ground::{GroundLoss, Tanh};
 use crate::losses::stability::distance_on_ground;
 use crate::mass::{Centre, Method};
+use crate::mass_properties::MassProperties;
 use crate::memory;
+use crate::moments::part_moments;
 use crate::number::vector::{Vec3, sub};
 use crate::number::{Real, Scalar};
+use crate::points::Points;
+use crate::posed::{self, PosedBody};
 use crate::pressure::{CenterOfPressure, Cop, LoadSums, PressureCurve};
 use crate::quantity::Quantity;
-use crate::sampling::{CHUNK, Points};
-use crate::scene::{self, Scene};
+use crate::sampling::CHUNK;
 use crate::support::{BaseOfSupport, Contact, ContactRule};
 use crate::template::Template;
-use crate::volume::{MassProperties, PartVolumes, part_moments};
+use crate::volume::PartVolumes;
 
 /// The constants of all figures.
 pub struct Analysis {
@@ -30,9 +33,9 @@ pub struct Analysis {
 /// The corners of a base of support, see [`BaseOfSupport::polygon`].
 pub type Polygon = Vec<Vec3<f64>>;
 
-/// Where the figures lie in a body's row: single numbers first, then points, then the solid, then the parts' volumes.
+/// The first column of each result in a body's row: single numbers, then points, then the solid, then the parts' volumes.
 mod at {
-    use crate::volume::MassProperties;
+    use crate::mass_properties::MassProperties;
 
     pub const STATUS: usize = 0;
     pub const NUM_CONTACTS: usize = 1;
@@ -42,8 +45,8 @@ mod at {
     pub const PRESSURE_SUM: usize = 5;
     pub const PRESSURE_MAX: usize = 6;
     pub const STABILITY: usize = 7;
-    /// Pull and push.
-    pub const GROUND: usize = 8;
+    pub const PULL: usize = 8;
+    pub const PUSH: usize = 9;
     pub const BALANCE: usize = 10;
     pub const CENTER_OF_MASS: usize = 11;
     pub const CENTER_OF_MASS_EXACT: usize = 14;
@@ -52,8 +55,31 @@ mod at {
     pub const PART_VOLUMES: usize = SOLID + MassProperties::ROW;
 }
 
+/// Name and first column of each result in a body's row. Points take three columns, the inertia nine (row by row), the
+/// parts' volumes one per part, all others one.
+pub const COLUMNS: [(&str, usize); 18] = [
+    ("status", at::STATUS),
+    ("num_contacts", at::NUM_CONTACTS),
+    ("area", at::AREA),
+    ("margin", at::MARGIN),
+    ("lowest", at::LOWEST),
+    ("pressure_sum", at::PRESSURE_SUM),
+    ("pressure_max", at::PRESSURE_MAX),
+    ("stability", at::STABILITY),
+    ("pull", at::PULL),
+    ("push", at::PUSH),
+    ("balance", at::BALANCE),
+    ("center_of_mass", at::CENTER_OF_MASS),
+    ("center_of_mass_exact", at::CENTER_OF_MASS_EXACT),
+    ("center_of_pressure", at::CENTER_OF_PRESSURE),
+    ("volume", at::SOLID + MassProperties::VOLUME),
+    ("mass", at::SOLID + MassProperties::MASS),
+    ("inertia", at::SOLID + MassProperties::INERTIA),
+    ("part_volumes", at::PART_VOLUMES),
+];
+
 /// What a look at all samples finds.
-struct Looked<R: Real> {
+struct SampleResults<R: Real> {
     cop: Cop<R>,
     pressure_sum: R,
     pressure_max: R,
@@ -100,36 +126,36 @@ impl Analysis {
     }
 
     /// Writes the numbers and gives the polygon of each lane.
-    pub fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Vec<Polygon> {
-        let heights = scene.heights();
-        out[at::LOWEST] = scene::lowest(&heights);
-        let looked = self.look(scene, &heights, &mut out[at::GROUND..at::BALANCE]);
-        out[at::PRESSURE_SUM] = looked.pressure_sum;
-        out[at::PRESSURE_MAX] = looked.pressure_max;
+    pub fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Vec<Polygon> {
+        let heights = posed.heights();
+        out[at::LOWEST] = posed::lowest(&heights);
+        let samples = self.pass_over_samples(posed, &heights, &mut out[at::PULL..at::BALANCE]);
+        out[at::PRESSURE_SUM] = samples.pressure_sum;
+        out[at::PRESSURE_MAX] = samples.pressure_max;
 
-        let parts = part_moments(&scene.template.closing, scene.points);
+        let parts = part_moments(&posed.template.closing, posed.points);
         let exact = Centre::<R>::exact(&parts);
-        let centre = self.method.forward(scene);
+        let centre = self.method.forward(posed);
         match centre.signed_volumes() {
             Some(volumes) => {
                 for (out, volume) in out[at::PART_VOLUMES..].iter_mut().zip(volumes) {
                     *out = R::narrow(volume.abs());
                 }
             }
-            None => drop(PartVolumes.forward(scene, &mut out[at::PART_VOLUMES..])),
+            None => drop(PartVolumes.forward(posed, &mut out[at::PART_VOLUMES..])),
         }
-        self.mass.write(scene, &parts, &mut out[at::SOLID..at::PART_VOLUMES]);
-        scene.put(centre.point, &mut out[at::CENTER_OF_MASS..][..3]);
-        scene.put(exact.point, &mut out[at::CENTER_OF_MASS_EXACT..][..3]);
-        scene.put(looked.cop.point, &mut out[at::CENTER_OF_PRESSURE..][..3]);
-        out[at::STABILITY] = R::narrow(distance_on_ground(scene, &centre, &looked.cop).0);
-        let supports = BaseOfSupport::new(scene, &self.contact, &centre);
-        self.balance.forward_about(scene, centre, &mut out[at::BALANCE..][..1]);
+        self.mass.write(posed, &parts, &mut out[at::SOLID..at::PART_VOLUMES]);
+        posed.write_world(centre.point, &mut out[at::CENTER_OF_MASS..][..3]);
+        posed.write_world(exact.point, &mut out[at::CENTER_OF_MASS_EXACT..][..3]);
+        posed.write_world(samples.cop.point, &mut out[at::CENTER_OF_PRESSURE..][..3]);
+        out[at::STABILITY] = R::narrow(distance_on_ground(posed, &centre, &samples.cop).0);
+        let supports = BaseOfSupport::new(posed, &self.contact, &centre);
+        self.balance.forward_about(posed, centre, &mut out[at::BALANCE..][..1]);
         let number = |of: &dyn Fn(usize) -> f64| R::narrow(R::Wide::from_lanes(|lane| Real::of(of(lane))));
         out[at::NUM_CONTACTS] = number(&|lane| supports[lane].num_contacts as f64);
         out[at::AREA] = number(&|lane| supports[lane].area);
         out[at::MARGIN] = number(&|lane| supports[lane].margin);
-        let [low, high] = scene.bounds();
+        let [low, high] = posed.bounds();
         out[at::STATUS] = number(&|lane| {
             let volumes = memory::collect(parts.iter().map(|part| part.volume.lane(lane).value()));
             let corner = |corner: Vec3<R>| corner.map(|x| x.lane(lane).value());
@@ -139,23 +165,23 @@ impl Analysis {
     }
 
     /// Pressure and ground losses.
-    fn look<R: Real>(&self, scene: &Scene<R>, heights: &[R], ground: &mut [R]) -> Looked<R> {
-        let mut loads = LoadSums::new(self.pressure, scene.template, heights);
+    fn pass_over_samples<R: Real>(&self, posed: &PosedBody<R>, heights: &[R], ground: &mut [R]) -> SampleResults<R> {
+        let mut loads = LoadSums::new(self.pressure, posed.template, heights);
         let mut sums = self.ground.sums();
         let mut lowest = R::of(1e30);
         let mut row = [R::zero(); CHUNK];
-        for place in Points::Samples.places(scene.template) {
-            place.read(heights, &mut row);
-            loads.read(&place, &row);
-            sums.read(&place, &row);
-            lowest = lowest.at_most(scene::lowest(&row[..place.len()]));
+        for chunk in Points::Samples.chunks(posed.template) {
+            chunk.gather(heights, &mut row);
+            loads.add(&chunk, &row);
+            sums.add(&chunk, &row);
+            lowest = lowest.at_most(posed::lowest(&row[..chunk.len()]));
         }
-        sums.finish(scene.template, ground);
-        Looked {
+        sums.finish(posed.template, ground);
+        SampleResults {
             pressure_sum: R::narrow(loads.total_pressure()),
             // ρ falls with the height.
             pressure_max: self.pressure.curve.density(lowest, R::zero()),
-            cop: loads.finish(scene),
+            cop: loads.finish(posed),
         }
     }
 }

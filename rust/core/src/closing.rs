@@ -11,7 +11,7 @@
 use crate::memory;
 use crate::mesh::Mesh;
 use crate::number::vector::{Vec3, add, narrow, scale, widen, zero};
-use crate::number::{Real, Room};
+use crate::number::{Kernel, Real};
 use crate::rings::Rings;
 use std::ops::Range;
 
@@ -59,23 +59,23 @@ impl Closing {
     /// Appends the virtual vertices to the mesh's.
     pub fn forward<R: Real>(&self, vertices: &mut Vec<Vec3<R>>) {
         debug_assert_eq!(vertices.len(), self.num_vertices);
-        R::apart::<Forward, _>((self, vertices));
+        R::dispatch::<Forward, _>((self, vertices));
     }
 
     /// Hands the virtual vertices' gradients to the vertices they are means of.
     pub fn backward<R: Real>(&self, d_points: &mut [Vec3<R>]) {
-        R::apart::<Backward, _>((self, d_points));
+        R::dispatch::<Backward, _>((self, d_points));
     }
 }
 
 /// [`Closing::forward`]
 struct Forward;
 
-impl<R: Real> Room<(&Closing, &mut Vec<Vec3<R>>)> for Forward {
+impl<R: Real> Kernel<(&Closing, &mut Vec<Vec3<R>>)> for Forward {
     type Output = ();
 
     #[inline(always)]
-    fn enter((closing, vertices): (&Closing, &mut Vec<Vec3<R>>)) {
+    fn run((closing, vertices): (&Closing, &mut Vec<Vec3<R>>)) {
         for component in &closing.components {
             let mut sum = zero::<R::Wide>();
             for &vertex in component {
@@ -89,11 +89,11 @@ impl<R: Real> Room<(&Closing, &mut Vec<Vec3<R>>)> for Forward {
 /// [`Closing::backward`]
 struct Backward;
 
-impl<R: Real> Room<(&Closing, &mut [Vec3<R>])> for Backward {
+impl<R: Real> Kernel<(&Closing, &mut [Vec3<R>])> for Backward {
     type Output = ();
 
     #[inline(always)]
-    fn enter((closing, d_points): (&Closing, &mut [Vec3<R>])) {
+    fn run((closing, d_points): (&Closing, &mut [Vec3<R>])) {
         let (d_vertices, d_centres) = d_points.split_at_mut(closing.num_vertices);
         for (component, d_centre) in closing.components.iter().zip(d_centres) {
             let share = scale(R::of(1.0 / component.len() as f64), *d_centre);

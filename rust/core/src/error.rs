@@ -49,6 +49,11 @@ pub enum Error {
 
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// An error that names the choices of an enumeration.
+pub(crate) fn unknown_choice(name: &'static str, choices: &str, got: &str) -> Error {
+    Error::Argument { name, expected: format!("one of {choices}"), got: format!("{got:?}") }
+}
+
 /// What is unusual about one body, as bits that may be combined; 0 is a good body.
 pub mod status {
     /// A coordinate is NaN or infinite: values are NaN, gradients zero.

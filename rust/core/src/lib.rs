@@ -20,10 +20,20 @@ pub mod mesh;
 pub mod closing;
 /// Around each point of a closed part its neighbours: area vectors, the volume's gradient.
 pub mod rings;
-/// Fill: signed tetrahedra of each closed part; exact mass properties.
+/// Fill: signed tetrahedra of each closed part, and the gradient of their volumes.
+pub mod signed_volume;
+/// The volume of each part.
 pub mod volume;
-/// Triangle point picking, W and Wᵀ, and the passes over the points.
+/// Exact first and second moments of each closed part.
+pub mod moments;
+/// Mass, centre and inertia of the body and of its parts.
+pub mod mass_properties;
+/// Triangle point picking, W and Wᵀ, and the passes over the samples.
 pub mod sampling;
+/// The samples' positions.
+pub mod sample_surface;
+/// Samples or vertices, a row of them at a time.
+pub mod points;
 /// The centre of mass in all its formulations.
 pub mod mass;
 /// Height to pressure to centre of pressure.
@@ -36,15 +46,17 @@ pub mod losses;
 /// Everything about a body's surface that is computed once.
 pub mod template;
 /// One closed body over its ground, in local coordinates.
-pub mod scene;
+pub mod posed;
 /// All figures of a body at one look.
 pub mod analysis;
-/// What a differentiable room offers, and the list of all.
+/// What a differentiable module offers.
 pub mod quantity;
+/// All quantities by name.
+pub mod registry;
 /// Many bodies over lanes and threads.
 pub mod batch;
 /// The weighted total of a training step, reduced over a batch, with its gradient.
-pub mod weighted;
+pub mod reduction;
 /// How many threads, and the pool.
 pub mod threads;
 
@@ -61,8 +73,6 @@ pub mod collision;
 
 /// Linear blend skinning: from a body model's parameters to its vertices and joints.
 pub mod skinning;
-/// Many posed bodies over threads.
-pub mod posing;
 
 pub use batch::Batch;
 pub use error::{Error, Result};

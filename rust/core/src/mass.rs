@@ -1,13 +1,14 @@
 //! The centre of mass: the paper's pCoM, the alternatives of its supplement, and the exact integral.
 
-use crate::error::Result;
+use crate::error::{Result, unknown_choice};
 use crate::memory;
+use crate::moments::{Moments, part_moments, part_moments_backward};
 use crate::number::vector::{Vec3, add, add_scaled, add_to, cross, dot, narrow, over, scale, sub, widen};
-use crate::number::{BLOCK, Real, Room};
-use crate::quantity::{Quantity, unknown_choice};
-use crate::scene::Scene;
+use crate::number::{BLOCK, Kernel, Real};
+use crate::posed::PosedBody;
+use crate::quantity::Quantity;
+use crate::signed_volume::{SignedVolumes, absolute};
 use crate::template::Template;
-use crate::volume::{Moments, SignedVolumes, absolute, part_moments, part_moments_backward};
 
 /// How a body's mass is spread.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,35 +40,35 @@ impl Method {
         }
     }
 
-    pub fn forward<R: Real>(self, scene: &Scene<R>) -> Centre<R> {
-        R::apart::<Forward, _>((self, scene))
+    pub fn forward<R: Real>(self, posed: &PosedBody<R>) -> Centre<R> {
+        R::dispatch::<Forward, _>((self, posed))
     }
 
     pub fn backward<R: Real>(
         self,
-        scene: &Scene<R>,
+        posed: &PosedBody<R>,
         centre: &Centre<R>,
         d_centre: Vec3<R::Wide>,
         d_points: &mut [Vec3<R>],
     ) {
-        R::apart::<Backward, _>((self, scene, centre, d_centre, d_points));
+        R::dispatch::<Backward, _>((self, posed, centre, d_centre, d_points));
     }
 }
 
 /// [`Method::forward`]
 struct Forward;
 
-impl<R: Real> Room<(Method, &Scene<'_, R>)> for Forward {
+impl<R: Real> Kernel<(Method, &PosedBody<'_, R>)> for Forward {
     type Output = Centre<R>;
 
     #[inline(always)]
-    fn enter((method, scene): (Method, &Scene<R>)) -> Centre<R> {
+    fn run((method, posed): (Method, &PosedBody<R>)) -> Centre<R> {
         match method {
-            Method::Pcom => pcom(scene),
-            Method::VertexMean => vertex_mean(scene),
-            Method::SampleMean => sample_mean(scene),
-            Method::FaceArea => face_area(scene),
-            Method::Exact => exact(scene),
+            Method::Pcom => pcom(posed),
+            Method::VertexMean => vertex_mean(posed),
+            Method::SampleMean => sample_mean(posed),
+            Method::FaceArea => face_area(posed),
+            Method::Exact => exact(posed),
         }
     }
 }
@@ -75,19 +76,19 @@ impl<R: Real> Room<(Method, &Scene<'_, R>)> for Forward {
 /// [`Method::backward`]
 struct Backward;
 
-impl<R: Real> Room<(Method, &Scene<'_, R>, &Centre<R>, Vec3<R::Wide>, &mut [Vec3<R>])> for Backward {
+impl<R: Real> Kernel<(Method, &PosedBody<'_, R>, &Centre<R>, Vec3<R::Wide>, &mut [Vec3<R>])> for Backward {
     type Output = ();
 
     #[inline(always)]
-    fn enter(
-        (method, scene, centre, d_centre, d_points): (Method, &Scene<R>, &Centre<R>, Vec3<R::Wide>, &mut [Vec3<R>]),
+    fn run(
+        (method, posed, centre, d_centre, d_points): (Method, &PosedBody<R>, &Centre<R>, Vec3<R::Wide>, &mut [Vec3<R>]),
     ) {
         match method {
-            Method::Pcom => pcom_backward(scene, centre, d_centre, d_points),
-            Method::VertexMean => vertex_mean_backward(scene, d_centre, d_points),
-            Method::SampleMean => sample_mean_backward(scene, d_centre, d_points),
-            Method::FaceArea => face_area_backward(scene, centre, d_centre, d_points),
-            Method::Exact => exact_backward(scene, centre, d_centre, d_points),
+            Method::Pcom => pcom_backward(posed, centre, d_centre, d_points),
+            Method::VertexMean => vertex_mean_backward(posed, d_centre, d_points),
+            Method::SampleMean => sample_mean_backward(posed, d_centre, d_points),
+            Method::FaceArea => face_area_backward(posed, centre, d_centre, d_points),
+            Method::Exact => exact_backward(posed, centre, d_centre, d_points),
         }
     }
 }
@@ -138,14 +139,14 @@ impl<R: Real> Centre<R> {
 
 /// (Eq. 1), part by part: Σ_p vol_p c_p / Σ_p vol_p n_p, c_p the sum of the part's n_p samples.
 #[inline(always)]
-fn pcom<R: Real>(scene: &Scene<R>) -> Centre<R> {
-    let signed = SignedVolumes::forward(&scene.template.closing, scene.points);
+fn pcom<R: Real>(posed: &PosedBody<R>) -> Centre<R> {
+    let signed = SignedVolumes::forward(&posed.template.closing, posed.points);
     let (volumes, signs) = absolute(&signed.of_parts);
     let mut total = R::Wide::zero();
     let mut moment = [R::Wide::zero(); 3];
     let mut of_parts = memory::with_capacity(volumes.len());
-    for ((row, volume), sign) in scene.template.samples.part_sums.iter().zip(volumes).zip(signs) {
-        let sum = row.forward(scene.points);
+    for ((row, volume), sign) in posed.template.samples.part_sums.iter().zip(volumes).zip(signs) {
+        let sum = row.forward(posed.points);
         total = volume.mul_add(R::Wide::of(row.count as f64), total);
         add_scaled(&mut moment, volume, sum);
         of_parts.push(Part { volume, sign, sum });
@@ -155,21 +156,21 @@ fn pcom<R: Real>(scene: &Scene<R>) -> Centre<R> {
 
 /// ∂m̄/∂c_p = vol_p / Σ vol n and ∂m̄/∂vol_p = (c_p − n_p m̄) / Σ vol n, c_p the sum of the part's n_p samples.
 #[inline(always)]
-fn pcom_backward<R: Real>(scene: &Scene<R>, centre: &Centre<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
+fn pcom_backward<R: Real>(posed: &PosedBody<R>, centre: &Centre<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
     let Some(Parts { signed, of_parts }) = &centre.parts else { unreachable!("pcom keeps its parts") };
     let d_moment = over(d_centre, centre.total);
     let mut d_volumes = memory::with_capacity(of_parts.len());
-    for (row, &Part { volume, sign, sum }) in scene.template.samples.part_sums.iter().zip(of_parts) {
+    for (row, &Part { volume, sign, sum }) in posed.template.samples.part_sums.iter().zip(of_parts) {
         let arm = sub(sum, scale(R::Wide::of(row.count as f64), centre.point));
         d_volumes.push(sign * dot(d_moment, arm));
         row.backward(scale(volume, d_moment), d_points);
     }
-    signed.backward(&scene.template.closing, &d_volumes, d_points);
+    signed.backward(&posed.template.closing, &d_volumes, d_points);
 }
 
 #[inline(always)]
-fn vertex_mean<R: Real>(scene: &Scene<R>) -> Centre<R> {
-    let vertices = &scene.points[..scene.template.mesh.num_vertices];
+fn vertex_mean<R: Real>(posed: &PosedBody<R>) -> Centre<R> {
+    let vertices = &posed.points[..posed.template.mesh.num_vertices];
     let mut moment = [R::Wide::zero(); 3];
     for block in vertices.chunks(BLOCK) {
         let mut partial = [R::zero(); 3];
@@ -182,8 +183,8 @@ fn vertex_mean<R: Real>(scene: &Scene<R>) -> Centre<R> {
 }
 
 #[inline(always)]
-fn vertex_mean_backward<R: Real>(scene: &Scene<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
-    let num_vertices = scene.template.mesh.num_vertices;
+fn vertex_mean_backward<R: Real>(posed: &PosedBody<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
+    let num_vertices = posed.template.mesh.num_vertices;
     let share = narrow::<R>(scale(R::Wide::of(1.0 / num_vertices as f64), d_centre));
     for d_point in &mut d_points[..num_vertices] {
         *d_point = add(*d_point, share);
@@ -191,18 +192,18 @@ fn vertex_mean_backward<R: Real>(scene: &Scene<R>, d_centre: Vec3<R::Wide>, d_po
 }
 
 #[inline(always)]
-fn sample_mean<R: Real>(scene: &Scene<R>) -> Centre<R> {
-    let samples = &scene.template.samples;
+fn sample_mean<R: Real>(posed: &PosedBody<R>) -> Centre<R> {
+    let samples = &posed.template.samples;
     let mut moment = [R::Wide::zero(); 3];
     for row in &samples.part_sums {
-        moment = add(moment, row.forward(scene.points));
+        moment = add(moment, row.forward(posed.points));
     }
     Centre::plain(moment, R::Wide::of(samples.len() as f64))
 }
 
 #[inline(always)]
-fn sample_mean_backward<R: Real>(scene: &Scene<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
-    let samples = &scene.template.samples;
+fn sample_mean_backward<R: Real>(posed: &PosedBody<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
+    let samples = &posed.template.samples;
     let share = scale(R::Wide::of(1.0 / samples.len() as f64), d_centre);
     for row in &samples.part_sums {
         row.backward(share, d_points);
@@ -218,13 +219,13 @@ fn triangle<R: Real>(corners: [Vec3<R>; 3]) -> (Vec3<R>, R, Vec3<R>) {
 }
 
 #[inline(always)]
-fn face_area<R: Real>(scene: &Scene<R>) -> Centre<R> {
+fn face_area<R: Real>(posed: &PosedBody<R>) -> Centre<R> {
     let mut total = R::Wide::zero();
     let mut moment = [R::Wide::zero(); 3];
-    for block in scene.template.mesh.faces.chunks(BLOCK) {
+    for block in posed.template.mesh.faces.chunks(BLOCK) {
         let (mut area, mut partial) = (R::zero(), [R::zero(); 3]);
         for &[a, b, c] in block {
-            let point = |index: u32| scene.points[index as usize];
+            let point = |index: u32| posed.points[index as usize];
             let (_, doubled, tripled) = triangle([point(a), point(b), point(c)]);
             area = area + doubled;
             add_scaled(&mut partial, doubled, tripled);
@@ -238,7 +239,7 @@ fn face_area<R: Real>(scene: &Scene<R>) -> Centre<R> {
 /// With A = |N|/2: ∂A/∂a = (b − c) × N/|N| / 2, and each corner is a third of the centroid.
 #[inline(always)]
 fn face_area_backward<R: Real>(
-    scene: &Scene<R>,
+    posed: &PosedBody<R>,
     centre: &Centre<R>,
     d_centre: Vec3<R::Wide>,
     d_points: &mut [Vec3<R>],
@@ -246,8 +247,8 @@ fn face_area_backward<R: Real>(
     let d_moment = narrow::<R>(over(d_centre, centre.total));
     let centre = narrow::<R>(centre.point);
     let third = R::of(1.0 / 3.0);
-    for face in &scene.template.mesh.faces {
-        let point = |k: usize| scene.points[face[k] as usize];
+    for face in &posed.template.mesh.faces {
+        let point = |k: usize| posed.points[face[k] as usize];
         let [a, b, c] = [point(0), point(1), point(2)];
         let (normal, doubled, tripled) = triangle([a, b, c]);
         let unit = scale(R::of(1.0) / doubled.at_least(R::of(1e-30)), normal);
@@ -261,16 +262,21 @@ fn face_area_backward<R: Real>(
 }
 
 #[inline(always)]
-fn exact<R: Real>(scene: &Scene<R>) -> Centre<R> {
-    Centre::exact(&part_moments(&scene.template.closing, scene.points))
+fn exact<R: Real>(posed: &PosedBody<R>) -> Centre<R> {
+    Centre::exact(&part_moments(&posed.template.closing, posed.points))
 }
 
 #[inline(always)]
-fn exact_backward<R: Real>(scene: &Scene<R>, centre: &Centre<R>, d_centre: Vec3<R::Wide>, d_points: &mut [Vec3<R>]) {
+fn exact_backward<R: Real>(
+    posed: &PosedBody<R>,
+    centre: &Centre<R>,
+    d_centre: Vec3<R::Wide>,
+    d_points: &mut [Vec3<R>],
+) {
     let first = over(d_centre, centre.total);
     let d_whole = Moments { volume: -dot(first, centre.point), first, ..Moments::zero() };
-    let d_parts = memory::filled(d_whole, scene.template.mesh.num_parts);
-    part_moments_backward(&scene.template.closing, scene.points, &d_parts, d_points);
+    let d_parts = memory::filled(d_whole, posed.template.mesh.num_parts);
+    part_moments_backward(&posed.template.closing, posed.points, &d_parts, d_points);
 }
 
 /// The centre of mass in the world, metres.
@@ -281,7 +287,7 @@ pub struct CenterOfMass {
 impl Quantity for CenterOfMass {
     type Saved<R: Real> = Centre<R>;
 
-    fn len(&self, _: &Template) -> usize {
+    fn num_outputs(&self, _: &Template) -> usize {
         3
     }
 
@@ -289,13 +295,13 @@ impl Quantity for CenterOfMass {
         Ok(())
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Centre<R> {
-        let centre = self.method.forward(scene);
-        scene.put(centre.point, out);
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Centre<R> {
+        let centre = self.method.forward(posed);
+        posed.write_world(centre.point, out);
         centre
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, centre: &Centre<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        self.method.backward(scene, centre, widen([d_out[0], d_out[1], d_out[2]]), d_points);
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, centre: &Centre<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+        self.method.backward(posed, centre, widen([d_out[0], d_out[1], d_out[2]]), d_points);
     }
 }

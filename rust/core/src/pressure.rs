@@ -3,11 +3,12 @@
 use crate::error::Result;
 use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, add_to, dot, narrow, over, scale, widen};
-use crate::number::{BLOCK, Real, Room};
+use crate::number::{BLOCK, Kernel, Real};
 use crate::options::not_negative;
+use crate::points::{PointChunk, Points};
+use crate::posed::{self, PosedBody};
 use crate::quantity::Quantity;
-use crate::sampling::{CHUNK, Place, Points, Row, Walk, sum_row};
-use crate::scene::{self, Scene};
+use crate::sampling::{CHUNK, Row, Walk, sum_row};
 use crate::template::Template;
 
 /// The paper's heuristic (Eq. 2): ρ = 1 − αh below the ground, e^(−γh) from the ground up. No unit.
@@ -48,7 +49,7 @@ pub struct Pressure {
 impl Quantity for Pressure {
     type Saved<R: Real> = ();
 
-    fn len(&self, template: &Template) -> usize {
+    fn num_outputs(&self, template: &Template) -> usize {
         template.samples.len()
     }
 
@@ -56,24 +57,24 @@ impl Quantity for Pressure {
         self.curve.check()
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) {
-        R::apart::<PressureForward, _>((self.curve, &scene.template.samples.walk, scene.heights(), out));
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) {
+        R::dispatch::<PressureForward, _>((self.curve, &posed.template.samples.walk, posed.heights(), out));
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, _: &(), d_out: &[R], d_points: &mut [Vec3<R>]) {
-        let walk = &scene.template.samples.walk;
-        let d_heights = R::apart::<PressureBackward, _>((self.curve, walk, scene.heights(), d_out));
-        scene.heights_backward(&d_heights, d_points);
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, _: &(), d_out: &[R], d_points: &mut [Vec3<R>]) {
+        let walk = &posed.template.samples.walk;
+        let d_heights = R::dispatch::<PressureBackward, _>((self.curve, walk, posed.heights(), d_out));
+        posed.heights_backward(&d_heights, d_points);
     }
 }
 
 struct PressureForward;
 
-impl<R: Real> Room<(PressureCurve, &Walk, Vec<R>, &mut [R])> for PressureForward {
+impl<R: Real> Kernel<(PressureCurve, &Walk, Vec<R>, &mut [R])> for PressureForward {
     type Output = ();
 
     #[inline(always)]
-    fn enter((curve, walk, heights, out): (PressureCurve, &Walk, Vec<R>, &mut [R])) {
+    fn run((curve, walk, heights, out): (PressureCurve, &Walk, Vec<R>, &mut [R])) {
         let mut row = [R::zero(); CHUNK];
         for chunk in &walk.chunks {
             walk.interpolate(chunk, &heights, &mut row);
@@ -86,11 +87,11 @@ impl<R: Real> Room<(PressureCurve, &Walk, Vec<R>, &mut [R])> for PressureForward
 
 struct PressureBackward;
 
-impl<R: Real> Room<(PressureCurve, &Walk, Vec<R>, &[R])> for PressureBackward {
+impl<R: Real> Kernel<(PressureCurve, &Walk, Vec<R>, &[R])> for PressureBackward {
     type Output = Vec<R>;
 
     #[inline(always)]
-    fn enter((curve, walk, heights, d_out): (PressureCurve, &Walk, Vec<R>, &[R])) -> Vec<R> {
+    fn run((curve, walk, heights, d_out): (PressureCurve, &Walk, Vec<R>, &[R])) -> Vec<R> {
         let mut d_heights = memory::filled(R::zero(), heights.len());
         let mut row = [R::zero(); CHUNK];
         for chunk in &walk.chunks {
@@ -150,10 +151,10 @@ impl<R: Real> LoadSums<R> {
         }
     }
 
-    pub fn read(&mut self, place: &Place, heights: &Row<R>) {
+    pub fn add(&mut self, chunk: &PointChunk, heights: &Row<R>) {
         let (density, total) = (&mut self.density, &mut self.total);
-        R::apart::<Densities, _>((self.of.curve, self.shift, heights, place.len(), density, total));
-        place.hand_back(&self.density, &mut self.loads);
+        R::dispatch::<Densities, _>((self.of.curve, self.shift, heights, chunk.len(), density, total));
+        chunk.scatter_add(&self.density, &mut self.loads);
     }
 
     /// Σ ρ_i, the shift taken back.
@@ -162,11 +163,11 @@ impl<R: Real> LoadSums<R> {
     }
 
     /// s̄ from the sums. Epsilon pulls towards the world's origin, which lies at −origin here.
-    pub fn finish(self, scene: &Scene<R>) -> Cop<R> {
+    pub fn finish(self, posed: &PosedBody<R>) -> Cop<R> {
         let LoadSums { of, shift, total, loads, .. } = self;
         let epsilon = R::Wide::of(of.epsilon);
-        let mut moment = scale(-epsilon, scene.origin);
-        R::apart::<Moment, _>((scene.points, loads.as_slice(), &mut moment));
+        let mut moment = scale(-epsilon, posed.origin);
+        R::dispatch::<Moment, _>((posed.points, loads.as_slice(), &mut moment));
         let total = total + epsilon;
         Cop { point: over(moment, total), of, shift, total, loads }
     }
@@ -177,20 +178,20 @@ const DEEP: f64 = 60.0;
 
 /// The height of a hovering body's lowest vertex, or sample, in each lane; 0 in the others.
 fn shift<R: Real>(curve: PressureCurve, template: &Template, heights: &[R]) -> R {
-    let vertex = scene::lowest(heights).at_least(R::zero());
+    let vertex = posed::lowest(heights).at_least(R::zero());
     if (-vertex).negative() == 0 {
         return vertex;
     }
-    let reach = R::of(curve.gamma) * (scene::highest(heights) - vertex);
+    let reach = R::of(curve.gamma) * (posed::highest(heights) - vertex);
     let deep = (R::of(DEEP) - reach).if_negative(-vertex, R::zero());
     if deep.negative() == 0 {
         return vertex;
     }
     let mut sample = R::of(1e30);
     let mut row = [R::zero(); CHUNK];
-    for place in Points::Samples.places(template) {
-        place.read(heights, &mut row);
-        sample = sample.at_most(scene::lowest(&row[..place.len()]));
+    for chunk in Points::Samples.chunks(template) {
+        chunk.gather(heights, &mut row);
+        sample = sample.at_most(posed::lowest(&row[..chunk.len()]));
     }
     deep.if_negative(sample.at_least(R::zero()), vertex)
 }
@@ -198,11 +199,11 @@ fn shift<R: Real>(curve: PressureCurve, template: &Template, heights: &[R]) -> R
 /// ρ of a row of heights, and their sum.
 struct Densities;
 
-impl<R: Real> Room<(PressureCurve, R, &Row<R>, usize, &mut Row<R>, &mut R::Wide)> for Densities {
+impl<R: Real> Kernel<(PressureCurve, R, &Row<R>, usize, &mut Row<R>, &mut R::Wide)> for Densities {
     type Output = ();
 
     #[inline(always)]
-    fn enter(
+    fn run(
         (curve, shift, heights, len, density, total): (PressureCurve, R, &Row<R>, usize, &mut Row<R>, &mut R::Wide),
     ) {
         for (density, &height) in density.iter_mut().zip(heights) {
@@ -215,11 +216,11 @@ impl<R: Real> Room<(PressureCurve, R, &Row<R>, usize, &mut Row<R>, &mut R::Wide)
 /// Σ_v q_v v
 struct Moment;
 
-impl<R: Real> Room<(&[Vec3<R>], &[R], &mut Vec3<R::Wide>)> for Moment {
+impl<R: Real> Kernel<(&[Vec3<R>], &[R], &mut Vec3<R::Wide>)> for Moment {
     type Output = ();
 
     #[inline(always)]
-    fn enter((points, loads, moment): (&[Vec3<R>], &[R], &mut Vec3<R::Wide>)) {
+    fn run((points, loads, moment): (&[Vec3<R>], &[R], &mut Vec3<R::Wide>)) {
         for (points, loads) in points.chunks(BLOCK).zip(loads.chunks(BLOCK)) {
             let mut partial = [R::zero(); 3];
             for (&point, &load) in points.iter().zip(loads) {
@@ -235,7 +236,7 @@ impl<R: Real> Cop<R> {
     /// gradient by the vertices' heights.
     pub fn backward(
         &self,
-        scene: &Scene<R>,
+        posed: &PosedBody<R>,
         heights: &[R],
         d_point: Vec3<R::Wide>,
         mut d_heights: Vec<R>,
@@ -243,27 +244,27 @@ impl<R: Real> Cop<R> {
     ) {
         let d_wide = over(d_point, self.total);
         let (d, lever) = (narrow::<R>(d_wide), R::narrow(dot(d_wide, self.point)));
-        let arms = R::apart::<Arms, _>((&scene.points[..heights.len()], d, lever));
+        let arms = R::dispatch::<Arms, _>((&posed.points[..heights.len()], d, lever));
         let (mut row, mut arm) = ([R::zero(); CHUNK], [R::zero(); CHUNK]);
-        for place in Points::Samples.places(scene.template) {
-            place.read(heights, &mut row);
-            place.read(&arms, &mut arm);
-            R::apart::<SlopesByArms, _>((self.of.curve, self.shift, &arm, &mut row));
-            place.hand_back(&row, &mut d_heights);
+        for chunk in Points::Samples.chunks(posed.template) {
+            chunk.gather(heights, &mut row);
+            chunk.gather(&arms, &mut arm);
+            R::dispatch::<SlopesByArms, _>((self.of.curve, self.shift, &arm, &mut row));
+            chunk.scatter_add(&row, &mut d_heights);
         }
-        let normal = scene.narrow_ground().normal;
-        R::apart::<Gradient, _>((self.loads.as_slice(), d, d_heights.as_slice(), normal, d_points));
+        let normal = posed.narrow_ground().normal;
+        R::dispatch::<Gradient, _>((self.loads.as_slice(), d, d_heights.as_slice(), normal, d_points));
     }
 }
 
 /// d·v − lever of each vertex: what a unit of load there does to d·s̄.
 struct Arms;
 
-impl<R: Real> Room<(&[Vec3<R>], Vec3<R>, R)> for Arms {
+impl<R: Real> Kernel<(&[Vec3<R>], Vec3<R>, R)> for Arms {
     type Output = Vec<R>;
 
     #[inline(always)]
-    fn enter((vertices, d, lever): (&[Vec3<R>], Vec3<R>, R)) -> Vec<R> {
+    fn run((vertices, d, lever): (&[Vec3<R>], Vec3<R>, R)) -> Vec<R> {
         let mut arms = memory::filled(R::zero(), vertices.len());
         for (arm, &vertex) in arms.iter_mut().zip(vertices) {
             *arm = dot(d, vertex) - lever;
@@ -275,11 +276,11 @@ impl<R: Real> Room<(&[Vec3<R>], Vec3<R>, R)> for Arms {
 /// From heights to dρ/dh · arm.
 struct SlopesByArms;
 
-impl<R: Real> Room<(PressureCurve, R, &Row<R>, &mut Row<R>)> for SlopesByArms {
+impl<R: Real> Kernel<(PressureCurve, R, &Row<R>, &mut Row<R>)> for SlopesByArms {
     type Output = ();
 
     #[inline(always)]
-    fn enter((curve, shift, arms, row): (PressureCurve, R, &Row<R>, &mut Row<R>)) {
+    fn run((curve, shift, arms, row): (PressureCurve, R, &Row<R>, &mut Row<R>)) {
         for (height, &arm) in row.iter_mut().zip(arms) {
             *height = curve.slope(*height, curve.density(*height, shift)) * arm;
         }
@@ -289,11 +290,11 @@ impl<R: Real> Room<(PressureCurve, R, &Row<R>, &mut Row<R>)> for SlopesByArms {
 /// Adds each vertex's load times d, and its height's gradient times n.
 struct Gradient;
 
-impl<R: Real> Room<(&[R], Vec3<R>, &[R], Vec3<R>, &mut [Vec3<R>])> for Gradient {
+impl<R: Real> Kernel<(&[R], Vec3<R>, &[R], Vec3<R>, &mut [Vec3<R>])> for Gradient {
     type Output = ();
 
     #[inline(always)]
-    fn enter((loads, d, d_heights, normal, d_points): (&[R], Vec3<R>, &[R], Vec3<R>, &mut [Vec3<R>])) {
+    fn run((loads, d, d_heights, normal, d_points): (&[R], Vec3<R>, &[R], Vec3<R>, &mut [Vec3<R>])) {
         for ((d_point, &load), &d_height) in d_points.iter_mut().zip(loads).zip(d_heights) {
             add_scaled(d_point, load, d);
             add_scaled(d_point, d_height, normal);
@@ -302,14 +303,14 @@ impl<R: Real> Room<(&[R], Vec3<R>, &[R], Vec3<R>, &mut [Vec3<R>])> for Gradient 
 }
 
 impl CenterOfPressure {
-    pub fn locate<R: Real>(&self, scene: &Scene<R>, heights: &[R]) -> Cop<R> {
-        let mut sums = LoadSums::new(*self, scene.template, heights);
+    pub fn locate<R: Real>(&self, posed: &PosedBody<R>, heights: &[R]) -> Cop<R> {
+        let mut sums = LoadSums::new(*self, posed.template, heights);
         let mut row = [R::zero(); CHUNK];
-        for place in Points::Samples.places(scene.template) {
-            place.read(heights, &mut row);
-            sums.read(&place, &row);
+        for chunk in Points::Samples.chunks(posed.template) {
+            chunk.gather(heights, &mut row);
+            sums.add(&chunk, &row);
         }
-        sums.finish(scene)
+        sums.finish(posed)
     }
 }
 
@@ -317,7 +318,7 @@ impl Quantity for CenterOfPressure {
     /// s̄ and the vertices' heights.
     type Saved<R: Real> = (Cop<R>, Vec<R>);
 
-    fn len(&self, _: &Template) -> usize {
+    fn num_outputs(&self, _: &Template) -> usize {
         3
     }
 
@@ -326,16 +327,16 @@ impl Quantity for CenterOfPressure {
         not_negative("epsilon", self.epsilon)
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
-        let heights = scene.heights();
-        let cop = self.locate(scene, &heights);
-        scene.put(cop.point, out);
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Self::Saved<R> {
+        let heights = posed.heights();
+        let cop = self.locate(posed, &heights);
+        posed.write_world(cop.point, out);
         (cop, heights)
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
         let (cop, heights) = saved;
         let d_heights = memory::filled(R::zero(), heights.len());
-        cop.backward(scene, heights, widen([d_out[0], d_out[1], d_out[2]]), d_heights, d_points);
+        cop.backward(posed, heights, widen([d_out[0], d_out[1], d_out[2]]), d_heights, d_points);
     }
 }

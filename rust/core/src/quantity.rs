@@ -1,105 +1,36 @@
-//! A quantity: numbers of one body, with their gradient by the body's points. Every differentiable room has one or more;
-//! [`named`] is the one list of them.
+//! A quantity: numbers of one body, with their gradient by the body's points. Every differentiable module has one or
+//! more; [`crate::registry`] lists them by name.
 
-use crate::error::{Error, Result};
-use crate::losses::balance::{BalanceCost, Wrap};
-use crate::losses::ground::{GroundLoss, Tanh};
-use crate::losses::stability::StabilityLoss;
-use crate::losses::terms::{BalanceTerms, StabilityTerms, Terms};
-use crate::mass::{CenterOfMass, Method};
+use crate::error::Result;
 use crate::number::Real;
 use crate::number::vector::Vec3;
-use crate::pressure::{CenterOfPressure, Pressure, PressureCurve};
-use crate::sampling::{Points, SampleSurface};
-use crate::scene::Scene;
-use crate::support::{Contact, ContactRule, SupportMargin};
+use crate::posed::PosedBody;
 use crate::template::Template;
-use crate::volume::{MassProperties, PartVolumes};
 
 pub trait Quantity: Send + Sync {
     /// What the forward keeps for the backward.
     type Saved<R: Real>;
 
     /// How many numbers it has for one body.
-    fn len(&self, template: &Template) -> usize;
+    fn num_outputs(&self, template: &Template) -> usize;
 
     /// An error names the option that is out of its range.
     fn check(&self, template: &Template) -> Result<()>;
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R>;
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Self::Saved<R>;
 
     /// Adds Σ d_out · ∂out/∂points to `d_points`, the virtual vertices' included.
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]);
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]);
 
     /// Both, for a quantity that can share work between them.
-    fn forward_and_backward<R: Real>(&self, scene: &Scene<R>, d_out: &[R], out: &mut [R], d_points: &mut [Vec3<R>]) {
-        let saved = self.forward(scene, out);
-        self.backward(scene, &saved, d_out, d_points);
+    fn forward_and_backward<R: Real>(
+        &self,
+        posed: &PosedBody<R>,
+        d_out: &[R],
+        out: &mut [R],
+        d_points: &mut [Vec3<R>],
+    ) {
+        let saved = self.forward(posed, out);
+        self.backward(posed, &saved, d_out, d_points);
     }
-}
-
-/// Calls back with the quantity of that name and these options: the place where a new one is registered.
-pub fn named<V: Visitor>(template: &Template, name: &str, options: &[f64], visitor: V) -> Result<V::Output> {
-    let unknown = || Error::UnknownQuantity(format!("{name} with {} options", options.len()));
-    let words: Vec<&str> = name.split('.').collect();
-    Ok(match (words.as_slice(), options) {
-        (["part_volumes"], []) => visitor.visit(PartVolumes),
-        (["mass_properties"], densities) if [1, template.mesh.num_parts].contains(&densities.len()) => {
-            visitor.visit(MassProperties { densities: densities.to_vec() })
-        }
-        (["sample_surface"], []) => visitor.visit(SampleSurface),
-        (["center_of_mass", m], []) => visitor.visit(CenterOfMass { method: Method::named(m)? }),
-        (["pressure"], &[alpha, gamma]) => visitor.visit(Pressure { curve: PressureCurve { alpha, gamma } }),
-        (["center_of_pressure"], &[alpha, gamma, epsilon]) => {
-            visitor.visit(CenterOfPressure { curve: PressureCurve { alpha, gamma }, epsilon })
-        }
-        (["support_margin", rule, m], &[threshold]) => {
-            let contact = Contact { rule: ContactRule::named(rule)?, threshold };
-            visitor.visit(SupportMargin { contact, method: Method::named(m)? })
-        }
-        (["stability_loss", m], o @ [_, _, _]) => visitor.visit(stability(m, o)?),
-        (["ground_loss", points, tanh], o @ [_, _, _, _]) => visitor.visit(ground(points, tanh, o)?),
-        (["balance_cost", wrap, m], o @ [_, _, _]) => visitor.visit(balance(wrap, m, o)?),
-        (["terms", "stability", m, points, tanh], o @ [_, _, _, _, _, _, _]) => visitor
-            .visit_terms(StabilityTerms { stability: stability(m, &o[..3])?, ground: ground(points, tanh, &o[3..])? }),
-        (["terms", "balance", wrap, m, points, tanh], o @ [_, _, _, _, _, _, _]) => visitor
-            .visit_terms(BalanceTerms { balance: balance(wrap, m, &o[..3])?, ground: ground(points, tanh, &o[3..])? }),
-        _ => return Err(unknown()),
-    })
-}
-
-/// What to do with a quantity whose type is known only once its name has been read.
-pub trait Visitor {
-    type Output;
-    fn visit<Q: Quantity>(self, quantity: Q) -> Self::Output;
-
-    /// For a visitor that wants more of loss terms.
-    fn visit_terms<Q: Terms>(self, quantity: Q) -> Self::Output
-    where
-        Self: Sized,
-    {
-        self.visit(quantity)
-    }
-}
-
-fn stability(method: &str, options: &[f64]) -> Result<StabilityLoss> {
-    let &[alpha, gamma, epsilon] = options else { unreachable!("the caller matched three options") };
-    let pressure = CenterOfPressure { curve: PressureCurve { alpha, gamma }, epsilon };
-    Ok(StabilityLoss { method: Method::named(method)?, pressure })
-}
-
-fn ground(points: &str, tanh: &str, options: &[f64]) -> Result<GroundLoss> {
-    let &[alpha1, alpha2, beta1, beta2] = options else { unreachable!("the caller matched four options") };
-    Ok(GroundLoss { points: Points::named(points)?, tanh: Tanh::named(tanh)?, alpha1, alpha2, beta1, beta2 })
-}
-
-fn balance(wrap: &str, method: &str, options: &[f64]) -> Result<BalanceCost> {
-    let &[alpha, gamma, sigma] = options else { unreachable!("the caller matched three options") };
-    let curve = PressureCurve { alpha, gamma };
-    Ok(BalanceCost { method: Method::named(method)?, wrap: Wrap::named(wrap)?, curve, sigma })
-}
-
-/// An error that names the choices of an enumeration.
-pub(crate) fn unknown_choice(name: &'static str, choices: &str, got: &str) -> Error {
-    Error::Argument { name, expected: format!("one of {choices}"), got: format!("{got:?}") }
 }

@@ -1,11 +1,12 @@
 //! A posed body as one stiff solid: its mass, its centre, its inertia, and how high it hovers over its ground.
 
 use crate::error::status;
+use crate::mass_properties::MassProperties;
 use crate::memory;
+use crate::moments::part_moments;
 use crate::number::vector::{Vec3, add, sub};
 use crate::number::{Real, Scalar};
-use crate::scene::{self, Scene};
-use crate::volume::{MassProperties, part_moments};
+use crate::posed::{self, PosedBody};
 
 /// m/s²
 pub const GRAVITY: f64 = 9.81;
@@ -19,9 +20,9 @@ pub struct Extent<R: Real> {
 }
 
 impl<R: Real> Extent<R> {
-    pub fn of(scene: &Scene<R>) -> Self {
-        let heights = scene.heights();
-        Extent { lowest: scene::lowest(&heights), heights, bounds: scene.bounds() }
+    pub fn of(posed: &PosedBody<R>) -> Self {
+        let heights = posed.heights();
+        Extent { lowest: posed::lowest(&heights), heights, bounds: posed.bounds() }
     }
 
     /// The lowest and the highest coordinates of one body.
@@ -64,12 +65,12 @@ impl Solid {
     /// The bodies of the lanes, each in its own coordinates, for one number or one a part of `densities`. A body with its
     /// lowest vertex higher than `contact` metres is in the air.
     pub fn of_lanes<R: Real>(
-        scene: &Scene<R>,
+        posed: &PosedBody<R>,
         extent: &Extent<R>,
         densities: &MassProperties,
         contact: f64,
     ) -> Vec<Self> {
-        let parts = part_moments(&scene.template.closing, scene.points);
+        let parts = part_moments(&posed.template.closing, posed.points);
         let row = densities.whole(&parts);
         let of_lane = |lane: usize| {
             let number = |k: usize| row[k].lane(lane).value();

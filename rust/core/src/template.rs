@@ -6,7 +6,7 @@ use crate::memory;
 use crate::mesh::Mesh;
 use crate::number::vector::{Vec3, sub};
 use crate::sampling::Samples;
-use crate::volume::SignedVolumes;
+use crate::signed_volume::SignedVolumes;
 
 #[derive(Clone, Debug)]
 pub struct Template {

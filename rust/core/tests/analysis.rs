@@ -5,8 +5,9 @@ mod common;
 use ipman::analysis::Analysis;
 use ipman::error::status;
 use ipman::mass::Method;
-use ipman::number::gate::Level;
-use ipman::quantity::{Quantity, Visitor, named};
+use ipman::number::simd_level::Level;
+use ipman::quantity::Quantity;
+use ipman::registry::{Visitor, named};
 use ipman::support::{Contact, ContactRule};
 use ipman::{Batch, Template};
 

@@ -8,12 +8,12 @@ use ipman::losses::ground::{GroundLoss, Tanh};
 use ipman::losses::stability::StabilityLoss;
 use ipman::losses::terms::StabilityTerms;
 use ipman::mass::Method;
-use ipman::number::gate::Level;
+use ipman::mass_properties::MassProperties;
+use ipman::number::simd_level::Level;
+use ipman::points::Points;
 use ipman::pressure::{CenterOfPressure, PressureCurve};
-use ipman::sampling::Points;
+use ipman::reduction::{Pool, Reduction};
 use ipman::support::{Contact, ContactRule, SupportMargin};
-use ipman::volume::MassProperties;
-use ipman::weighted::{Pool, Reduction};
 use ipman::{Batch, Error, Template};
 
 fn terms() -> StabilityTerms {

@@ -4,7 +4,8 @@
 mod common;
 
 use ipman::number::Data;
-use ipman::quantity::{Quantity, Visitor, named};
+use ipman::quantity::Quantity;
+use ipman::registry::{Visitor, named};
 use ipman::{Batch, Template};
 use proptest::prelude::*;
 

@@ -2,8 +2,9 @@
 
 mod common;
 
-use ipman::number::gate::Level;
-use ipman::quantity::{Quantity, Visitor, named};
+use ipman::number::simd_level::Level;
+use ipman::quantity::Quantity;
+use ipman::registry::{Visitor, named};
 use ipman::{Batch, Template};
 
 /// Values and gradients.

@@ -4,10 +4,10 @@
 mod common;
 
 use ipman::error::status;
+use ipman::mass_properties::MassProperties;
 use ipman::simulation::contact::Shape;
 use ipman::simulation::{Motion, Simulation};
 use ipman::solid::GRAVITY;
-use ipman::volume::MassProperties;
 use ipman::{Batch, Template, threads};
 
 const STEP: f64 = 1.0 / 240.0;

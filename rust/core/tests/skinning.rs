@@ -1,7 +1,7 @@
 //! Skinning: the backward is the transpose of the forward's derivative, and a body's bits are its own.
 
 use ipman::number::Scalar;
-use ipman::posing::{Bodies, Posing, Rows, TILE, Upstream};
+use ipman::skinning::batch::{Bodies, PosedBatch, Rows, TILE, Upstream};
 use ipman::skinning::{Model, Skin};
 
 const VERTICES: usize = 37; // two full tiles and a rest
@@ -66,13 +66,13 @@ fn the_gradient_is_the_transpose_of_the_derivative() {
     let skin = skin::<f64>();
     for form in [3, 6] {
         let (given, along) = (Given::new(3, form, 20), Given::<f64>::new(3, form, 30));
-        let posing = Posing::new(&skin, 3, given.bodies(), &|| false).unwrap();
+        let batch = PosedBatch::new(&skin, 3, given.bodies(), &|| false).unwrap();
         let (d_vertices, d_joints) = (numbers(9 * VERTICES, 40), numbers(9 * JOINTS, 41));
         let mut gradients = given.zeros();
         let upstream = Upstream { vertices: &d_vertices, joints: &d_joints };
-        posing.vjp(upstream, gradients.each_mut().map(|part| &mut part[..])).unwrap();
+        batch.vjp(upstream, gradients.each_mut().map(|part| &mut part[..])).unwrap();
         let (mut vertices, mut joints) = (vec![0.0; 9 * VERTICES], vec![0.0; 9 * JOINTS]);
-        posing.jvp(&along.bodies(), &mut vertices, &mut joints).unwrap();
+        batch.jvp(&along.bodies(), &mut vertices, &mut joints).unwrap();
         let forward = dot(&vertices, &d_vertices) + dot(&joints, &d_joints);
         let backward: f64 = gradients.iter().zip(&along.0).map(|(a, b)| dot(a, b)).sum();
         assert!((forward - backward).abs() < 1e-12 * forward.abs().max(1.0), "{form}: {forward} {backward}");
@@ -85,13 +85,13 @@ fn a_body_has_its_own_bits_and_a_broken_one_no_gradient() {
     let mut given = Given::<f32>::new(11, 3, 50);
     let run = |given: &Given<f32>| {
         let count = given.1;
-        let posing = Posing::new(&skin, count, given.bodies(), &|| false).unwrap();
+        let batch = PosedBatch::new(&skin, count, given.bodies(), &|| false).unwrap();
         let (mut vertices, mut joints) = (vec![0.0; 3 * count * VERTICES], vec![0.0; 3 * count * JOINTS]);
-        posing.forward(&mut vertices, &mut joints).unwrap();
+        batch.forward(&mut vertices, &mut joints).unwrap();
         let mut gradients = given.zeros();
         let ones = vec![1.0; vertices.len()];
         let upstream = Upstream { vertices: &ones, joints: &[] };
-        posing.vjp(upstream, gradients.each_mut().map(|part| &mut part[..])).unwrap();
+        batch.vjp(upstream, gradients.each_mut().map(|part| &mut part[..])).unwrap();
         (vertices, gradients)
     };
     let (vertices, gradients) = run(&given);
@@ -117,10 +117,10 @@ fn a_body_has_its_own_bits_and_a_broken_one_no_gradient() {
 fn the_jacobian_has_the_derivatives() {
     let skin = skin::<f64>();
     let given = Given::<f64>::new(2, 3, 60);
-    let posing = Posing::new(&skin, 2, given.bodies(), &|| false).unwrap();
+    let batch = PosedBatch::new(&skin, 2, given.bodies(), &|| false).unwrap();
     let (parameters, row) = (3 * JOINTS + WIDTHS[0], 3 * (VERTICES + JOINTS));
-    let mut jacobian = vec![0.0; 2 * posing.jacobian_width()];
-    posing.jacobian(&mut jacobian).unwrap();
+    let mut jacobian = vec![0.0; 2 * batch.jacobian_width()];
+    batch.jacobian(&mut jacobian).unwrap();
     for k in 0..parameters {
         let mut along = Given::<f64>(given.zeros(), 2);
         let (part, place) = if k < 3 * JOINTS { (0, k) } else { (1, k - 3 * JOINTS) };
@@ -129,7 +129,7 @@ fn the_jacobian_has_the_derivatives() {
             along.0[part][body * width + place] = 1.0;
         }
         let (mut vertices, mut joints) = (vec![0.0; 6 * VERTICES], vec![0.0; 6 * JOINTS]);
-        posing.jvp(&along.bodies(), &mut vertices, &mut joints).unwrap();
+        batch.jvp(&along.bodies(), &mut vertices, &mut joints).unwrap();
         for body in 0..2 {
             let expected =
                 [&vertices[body * 3 * VERTICES..][..3 * VERTICES], &joints[body * 3 * JOINTS..][..3 * JOINTS]];

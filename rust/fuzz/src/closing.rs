@@ -5,7 +5,8 @@ use crate::body::Surface;
 use crate::source::Source;
 use ipman::closing::Closing;
 use ipman::mesh::Mesh;
-use ipman::volume::{SignedVolumes, part_moments};
+use ipman::moments::part_moments;
+use ipman::signed_volume::SignedVolumes;
 
 pub fn run(data: &[u8]) {
     let mut source = Source(data);

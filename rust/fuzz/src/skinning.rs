@@ -1,7 +1,7 @@
 //! Skinning: arrays that do not fit are refused, and the zero pose of a model without a mean is its template.
 
 use crate::source::Source;
-use ipman::posing::{Bodies, Posing, Rows, TILE, Upstream};
+use ipman::skinning::batch::{Bodies, PosedBatch, Rows, TILE, Upstream};
 use ipman::skinning::{Model, Skin};
 
 pub fn run(data: &[u8]) {
@@ -57,8 +57,8 @@ pub fn run(data: &[u8]) {
     if spoilt == 0 {
         let mut there = vec![f64::NAN; v.len()];
         let pose = vec![0.0; 3 * joints];
-        let posing = Posing::new(&skin, 1, bodies([&pose, &[], &[], &[]], 1), &|| false).expect("shapes that fit");
-        posing.forward(&mut there, &mut vec![0.0; 3 * joints]).expect("shapes that fit");
+        let batch = PosedBatch::new(&skin, 1, bodies([&pose, &[], &[], &[]], 1), &|| false).expect("shapes that fit");
+        batch.forward(&mut there, &mut vec![0.0; 3 * joints]).expect("shapes that fit");
         assert!(there.iter().zip(v).all(|(there, v)| (there - v).abs() < 1e-12));
     }
 }
@@ -78,21 +78,21 @@ fn pose(skin: &Skin<f64, TILE>, source: &mut Source) {
     let [pose, betas, expression, transl] =
         [numbers(width), numbers(skin.num_betas()), numbers(skin.num_expressions()), numbers(3)];
     let given = [&pose[..], &betas, &expression, &transl];
-    let Ok(posing) = Posing::new(skin, count, bodies(given, count), &|| false) else { return };
+    let Ok(batch) = PosedBatch::new(skin, count, bodies(given, count), &|| false) else { return };
     let (row, joints) = (3 * skin.num_vertices, 3 * skin.num_joints());
     let (mut vertices, mut places) = (vec![0.0; count * row], vec![0.0; count * joints]);
-    posing.forward(&mut vertices, &mut places).expect("shapes that fit");
+    batch.forward(&mut vertices, &mut places).expect("shapes that fit");
     let (d_vertices, mut d_pose, mut d_transl) = (vec![1.0; count * row], vec![0.0; pose.len()], vec![0.0; 3 * count]);
     let upstream = Upstream { vertices: &d_vertices, joints: &[] };
-    posing.vjp(upstream, [&mut d_pose, &mut [], &mut [], &mut d_transl]).expect("shapes that fit");
+    batch.vjp(upstream, [&mut d_pose, &mut [], &mut [], &mut d_transl]).expect("shapes that fit");
     assert!(d_transl.iter().all(|d| d.is_finite()));
     for body in 0..count {
         let part = |numbers: &[f64]| numbers[body * numbers.len() / count..(body + 1) * numbers.len() / count].to_vec();
         let own = given.map(part);
         let own = bodies([&own[0], &own[1], &own[2], &own[3]], 1);
         let (mut alone, mut places) = (vec![0.0; row], vec![0.0; joints]);
-        let posing = Posing::new(skin, 1, own, &|| false).expect("shapes that fit");
-        posing.forward(&mut alone, &mut places).expect("shapes that fit");
+        let batch = PosedBatch::new(skin, 1, own, &|| false).expect("shapes that fit");
+        batch.forward(&mut alone, &mut places).expect("shapes that fit");
         for (alone, there) in alone.iter().zip(&vertices[body * row..]) {
             assert!(alone.to_bits() == there.to_bits() || (alone.is_nan() && there.is_nan()), "{alone} {there}");
         }

@@ -6,7 +6,8 @@ use crate::error::python_error;
 use crate::template::Template;
 use ipman::Batch;
 use ipman::number::Data;
-use ipman::quantity::{Quantity, Visitor, named};
+use ipman::quantity::Quantity;
+use ipman::registry::{Visitor, named};
 use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -67,7 +68,7 @@ struct Size<'a>(&'a Template);
 impl Visitor for Size<'_> {
     type Output = usize;
     fn visit<Q: Quantity>(self, quantity: Q) -> usize {
-        quantity.len(&self.0.inner)
+        quantity.num_outputs(&self.0.inner)
     }
 }
 

@@ -37,16 +37,18 @@ mod _core {
     use crate::weighted::{terms, terms_backward, weighted};
 
     use pyo3::prelude::*;
+    use pyo3::types::IntoPyDict;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("ANALYSIS_COLUMNS", ipman::analysis::COLUMNS.into_py_dict(module.py())?)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }
 
 mod threads {
     use crate::error::python_error;
-    use ipman::number::gate::Level;
+    use ipman::number::simd_level::Level;
     use pyo3::exceptions::PyValueError;
     use pyo3::prelude::*;
 

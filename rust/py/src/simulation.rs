@@ -5,11 +5,11 @@ use crate::array::{Vertices, written};
 use crate::bodies::{Grounds, on_batch};
 use crate::error::python_error;
 use crate::template::Template;
+use ipman::mass_properties::MassProperties;
 use ipman::memory;
 use ipman::simulation::contact::Shape;
-use ipman::simulation::{Place, Simulation};
+use ipman::simulation::{Placement, Simulation};
 use ipman::tipping::TipTest;
-use ipman::volume::MassProperties;
 use numpy::{PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -126,7 +126,7 @@ pub fn simulate<'py>(
     Ok((status, written(py, &[motions.len(), count, 12], places)?))
 }
 
-fn numbers(place: &Place) -> [f64; 12] {
+fn numbers(place: &Placement) -> [f64; 12] {
     let ([x, y, z], [[a, b, c], [d, e, f], [g, h, i]]) = (place.centre, place.rotation);
     [x, y, z, a, b, c, d, e, f, g, h, i]
 }

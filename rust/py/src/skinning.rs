@@ -3,7 +3,7 @@
 use crate::array::flat;
 use crate::error::detached;
 use ipman::number::Data;
-use ipman::posing::{Bodies, Gradients, Posing, Rows, TILE, Upstream};
+use ipman::skinning::batch::{Bodies, Gradients, PosedBatch, Rows, TILE, Upstream};
 use ipman::skinning::{self, Model};
 use numpy::{Element, PyReadonlyArray1, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -160,17 +160,17 @@ impl<'py> Call<'py> {
                 let (mut vertices, mut joints) = (output(vertices, "vertices")?, output(joints, "joints")?);
                 let (vertices, joints) = (slice(&mut vertices, "vertices")?, slice(&mut joints, "joints")?);
                 detached(py, |interrupted| {
-                    let posing = Posing::new(skin, batch, parameters, interrupted)?;
+                    let batch = PosedBatch::new(skin, batch, parameters, interrupted)?;
                     match &along {
-                        None => posing.forward(vertices, joints),
-                        Some(along) => posing.jvp(along, vertices, joints),
+                        None => batch.forward(vertices, joints),
+                        Some(along) => batch.jvp(along, vertices, joints),
                     }
                 })
             }
             Filled::Jacobian(jacobian) => {
                 let mut jacobian = output(jacobian, "jacobian")?;
                 let jacobian = slice(&mut jacobian, "jacobian")?;
-                detached(py, |interrupted| Posing::new(skin, batch, parameters, interrupted)?.jacobian(jacobian))
+                detached(py, |interrupted| PosedBatch::new(skin, batch, parameters, interrupted)?.jacobian(jacobian))
             }
             Filled::Gradients { d_vertices, d_joints, gradients } => {
                 let (d_vertices, d_joints) = (input(d_vertices, "d_vertices")?, input(d_joints, "d_joints")?);
@@ -179,10 +179,10 @@ impl<'py> Call<'py> {
                 let mut gradients = Outputs::new(["d_pose", "d_betas", "d_expression", "d_transl"], gradients)?;
                 let gradients = gradients.slices()?;
                 detached(py, |interrupted| {
-                    let posing = Posing::new(skin, batch, parameters, interrupted)?;
+                    let batch = PosedBatch::new(skin, batch, parameters, interrupted)?;
                     match &along {
-                        None => posing.vjp(upstream, gradients),
-                        Some(along) => posing.vjp_jvp(upstream, along, gradients),
+                        None => batch.vjp(upstream, gradients),
+                        Some(along) => batch.vjp_jvp(upstream, along, gradients),
                     }
                 })
             }

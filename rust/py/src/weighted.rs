@@ -9,8 +9,9 @@ use ipman::error::Error;
 use ipman::losses::terms::{NUM_TERMS, Terms};
 use ipman::memory;
 use ipman::number::Data;
-use ipman::quantity::{Quantity, Visitor, named};
-use ipman::weighted::{Pool, Pooled, Reduction, terms_backward as gradient_of_terms};
+use ipman::quantity::Quantity;
+use ipman::reduction::{Pool, Pooled, Reduction, terms_backward as gradient_of_terms};
+use ipman::registry::{Visitor, named};
 use numpy::{
     Element, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,

@@ -1,9 +1,17 @@
 //! The cost of a body's contact with itself: what is inside another part is pushed out, what is near is pulled closer
 //! (Müller et al., *On Self-Contact and Human Pose*, CVPR 2021).
 
-use super::Touch;
+use super::nearest::Nearest;
 use crate::error::{Error, Result};
 use crate::number::vector::{Vec3, add_scaled};
+
+/// A vertex with opposite surface around it, or near.
+#[derive(Clone, Copy, Debug)]
+pub struct Touch {
+    pub vertex: u32,
+    pub inside: bool,
+    pub nearest: Nearest,
+}
 
 /// push = ½ Σ tanh²(d / push_width) over the vertices inside, pull = ½ pull_weight Σ tanh²(d / pull_width) over those
 /// outside that are less than `near` away; d the distance to the nearest opposite point. Metres.

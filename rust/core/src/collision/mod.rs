@@ -15,10 +15,10 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::mesh::Mesh;
 use crate::number::Data;
-use crate::number::gate::Level;
+use crate::number::simd_level::Level;
 use crate::number::vector::{Vec3, add_scaled, cross, dot, scale, sub, zero};
 use crate::threads;
-use contact::SelfContact;
+use contact::{SelfContact, Touch};
 use geodesic::Neighbourhoods;
 use nearest::{Nearest, nearest};
 use tree::{Aabb, Tree};
@@ -42,14 +42,6 @@ pub struct Collision {
     num_vertices: usize,
     tree: Tree,
     neighbourhoods: Neighbourhoods,
-}
-
-/// A vertex with opposite surface around it, or near.
-#[derive(Clone, Copy, Debug)]
-pub struct Touch {
-    pub vertex: u32,
-    pub inside: bool,
-    pub nearest: Nearest,
 }
 
 impl Collision {
@@ -187,7 +179,7 @@ struct Posed<'a> {
 
 impl<'a> Posed<'a> {
     fn new<T: Data>(collision: &'a Collision, vertices: &[T], level: Level) -> Self {
-        let origin = crate::scene::origin(std::array::from_fn(|k| vertices[k].value()));
+        let origin = crate::posed::origin(std::array::from_fn(|k| vertices[k].value()));
         let local = |vertex: &[T; 3]| [0, 1, 2].map(|k| vertex[k].value() - origin[k]);
         let points = memory::collect(vertices.as_chunks::<3>().0.iter().map(local));
         let boxes = collision.tree.boxes(&points);
@@ -199,7 +191,7 @@ impl<'a> Posed<'a> {
         let Posed { collision, points, boxes, level, .. } = self;
         let rounded = memory::collect(points.iter().map(|point| point.map(T::of)));
         let work = winding::AtVertices { tree: &collision.tree, boxes, points, rounded: &rounded };
-        T::enter(*level, T::widths(*level)[0], work)
+        T::run_on_lanes(*level, T::widths(*level)[0], work)
     }
 
     /// Whether a vertex with this winding number is inside another part.

@@ -7,9 +7,9 @@
 
 use super::tree::{Aabb, Tree};
 use crate::memory;
-use crate::number::gate::{Level, Work};
+use crate::number::simd_level::Level;
 use crate::number::vector::{Vec3, cross, dot, sub};
-use crate::number::{Data, Real, Room, Scalar};
+use crate::number::{Data, Kernel, Real, Scalar, Work};
 use std::f64::consts::TAU;
 
 /// The winding number of the whole surface at each vertex.
@@ -34,7 +34,7 @@ impl<T: Data> Work<T> for AtVertices<'_, T> {
             gather(self.tree, self.boxes, &own, 0, &mut triangles);
             let vertex = |lane: usize| self.rounded[group[lane.min(group.len() - 1)] as usize];
             let at: Vec3<R> = [0, 1, 2].map(|k| R::from_lanes(|lane| R::Scalar::read(vertex(lane)[k])));
-            let [re, im, turns] = R::apart::<SumOfAngles, _>((triangles.as_slice(), self.rounded, at));
+            let [re, im, turns] = R::dispatch::<SumOfAngles, _>((triangles.as_slice(), self.rounded, at));
             for (lane, &vertex) in group.iter().enumerate() {
                 let [re, im, turns] = [re, im, turns].map(|x| x.lane(lane).value());
                 windings[vertex as usize] = im.atan2(re) / TAU + turns;
@@ -54,7 +54,7 @@ pub struct OfTriangles<'a> {
 impl OfTriangles<'_> {
     /// The same in a precision of choice.
     pub fn sum<T: Data>(self, level: Level) -> f64 {
-        T::enter(level, T::widths(level)[0], self)
+        T::run_on_lanes(level, T::widths(level)[0], self)
     }
 }
 
@@ -73,7 +73,7 @@ impl<T: Data> Work<T> for OfTriangles<'_> {
         for (k, corner) in corners.iter_mut().enumerate() {
             *corner = R::from_lanes(|lane| R::Scalar::read(rows[lane][k]));
         }
-        let [re, im, turns] = R::apart::<SumOfLanes, _>(corners.as_chunks::<3>().0.as_chunks::<3>().0);
+        let [re, im, turns] = R::dispatch::<SumOfLanes, _>(corners.as_chunks::<3>().0.as_chunks::<3>().0);
         let winding = |lane: usize| im.lane(lane).value().atan2(re.lane(lane).value()) / TAU + turns.lane(lane).value();
         (0..R::LANES).map(winding).sum()
     }
@@ -122,11 +122,11 @@ fn gather(tree: &Tree, boxes: &[Aabb], from: &Aabb, node: usize, triangles: &mut
 /// Half the solid angles of triangles seen from the points of lanes.
 struct SumOfAngles;
 
-impl<R: Real> Room<(&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)> for SumOfAngles {
+impl<R: Real> Kernel<(&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)> for SumOfAngles {
     type Output = [R; 3];
 
     #[inline(always)]
-    fn enter((triangles, points, at): (&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)) -> [R; 3] {
+    fn run((triangles, points, at): (&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)) -> [R; 3] {
         let mut sum = [R::of(1.0), R::zero(), R::zero()];
         for triangle in triangles {
             let a = seen_from(at, points[triangle[0] as usize]);
@@ -141,11 +141,11 @@ impl<R: Real> Room<(&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)> for SumOfAngles {
 /// The same of triangles on lanes, seen from the origin.
 struct SumOfLanes;
 
-impl<R: Real> Room<&[[Vec3<R>; 3]]> for SumOfLanes {
+impl<R: Real> Kernel<&[[Vec3<R>; 3]]> for SumOfLanes {
     type Output = [R; 3];
 
     #[inline(always)]
-    fn enter(triangles: &[[Vec3<R>; 3]]) -> [R; 3] {
+    fn run(triangles: &[[Vec3<R>; 3]]) -> [R; 3] {
         let mut sum = [R::of(1.0), R::zero(), R::zero()];
         for triangle in triangles {
             add_angle(&mut sum, *triangle);
@@ -184,7 +184,6 @@ fn seen_from<R: Real>(at: Vec3<R>, point: Vec3<R::Data>) -> Vec3<R> {
 mod tests {
     use super::*;
     use crate::mesh::Mesh;
-    use crate::number::gate::Gates;
 
     /// A torus of 20 × 12 quads.
     fn torus() -> (Mesh, Vec<Vec3<f64>>) {
@@ -245,7 +244,7 @@ mod tests {
         let boxes = tree.boxes(&points);
         for level in Level::available() {
             let work = AtVertices { tree: &tree, boxes: &boxes, points: &points, rounded: &points };
-            for (winding, &at) in f64::enter(level, 1, work).iter().zip(&points) {
+            for (winding, &at) in f64::run_on_lanes(level, 1, work).iter().zip(&points) {
                 assert!((winding - plainly(&mesh.faces, &points, at)).abs() < 1e-13);
                 assert!((0.3..0.7).contains(winding));
             }

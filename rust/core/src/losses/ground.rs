@@ -1,14 +1,15 @@
 //! L_ground = pull + push (Eq. 5): pull = mean of α1 tanh(h/α2)² over the points at or above the ground (Eq. 6), push =
 //! mean of β1 tanh(h/β2)² over those below it (Eq. 7). Both means run over all points.
 
-use crate::error::Result;
+use crate::error::{Result, unknown_choice};
 use crate::memory;
 use crate::number::vector::Vec3;
-use crate::number::{Real, Room};
+use crate::number::{Kernel, Real, SUMS};
 use crate::options::{not_negative, positive};
-use crate::quantity::{Quantity, unknown_choice};
-use crate::sampling::{CHUNK, Place, Points, Row, SUMS, fold};
-use crate::scene::Scene;
+use crate::points::{PointChunk, Points};
+use crate::posed::PosedBody;
+use crate::quantity::Quantity;
+use crate::sampling::{CHUNK, Row, fold};
 use crate::template::Template;
 
 /// How "tanh x squared" is read.
@@ -141,27 +142,27 @@ impl<R: Real> Sides<R> {
 
 impl<R: Real> GroundSums<'_, R> {
     /// Looks at the points of a place.
-    pub fn read(&mut self, place: &Place, heights: &Row<R>) {
+    pub fn add(&mut self, chunk: &PointChunk, heights: &Row<R>) {
         let sums = [&mut self.pull, &mut self.push];
-        R::apart::<Look, _>((&self.sides, heights, place.len(), &mut self.slopes, sums));
+        R::dispatch::<AddChunk, _>((&self.sides, heights, chunk.len(), &mut self.slopes, sums));
         match &mut self.gradient {
             Gradient::Unasked => {}
-            Gradient::Of(d_heights) => place.hand_back(&self.slopes, d_heights),
+            Gradient::Of(d_heights) => chunk.scatter_add(&self.slopes, d_heights),
             Gradient::OfEach([pull, push]) => {
                 let mut below = [R::zero(); CHUNK];
-                R::apart::<Part, _>((heights, &mut self.slopes, &mut below));
-                place.hand_back(&self.slopes, pull);
-                place.hand_back(&below, push);
+                R::dispatch::<SplitBelow, _>((heights, &mut self.slopes, &mut below));
+                chunk.scatter_add(&self.slopes, pull);
+                chunk.scatter_add(&below, push);
             }
         }
     }
 
     /// Looks at all its points.
-    pub fn read_all(&mut self, template: &Template, heights: &[R]) {
+    pub fn add_all(&mut self, template: &Template, heights: &[R]) {
         let mut row = [R::zero(); CHUNK];
-        for place in self.of.points.places(template) {
-            place.read(heights, &mut row);
-            self.read(&place, &row);
+        for chunk in self.of.points.chunks(template) {
+            chunk.gather(heights, &mut row);
+            self.add(&chunk, &row);
         }
     }
 
@@ -173,15 +174,15 @@ impl<R: Real> GroundSums<'_, R> {
 }
 
 /// Both curves over a row of heights, added to their sums, and their slopes.
-struct Look;
+struct AddChunk;
 
-type Looked<'a, R> = (&'a Sides<R>, &'a Row<R>, usize, &'a mut Row<R>, [&'a mut <R as Real>::Wide; 2]);
+type ChunkToAdd<'a, R> = (&'a Sides<R>, &'a Row<R>, usize, &'a mut Row<R>, [&'a mut <R as Real>::Wide; 2]);
 
-impl<R: Real> Room<Looked<'_, R>> for Look {
+impl<R: Real> Kernel<ChunkToAdd<'_, R>> for AddChunk {
     type Output = ();
 
     #[inline(always)]
-    fn enter((sides, heights, len, slopes, [pull, push]): Looked<'_, R>) {
+    fn run((sides, heights, len, slopes, [pull, push]): ChunkToAdd<'_, R>) {
         // Pull as positive, push as negative numbers.
         let mut values = [R::zero(); CHUNK];
         for ((&height, signed), slope) in heights.iter().zip(&mut values).zip(slopes) {
@@ -207,13 +208,13 @@ impl<R: Real> Room<Looked<'_, R>> for Look {
 }
 
 /// Moves the slopes of the points below the ground to a row of their own.
-struct Part;
+struct SplitBelow;
 
-impl<R: Real> Room<(&Row<R>, &mut Row<R>, &mut Row<R>)> for Part {
+impl<R: Real> Kernel<(&Row<R>, &mut Row<R>, &mut Row<R>)> for SplitBelow {
     type Output = ();
 
     #[inline(always)]
-    fn enter((heights, above, below): (&Row<R>, &mut Row<R>, &mut Row<R>)) {
+    fn run((heights, above, below): (&Row<R>, &mut Row<R>, &mut Row<R>)) {
         for ((&height, above), below) in heights.iter().zip(above).zip(below) {
             *below = height.if_negative(*above, R::zero());
             *above = height.if_negative(R::zero(), *above);
@@ -225,7 +226,7 @@ impl Quantity for GroundLoss {
     /// The vertices' heights.
     type Saved<R: Real> = Vec<R>;
 
-    fn len(&self, _: &Template) -> usize {
+    fn num_outputs(&self, _: &Template) -> usize {
         2
     }
 
@@ -236,35 +237,35 @@ impl Quantity for GroundLoss {
         positive("beta2", self.beta2)
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Vec<R> {
-        let heights = scene.heights();
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Vec<R> {
+        let heights = posed.heights();
         let mut sums = self.sums();
-        sums.read_all(scene.template, &heights);
-        sums.finish(scene.template, out);
+        sums.add_all(posed.template, &heights);
+        sums.finish(posed.template, out);
         heights
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, heights: &Vec<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        let sides = Sides::new(self, self.shares(scene.template, d_out));
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, heights: &Vec<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+        let sides = Sides::new(self, self.shares(posed.template, d_out));
         let mut d_heights = memory::filled(R::zero(), heights.len());
         let mut row = [R::zero(); CHUNK];
-        for place in self.points.places(scene.template) {
-            place.read(heights, &mut row);
-            R::apart::<Slopes, _>((&sides, &mut row));
-            place.hand_back(&row, &mut d_heights);
+        for chunk in self.points.chunks(posed.template) {
+            chunk.gather(heights, &mut row);
+            R::dispatch::<Slopes, _>((&sides, &mut row));
+            chunk.scatter_add(&row, &mut d_heights);
         }
-        scene.heights_backward(&d_heights, d_points);
+        posed.heights_backward(&d_heights, d_points);
     }
 }
 
 /// From heights to the slopes of both curves.
 struct Slopes;
 
-impl<R: Real> Room<(&Sides<R>, &mut Row<R>)> for Slopes {
+impl<R: Real> Kernel<(&Sides<R>, &mut Row<R>)> for Slopes {
     type Output = ();
 
     #[inline(always)]
-    fn enter((sides, row): (&Sides<R>, &mut Row<R>)) {
+    fn run((sides, row): (&Sides<R>, &mut Row<R>)) {
         for height in row {
             *height = sides.value_and_slope(*height).1;
         }

@@ -6,9 +6,9 @@ use crate::mass::{Centre, Method};
 use crate::memory;
 use crate::number::Real;
 use crate::number::vector::{Vec3, dot, scale, sub};
+use crate::posed::PosedBody;
 use crate::pressure::{CenterOfPressure, Cop};
 use crate::quantity::Quantity;
-use crate::scene::Scene;
 use crate::template::Template;
 
 pub struct StabilityLoss {
@@ -18,8 +18,8 @@ pub struct StabilityLoss {
 
 /// (Eq. 4) The loss from m̄ and s̄, and its gradient by m̄; that by s̄ is the opposite. It is the unit offset, 0 where the
 /// two points coincide.
-pub fn distance_on_ground<R: Real>(scene: &Scene<R>, centre: &Centre<R>, cop: &Cop<R>) -> (R::Wide, Vec3<R::Wide>) {
-    let offset = scene.ground.along(sub(centre.point, cop.point));
+pub fn distance_on_ground<R: Real>(posed: &PosedBody<R>, centre: &Centre<R>, cop: &Cop<R>) -> (R::Wide, Vec3<R::Wide>) {
+    let offset = posed.ground.along(sub(centre.point, cop.point));
     let length = dot(offset, offset).sqrt();
     (length, scale(R::Wide::of(1.0) / length.at_least(R::Wide::of(1e-300)), offset))
 }
@@ -28,15 +28,15 @@ impl StabilityLoss {
     /// The backward, which adds what `d_heights` holds already, too: a gradient by the vertices' heights.
     pub fn backward_with<R: Real>(
         &self,
-        scene: &Scene<R>,
+        posed: &PosedBody<R>,
         (centre, cop, heights): &(Centre<R>, Cop<R>, Vec<R>),
         d_out: R,
         d_heights: Vec<R>,
         d_points: &mut [Vec3<R>],
     ) {
-        let d_centre = scale(d_out.widen(), distance_on_ground(scene, centre, cop).1);
-        cop.backward(scene, heights, scale(R::Wide::of(-1.0), d_centre), d_heights, d_points);
-        self.method.backward(scene, centre, d_centre, d_points);
+        let d_centre = scale(d_out.widen(), distance_on_ground(posed, centre, cop).1);
+        cop.backward(posed, heights, scale(R::Wide::of(-1.0), d_centre), d_heights, d_points);
+        self.method.backward(posed, centre, d_centre, d_points);
     }
 }
 
@@ -44,7 +44,7 @@ impl Quantity for StabilityLoss {
     /// m̄, s̄ and the vertices' heights.
     type Saved<R: Real> = (Centre<R>, Cop<R>, Vec<R>);
 
-    fn len(&self, _: &Template) -> usize {
+    fn num_outputs(&self, _: &Template) -> usize {
         1
     }
 
@@ -52,15 +52,15 @@ impl Quantity for StabilityLoss {
         self.pressure.check(template)
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
-        let heights = scene.heights();
-        let centre = self.method.forward(scene);
-        let cop = self.pressure.locate(scene, &heights);
-        out[0] = R::narrow(distance_on_ground(scene, &centre, &cop).0);
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Self::Saved<R> {
+        let heights = posed.heights();
+        let centre = self.method.forward(posed);
+        let cop = self.pressure.locate(posed, &heights);
+        out[0] = R::narrow(distance_on_ground(posed, &centre, &cop).0);
         (centre, cop, heights)
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        self.backward_with(scene, saved, d_out[0], memory::filled(R::zero(), saved.2.len()), d_points);
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+        self.backward_with(posed, saved, d_out[0], memory::filled(R::zero(), saved.2.len()), d_points);
     }
 }

@@ -10,10 +10,11 @@ use crate::mass::Centre;
 use crate::memory;
 use crate::number::Real;
 use crate::number::vector::Vec3;
+use crate::points::Points;
+use crate::posed::PosedBody;
 use crate::pressure::{Cop, LoadSums};
 use crate::quantity::Quantity;
-use crate::sampling::{CHUNK, Points};
-use crate::scene::Scene;
+use crate::sampling::CHUNK;
 use crate::template::Template;
 
 /// A first term, pull and push.
@@ -25,7 +26,7 @@ pub trait Terms: Quantity {
     /// of pull and push by the vertices' heights, added to `d_ground`.
     fn forward_and_jacobian<R: Real>(
         &self,
-        scene: &Scene<R>,
+        posed: &PosedBody<R>,
         out: &mut [R],
         d_first: &mut [Vec3<R>],
         d_ground: [&mut [R]; 2],
@@ -40,23 +41,28 @@ pub struct StabilityTerms {
 impl StabilityTerms {
     /// Values, and what the stability's backward needs. Where the sums ask for it, the ground's backward is done at the
     /// same look at the samples.
-    fn look<R: Real>(&self, scene: &Scene<R>, mut ground: GroundSums<R>, out: &mut [R]) -> (Centre<R>, Cop<R>, Vec<R>) {
-        let heights = scene.heights();
-        let mut loads = LoadSums::new(self.stability.pressure, scene.template, &heights);
+    fn one_pass<R: Real>(
+        &self,
+        posed: &PosedBody<R>,
+        mut ground: GroundSums<R>,
+        out: &mut [R],
+    ) -> (Centre<R>, Cop<R>, Vec<R>) {
+        let heights = posed.heights();
+        let mut loads = LoadSums::new(self.stability.pressure, posed.template, &heights);
         let mut row = [R::zero(); CHUNK];
-        for place in Points::Samples.places(scene.template) {
-            place.read(&heights, &mut row);
-            loads.read(&place, &row);
+        for chunk in Points::Samples.chunks(posed.template) {
+            chunk.gather(&heights, &mut row);
+            loads.add(&chunk, &row);
             if self.ground.points == Points::Samples {
-                ground.read(&place, &row);
+                ground.add(&chunk, &row);
             }
         }
         if self.ground.points == Points::Vertices {
-            ground.read_all(scene.template, &heights);
+            ground.add_all(posed.template, &heights);
         }
-        let (centre, cop) = (self.stability.method.forward(scene), loads.finish(scene));
-        out[0] = R::narrow(distance_on_ground(scene, &centre, &cop).0);
-        ground.finish(scene.template, &mut out[1..]);
+        let (centre, cop) = (self.stability.method.forward(posed), loads.finish(posed));
+        out[0] = R::narrow(distance_on_ground(posed, &centre, &cop).0);
+        ground.finish(posed.template, &mut out[1..]);
         (centre, cop, heights)
     }
 }
@@ -64,7 +70,7 @@ impl StabilityTerms {
 impl Quantity for StabilityTerms {
     type Saved<R: Real> = (Centre<R>, Cop<R>, Vec<R>);
 
-    fn len(&self, _: &Template) -> usize {
+    fn num_outputs(&self, _: &Template) -> usize {
         NUM_TERMS
     }
 
@@ -73,33 +79,39 @@ impl Quantity for StabilityTerms {
         self.ground.check(template)
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
-        self.look(scene, self.ground.sums(), out)
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Self::Saved<R> {
+        self.one_pass(posed, self.ground.sums(), out)
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        self.stability.backward(scene, saved, &d_out[..1], d_points);
-        self.ground.backward(scene, &saved.2, &d_out[1..], d_points);
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+        self.stability.backward(posed, saved, &d_out[..1], d_points);
+        self.ground.backward(posed, &saved.2, &d_out[1..], d_points);
     }
 
-    fn forward_and_backward<R: Real>(&self, scene: &Scene<R>, d_out: &[R], out: &mut [R], d_points: &mut [Vec3<R>]) {
-        let mut d_heights = memory::filled(R::zero(), scene.template.mesh.num_vertices);
-        let ground = self.ground.sums_and_gradient(scene.template, &d_out[1..], &mut d_heights);
-        let saved = self.look(scene, ground, out);
-        self.stability.backward_with(scene, &saved, d_out[0], d_heights, d_points);
+    fn forward_and_backward<R: Real>(
+        &self,
+        posed: &PosedBody<R>,
+        d_out: &[R],
+        out: &mut [R],
+        d_points: &mut [Vec3<R>],
+    ) {
+        let mut d_heights = memory::filled(R::zero(), posed.template.mesh.num_vertices);
+        let ground = self.ground.sums_and_gradient(posed.template, &d_out[1..], &mut d_heights);
+        let saved = self.one_pass(posed, ground, out);
+        self.stability.backward_with(posed, &saved, d_out[0], d_heights, d_points);
     }
 }
 
 impl Terms for StabilityTerms {
     fn forward_and_jacobian<R: Real>(
         &self,
-        scene: &Scene<R>,
+        posed: &PosedBody<R>,
         out: &mut [R],
         d_first: &mut [Vec3<R>],
         d_ground: [&mut [R]; 2],
     ) {
-        let saved = self.look(scene, self.ground.sums_and_jacobian(scene.template, d_ground), out);
-        self.stability.backward(scene, &saved, &[R::of(1.0)], d_first);
+        let saved = self.one_pass(posed, self.ground.sums_and_jacobian(posed.template, d_ground), out);
+        self.stability.backward(posed, &saved, &[R::of(1.0)], d_first);
     }
 }
 
@@ -111,7 +123,7 @@ pub struct BalanceTerms {
 impl Quantity for BalanceTerms {
     type Saved<R: Real> = (Balance<R>, Vec<R>);
 
-    fn len(&self, _: &Template) -> usize {
+    fn num_outputs(&self, _: &Template) -> usize {
         NUM_TERMS
     }
 
@@ -120,30 +132,30 @@ impl Quantity for BalanceTerms {
         self.ground.check(template)
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> Self::Saved<R> {
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Self::Saved<R> {
         let (first, rest) = out.split_at_mut(1);
-        (self.balance.forward(scene, first), self.ground.forward(scene, rest))
+        (self.balance.forward(posed, first), self.ground.forward(posed, rest))
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        self.ground.backward(scene, &saved.1, &d_out[1..], d_points);
-        self.balance.backward(scene, &saved.0, &d_out[..1], d_points);
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+        self.ground.backward(posed, &saved.1, &d_out[1..], d_points);
+        self.balance.backward(posed, &saved.0, &d_out[..1], d_points);
     }
 }
 
 impl Terms for BalanceTerms {
     fn forward_and_jacobian<R: Real>(
         &self,
-        scene: &Scene<R>,
+        posed: &PosedBody<R>,
         out: &mut [R],
         d_first: &mut [Vec3<R>],
         d_ground: [&mut [R]; 2],
     ) {
         let (first, rest) = out.split_at_mut(1);
-        let saved = self.balance.forward(scene, first);
-        self.balance.backward(scene, &saved, &[R::of(1.0)], d_first);
-        let mut ground = self.ground.sums_and_jacobian(scene.template, d_ground);
-        ground.read_all(scene.template, &scene.heights());
-        ground.finish(scene.template, rest);
+        let saved = self.balance.forward(posed, first);
+        self.balance.backward(posed, &saved, &[R::of(1.0)], d_first);
+        let mut ground = self.ground.sums_and_jacobian(posed.template, d_ground);
+        ground.add_all(posed.template, &posed.heights());
+        ground.finish(posed.template, rest);
     }
 }

@@ -1,7 +1,7 @@
 //! `f32` and `f64` as numbers with one lane, on any CPU.
 
 use super::curves::{self, DOUBLE_POWERS, Format, SINGLE_POWERS};
-use super::{Data, Real, Scalar};
+use super::{Real, Scalar};
 
 macro_rules! float {
     ($float:ty) => {
@@ -92,22 +92,6 @@ macro_rules! float {
 
 float!(f32);
 float!(f64);
-
-impl Data for f32 {
-    const EPSILON: f64 = f32::EPSILON as f64;
-    #[inline(always)]
-    fn pick<'a>(single: &'a [f32], _: &'a [f64]) -> &'a [f32] {
-        single
-    }
-}
-
-impl Data for f64 {
-    const EPSILON: f64 = f64::EPSILON;
-    #[inline(always)]
-    fn pick<'a>(_: &'a [f32], double: &'a [f64]) -> &'a [f64] {
-        double
-    }
-}
 
 impl Format for f32 {
     const ROUNDER: f64 = 12_582_912.0 + 127.0;

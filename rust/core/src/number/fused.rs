@@ -1,7 +1,7 @@
 //! One number whose operations round as the lanes do: `mul_add` is one rounding.
 
 use super::curves::{self, Format};
-use super::{Real, Room, Scalar, gate};
+use super::{Kernel, Real, Scalar, target};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A float of a CPU level with fused operations. Elsewhere it is correct, and slow.
@@ -99,8 +99,8 @@ macro_rules! fused {
                 Fused(wide.0 as $float)
             }
             #[inline(never)]
-            fn apart<F: Room<A>, A>(arguments: A) -> F::Output {
-                gate::apart_at_current_level::<F, A>(arguments)
+            fn dispatch<F: Kernel<A>, A>(arguments: A) -> F::Output {
+                target::dispatch_at_current_level::<F, A>(arguments)
             }
             #[inline(always)]
             fn lane(self, _: usize) -> Self {

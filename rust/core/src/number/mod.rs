@@ -9,10 +9,13 @@
 
 mod curves;
 mod dual;
+mod dispatch;
 mod float;
 mod fused;
-pub mod gate;
-pub mod lanes;
+mod real;
+#[cfg(test)]
+mod row_tests;
+pub mod simd_level;
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 #[macro_use]
 mod registers;
@@ -20,155 +23,9 @@ mod registers;
 mod neon;
 #[cfg(target_arch = "x86_64")]
 mod simd;
+mod target;
 pub mod vector;
 
 pub use dual::Dual;
 pub use fused::Fused;
-
-use std::mem::MaybeUninit;
-use std::ops::{Add, Div, Mul, Neg, Sub};
-
-/// So many numbers are summed in their own precision before the sum goes on in [`Real::Wide`]: sums that short lose
-/// next to nothing, and the step to the wider number is paid once for all of them.
-pub const BLOCK: usize = 16;
-
-/// A function that is compiled once for each number, see [`Real::apart`].
-pub trait Room<Arguments> {
-    type Output;
-    /// To be marked `#[inline(always)]`.
-    fn enter(arguments: Arguments) -> Self::Output;
-}
-
-/// A number, or one number for each lane.
-pub trait Real:
-    Copy
-    + Send
-    + Sync
-    + 'static
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-{
-    /// One lane of it.
-    type Scalar: Scalar<Data = Self::Data>;
-    /// What one lane of it is in memory outside.
-    type Data: Data;
-    /// The type that long sums run in: the same lanes in double precision.
-    type Wide: Real<Wide = Self::Wide>;
-    const LANES: usize;
-
-    fn of(value: f64) -> Self;
-    /// The same number in all lanes.
-    fn splat(number: Self::Data) -> Self;
-    /// self · factor + term, rounded once where the CPU level has fused operations.
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        self * factor + term
-    }
-    /// `below` where self < 0, else `otherwise` (at 0, and for NaN).
-    fn if_negative(self, below: Self, otherwise: Self) -> Self;
-    fn at_least(self, floor: Self) -> Self;
-    fn at_most(self, ceiling: Self) -> Self;
-    /// Square root, with derivative 0 at 0: the norm's subgradient that the losses want.
-    fn sqrt(self) -> Self;
-    fn ln(self) -> Self;
-    /// 2^self, relative error of a few ulp, within the type's normal range (no underflow to 0, no infinity).
-    fn exp2(self) -> Self;
-    fn tanh(self) -> Self;
-    /// tanh where self is known not to be negative.
-    #[inline(always)]
-    fn tanh_of_positive(self) -> Self {
-        self.tanh()
-    }
-    /// The nearest integer, with slope zero; |self| below 2^22 (2^51 in double precision).
-    fn nearest(self) -> Self;
-    fn widen(self) -> Self::Wide;
-    /// [`Real::widen`] for loops whose own work is in double precision: there a call costs more than its registers.
-    #[inline(always)]
-    fn widen_in_line(self) -> Self::Wide {
-        self.widen()
-    }
-    fn narrow(wide: Self::Wide) -> Self;
-    /// Enters `F` in a function of its own that may use the CPU's instructions for this number. Gates inline all that they
-    /// lead to; a large room that many quantities enter is compiled once behind this door.
-    #[inline(never)]
-    fn apart<F: Room<A>, A>(arguments: A) -> F::Output {
-        F::enter(arguments)
-    }
-    fn lane(self, lane: usize) -> Self::Scalar;
-    fn from_lanes(lane: impl FnMut(usize) -> Self::Scalar) -> Self;
-
-    #[inline(always)]
-    fn zero() -> Self {
-        Self::of(0.0)
-    }
-
-    /// −(self · factor) + term
-    #[inline(always)]
-    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-        (-self).mul_add(factor, term)
-    }
-
-    #[inline(always)]
-    fn add_to(self, sum: &mut Self::Wide) {
-        *sum = *sum + self.widen();
-    }
-
-    /// The lanes in which self < 0, as bits.
-    #[inline(always)]
-    fn negative(self) -> u32 {
-        let mut lanes = 0;
-        for lane in 0..Self::LANES {
-            lanes |= u32::from(self.lane(lane).value() < 0.0) << lane;
-        }
-        lanes
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.if_negative(-self, self)
-    }
-
-    /// e^self.
-    #[inline(always)]
-    fn exp(self) -> Self {
-        (self * Self::of(std::f64::consts::LOG2_E)).exp2()
-    }
-
-    /// Rows of coordinates, one row a lane and all as long as `out`, as one row of lanes, each coordinate k less its lane's
-    /// `origin[k % 3]`. Writes all of `out`.
-    fn read_rows(rows: &[&[Self::Data]], origin: &[[Self::Data; 3]], out: &mut [MaybeUninit<Self>]) {
-        lanes::read_rows_one_by_one(rows, origin, out);
-    }
-
-    /// The way back: lane l of every number to `rows[l]`.
-    fn write_rows(numbers: &[Self], rows: &mut [&mut [Self::Data]]) {
-        lanes::write_rows_one_by_one(numbers, rows);
-    }
-}
-
-/// One lane of a number in double precision.
-pub type WideScalar<R> = <<R as Real>::Wide as Real>::Scalar;
-
-/// A number that stands alone, so that decisions (contact, hull) can be taken on its value.
-pub trait Scalar: Real<Scalar = Self> {
-    fn value(self) -> f64;
-    fn read(data: Self::Data) -> Self;
-    fn data(self) -> Self::Data;
-}
-
-/// Looks at 1024 numbers before it decides whether to go on: so the look vectorises.
-pub fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
-    let broken = |piece: &[S]| piece.iter().fold(false, |broken, x| broken | !x.value().is_finite());
-    !numbers.chunks(1024).any(broken)
-}
-
-/// A floating-point format of the caller's arrays, itself a number with one lane.
-pub trait Data: Scalar<Data = Self> + gate::Gates {
-    /// The distance from 1 to the next number.
-    const EPSILON: f64;
-    /// The ones that are kept in this format, of constants that are kept in both.
-    fn pick<'a>(single: &'a [f32], double: &'a [f64]) -> &'a [Self];
-}
+pub use real::{BLOCK, Data, Kernel, Real, SUMS, Scalar, WideScalar, Work, all_finite};

@@ -1,6 +1,7 @@
 //! Lane types on aarch64, of 128 bits: NEON is in every such CPU.
 
 use super::registers::*;
+use super::target::run_neon;
 use core::arch::aarch64::*;
 
 /// One intrinsic for each operation of a register, by the operation's name.
@@ -12,40 +13,40 @@ mod single128 {
     };
     #[inline(always)]
     pub unsafe fn fmadd(x: float32x4_t, factor: float32x4_t, term: float32x4_t) -> float32x4_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vfmaq_f32(term, x, factor) }
     }
     #[inline(always)]
     pub unsafe fn fnmadd(x: float32x4_t, factor: float32x4_t, term: float32x4_t) -> float32x4_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vfmsq_f32(term, x, factor) }
     }
     // NEON's own maximum and minimum are NaN where either operand is, and tell +0 from -0.
     #[inline(always)]
     pub unsafe fn max(a: float32x4_t, b: float32x4_t) -> float32x4_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vbslq_f32(vcgtq_f32(a, b), a, b) }
     }
     #[inline(always)]
     pub unsafe fn min(a: float32x4_t, b: float32x4_t) -> float32x4_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vbslq_f32(vcltq_f32(a, b), a, b) }
     }
     #[inline(always)]
     pub unsafe fn if_negative(x: float32x4_t, below: float32x4_t, otherwise: float32x4_t) -> float32x4_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vbslq_f32(vcltzq_f32(x), below, otherwise) }
     }
     #[inline(always)]
     pub unsafe fn low_bits_as_power(x: float32x4_t) -> float32x4_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vreinterpretq_f32_u32(vshlq_n_u32::<23>(vreinterpretq_u32_f32(x))) }
     }
     pub const LANES: u32 = 4;
     /// One bit a lane.
     #[inline(always)]
     pub unsafe fn negative(x: float32x4_t) -> u32 {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vaddvq_u32(vandq_u32(vcltzq_f32(x), vld1q_u32([1, 2, 4, 8].as_ptr()))) }
     }
 }
@@ -58,51 +59,45 @@ mod double128 {
     };
     #[inline(always)]
     pub unsafe fn fmadd(x: float64x2_t, factor: float64x2_t, term: float64x2_t) -> float64x2_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vfmaq_f64(term, x, factor) }
     }
     #[inline(always)]
     pub unsafe fn fnmadd(x: float64x2_t, factor: float64x2_t, term: float64x2_t) -> float64x2_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vfmsq_f64(term, x, factor) }
     }
     #[inline(always)]
     pub unsafe fn max(a: float64x2_t, b: float64x2_t) -> float64x2_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vbslq_f64(vcgtq_f64(a, b), a, b) }
     }
     #[inline(always)]
     pub unsafe fn min(a: float64x2_t, b: float64x2_t) -> float64x2_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vbslq_f64(vcltq_f64(a, b), a, b) }
     }
     #[inline(always)]
     pub unsafe fn if_negative(x: float64x2_t, below: float64x2_t, otherwise: float64x2_t) -> float64x2_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vbslq_f64(vcltzq_f64(x), below, otherwise) }
     }
     #[inline(always)]
     pub unsafe fn low_bits_as_power(x: float64x2_t) -> float64x2_t {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vreinterpretq_f64_u64(vshlq_n_u64::<52>(vreinterpretq_u64_f64(x))) }
     }
     pub const LANES: u32 = 2;
     /// One bit a lane.
     #[inline(always)]
     pub unsafe fn negative(x: float64x2_t) -> u32 {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { vaddvq_u64(vandq_u64(vcltzq_f64(x), vld1q_u64([1, 2].as_ptr()))) as u32 }
     }
 }
 
-double!(F64x4: 4, float64x2_t, double128, apart128);
-single!(F32x4: 4, F64x4, float32x4_t, single128, apart128, border128);
-
-#[inline(never)]
-#[target_feature(enable = "neon")]
-fn apart128<F: Room<A>, A>(arguments: A) -> F::Output {
-    F::enter(arguments)
-}
+double!(F64x4: 4, float64x2_t, double128, run_neon);
+single!(F32x4: 4, F64x4, float32x4_t, single128, run_neon, border128);
 
 border!(
     border128,
@@ -117,17 +112,17 @@ border!(
 impl Square for F32x4 {
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: behind the gate; the caller says that as many numbers lie there as there are lanes.
+        // SAFETY: the CPU has the level; the caller says that as many numbers lie there as there are lanes.
         F32x4(unsafe { vld1q_f32(from) })
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: behind the gate; the caller says that as many numbers lie there as there are lanes.
+        // SAFETY: the CPU has the level; the caller says that as many numbers lie there as there are lanes.
         unsafe { vst1q_f32(to, self.0) }
     }
     #[inline(always)]
-    fn turn(block: &mut [Self]) {
-        // SAFETY: behind the gate.
+    fn transpose(block: &mut [Self]) {
+        // SAFETY: the CPU has the level.
         unsafe {
             // Within quarters of 2 × 2 first, then the quarters, each row of one a double, among each other.
             let [a, b, c, d] = [block[0].0, block[1].0, block[2].0, block[3].0];

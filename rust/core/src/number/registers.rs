@@ -7,7 +7,7 @@
 
 // What the macros' text names: their users take all of this file.
 pub(super) use super::curves::{self, Format};
-pub(super) use super::{Fused, Real, Room, Scalar};
+pub(super) use super::{Fused, Kernel, Real, Scalar};
 pub(super) use std::mem::MaybeUninit;
 pub(super) use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -17,7 +17,7 @@ macro_rules! operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                // SAFETY: behind the gate.
+                // SAFETY: the CPU has the level.
                 $name($(unsafe { $intrinsics::$method(self.$part, other.$part) }),+)
             }
         }
@@ -51,7 +51,7 @@ macro_rules! lanes {
             type Output = Self;
             #[inline(always)]
             fn neg(self) -> Self {
-                // SAFETY: behind the gate.
+                // SAFETY: the CPU has the level.
                 $name($(unsafe { $intrinsics::sub($intrinsics::splat(-0.0), self.$part) }),+)
             }
         }
@@ -62,7 +62,7 @@ macro_rules! lanes {
             const POWERS: &'static [f64] = <$float as Format>::POWERS;
             #[inline(always)]
             fn low_bits_as_power(self) -> Self {
-                // SAFETY: behind the gate.
+                // SAFETY: the CPU has the level.
                 $name($(unsafe { $intrinsics::low_bits_as_power(self.$part) }),+)
             }
         }
@@ -78,48 +78,48 @@ macro_rules! arithmetic {
 
         #[inline(always)]
         fn of(value: f64) -> Self {
-            // SAFETY: behind the gate.
+            // SAFETY: the CPU has the level.
             $name($(unsafe { splat_part!($intrinsics, value as $float, $part) }),+)
         }
         #[inline(always)]
         fn splat(number: $float) -> Self {
-            // SAFETY: behind the gate.
+            // SAFETY: the CPU has the level.
             $name($(unsafe { splat_part!($intrinsics, number, $part) }),+)
         }
         #[inline(always)]
         fn mul_add(self, factor: Self, term: Self) -> Self {
-            // SAFETY: behind the gate.
+            // SAFETY: the CPU has the level.
             $name($(unsafe { $intrinsics::fmadd(self.$part, factor.$part, term.$part) }),+)
         }
         #[inline(always)]
         fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-            // SAFETY: behind the gate.
+            // SAFETY: the CPU has the level.
             $name($(unsafe { $intrinsics::fnmadd(self.$part, factor.$part, term.$part) }),+)
         }
         #[inline(always)]
         fn if_negative(self, below: Self, otherwise: Self) -> Self {
-            // SAFETY: behind the gate.
+            // SAFETY: the CPU has the level.
             $name($(unsafe { $intrinsics::if_negative(self.$part, below.$part, otherwise.$part) }),+)
         }
         #[inline(always)]
         fn negative(self) -> u32 {
-            // SAFETY: behind the gate.
+            // SAFETY: the CPU has the level.
             0 $(| (unsafe { $intrinsics::negative(self.$part) } << ($part * $intrinsics::LANES)))+
         }
         // The instructions give their second operand where the first is NaN.
         #[inline(always)]
         fn at_least(self, floor: Self) -> Self {
-            // SAFETY: behind the gate.
+            // SAFETY: the CPU has the level.
             $name($(unsafe { $intrinsics::max(floor.$part, self.$part) }),+)
         }
         #[inline(always)]
         fn at_most(self, ceiling: Self) -> Self {
-            // SAFETY: behind the gate.
+            // SAFETY: the CPU has the level.
             $name($(unsafe { $intrinsics::min(ceiling.$part, self.$part) }),+)
         }
         #[inline(always)]
         fn sqrt(self) -> Self {
-            // SAFETY: behind the gate.
+            // SAFETY: the CPU has the level.
             $name($(unsafe { $intrinsics::sqrt(self.$part) }),+)
         }
         #[inline(always)]
@@ -160,7 +160,7 @@ macro_rules! arithmetic {
 }
 
 macro_rules! double {
-    ($name:ident: $lanes:literal, $register:ty, $intrinsics:ident, $apart:ident) => {
+    ($name:ident: $lanes:literal, $register:ty, $intrinsics:ident, $run:ident) => {
         #[derive(Clone, Copy)]
         #[repr(C)]
         pub struct $name($register, $register);
@@ -170,9 +170,9 @@ macro_rules! double {
             arithmetic!($name: $lanes x f64, $intrinsics, 0 1);
             type Wide = Self;
             #[inline(always)]
-            fn apart<F: Room<A>, A>(arguments: A) -> F::Output {
-                // SAFETY: behind the gate.
-                unsafe { $apart::<F, A>(arguments) }
+            fn dispatch<F: Kernel<A>, A>(arguments: A) -> F::Output {
+                // SAFETY: the CPU has the level.
+                unsafe { $run::<F, A>(arguments) }
             }
             #[inline(always)]
             fn widen(self) -> Self {
@@ -187,7 +187,7 @@ macro_rules! double {
 }
 
 macro_rules! single {
-    ($name:ident: $lanes:literal, $wide:ident, $register:ty, $intrinsics:ident, $apart:ident, $border:ident) => {
+    ($name:ident: $lanes:literal, $wide:ident, $register:ty, $intrinsics:ident, $run:ident, $border:ident) => {
         #[derive(Clone, Copy)]
         #[repr(C)]
         pub struct $name($register);
@@ -197,38 +197,38 @@ macro_rules! single {
             arithmetic!($name: $lanes x f32, $intrinsics, 0);
             type Wide = $wide;
             #[inline(always)]
-            fn apart<F: Room<A>, A>(arguments: A) -> F::Output {
-                // SAFETY: behind the gate.
-                unsafe { $apart::<F, A>(arguments) }
+            fn dispatch<F: Kernel<A>, A>(arguments: A) -> F::Output {
+                // SAFETY: the CPU has the level.
+                unsafe { $run::<F, A>(arguments) }
             }
             #[inline(always)]
             fn widen(self) -> $wide {
-                // SAFETY: behind the gate.
+                // SAFETY: the CPU has the level.
                 unsafe { $border::widen(self) }
             }
             #[inline(always)]
             fn widen_in_line(self) -> $wide {
-                // SAFETY: behind the gate.
+                // SAFETY: the CPU has the level.
                 unsafe { $border::widen_in_line(self) }
             }
             #[inline(always)]
             fn narrow(wide: $wide) -> Self {
-                // SAFETY: behind the gate.
+                // SAFETY: the CPU has the level.
                 unsafe { $border::narrow(wide) }
             }
             #[inline(always)]
             fn add_to(self, sum: &mut $wide) {
-                // SAFETY: behind the gate.
+                // SAFETY: the CPU has the level.
                 unsafe { $border::add_to(self, sum) }
             }
             #[inline(always)]
             fn read_rows(rows: &[&[f32]], origin: &[[f32; 3]], out: &mut [MaybeUninit<Self>]) {
-                // SAFETY: behind the gate.
+                // SAFETY: the CPU has the level.
                 unsafe { $border::read_rows(rows, origin, out) }
             }
             #[inline(always)]
             fn write_rows(numbers: &[Self], rows: &mut [&mut [f32]]) {
-                // SAFETY: behind the gate.
+                // SAFETY: the CPU has the level.
                 unsafe { $border::write_rows(numbers, rows) }
             }
         }
@@ -240,7 +240,7 @@ pub(super) trait Square: Real<Data = f32> {
     unsafe fn load(from: *const f32) -> Self;
     unsafe fn store(self, to: *mut f32);
     /// Number i of body l becomes lane l of number i, and back.
-    fn turn(block: &mut [Self]);
+    fn transpose(block: &mut [Self]);
 }
 
 #[inline(always)]
@@ -255,10 +255,10 @@ pub(super) fn read_squares<S: Square, const N: usize>(
     for start in (0..whole).step_by(N) {
         let mut block = [S::zero(); N];
         for (number, row) in block.iter_mut().zip(rows) {
-            // SAFETY: behind the gate; start + N ≤ out.len() = row.len().
+            // SAFETY: the CPU has the level; start + N ≤ out.len() = row.len().
             *number = unsafe { S::load(row.as_ptr().add(start)) };
         }
-        S::turn(&mut block);
+        S::transpose(&mut block);
         for (i, &number) in block.iter().enumerate() {
             out[start + i].write(number - origins[(start + i) % 3]);
         }
@@ -277,9 +277,9 @@ pub(super) fn write_squares<S: Square, const N: usize>(numbers: &[S], rows: &mut
         for (i, number) in block.iter_mut().enumerate() {
             *number = numbers[start + i];
         }
-        S::turn(&mut block);
+        S::transpose(&mut block);
         for (number, row) in block.iter().zip(rows.iter_mut()) {
-            // SAFETY: behind the gate; start + N ≤ numbers.len() = row.len().
+            // SAFETY: the CPU has the level; start + N ≤ numbers.len() = row.len().
             unsafe { number.store(row.as_mut_ptr().add(start)) };
         }
     }

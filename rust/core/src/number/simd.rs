@@ -1,6 +1,7 @@
 //! Lane types on x86-64, of 256 and 512 bits.
 
 use super::registers::*;
+use super::target::{run_avx2, run_avx512};
 use core::arch::x86_64::*;
 
 /// One intrinsic for each operation of a register, by the operation's name.
@@ -13,7 +14,7 @@ mod single512 {
     };
     #[inline(always)]
     pub unsafe fn if_negative(x: __m512, below: __m512, otherwise: __m512) -> __m512 {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe {
             let negative = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(x, _mm512_setzero_ps());
             _mm512_mask_blend_ps(negative, otherwise, below)
@@ -21,14 +22,14 @@ mod single512 {
     }
     #[inline(always)]
     pub unsafe fn low_bits_as_power(x: __m512) -> __m512 {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { _mm512_castsi512_ps(_mm512_slli_epi32::<23>(_mm512_castps_si512(x))) }
     }
     pub const LANES: u32 = 16;
     /// One bit a lane.
     #[inline(always)]
     pub unsafe fn negative(x: __m512) -> u32 {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(x, _mm512_setzero_ps()) as u32 }
     }
 }
@@ -42,7 +43,7 @@ mod double512 {
     };
     #[inline(always)]
     pub unsafe fn if_negative(x: __m512d, below: __m512d, otherwise: __m512d) -> __m512d {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe {
             let negative = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(x, _mm512_setzero_pd());
             _mm512_mask_blend_pd(negative, otherwise, below)
@@ -50,14 +51,14 @@ mod double512 {
     }
     #[inline(always)]
     pub unsafe fn low_bits_as_power(x: __m512d) -> __m512d {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(x))) }
     }
     pub const LANES: u32 = 8;
     /// One bit a lane.
     #[inline(always)]
     pub unsafe fn negative(x: __m512d) -> u32 {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(x, _mm512_setzero_pd()) as u32 }
     }
 }
@@ -71,19 +72,19 @@ mod single256 {
     };
     #[inline(always)]
     pub unsafe fn if_negative(x: __m256, below: __m256, otherwise: __m256) -> __m256 {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { _mm256_blendv_ps(otherwise, below, _mm256_cmp_ps::<_CMP_LT_OQ>(x, _mm256_setzero_ps())) }
     }
     #[inline(always)]
     pub unsafe fn low_bits_as_power(x: __m256) -> __m256 {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { _mm256_castsi256_ps(_mm256_slli_epi32::<23>(_mm256_castps_si256(x))) }
     }
     pub const LANES: u32 = 8;
     /// One bit a lane.
     #[inline(always)]
     pub unsafe fn negative(x: __m256) -> u32 {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(x, _mm256_setzero_ps())) as u32 }
     }
 }
@@ -97,39 +98,27 @@ mod double256 {
     };
     #[inline(always)]
     pub unsafe fn if_negative(x: __m256d, below: __m256d, otherwise: __m256d) -> __m256d {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { _mm256_blendv_pd(otherwise, below, _mm256_cmp_pd::<_CMP_LT_OQ>(x, _mm256_setzero_pd())) }
     }
     #[inline(always)]
     pub unsafe fn low_bits_as_power(x: __m256d) -> __m256d {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(x))) }
     }
     pub const LANES: u32 = 4;
     /// One bit a lane.
     #[inline(always)]
     pub unsafe fn negative(x: __m256d) -> u32 {
-        // SAFETY: behind the gate.
+        // SAFETY: the CPU has the level.
         unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(x, _mm256_setzero_pd())) as u32 }
     }
 }
 
-double!(F64x16: 16, __m512d, double512, apart512);
-double!(F64x8: 8, __m256d, double256, apart256);
-single!(F32x16: 16, F64x16, __m512, single512, apart512, border512);
-single!(F32x8: 8, F64x8, __m256, single256, apart256, border256);
-
-#[inline(never)]
-#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx2,fma")]
-pub(super) fn apart512<F: Room<A>, A>(arguments: A) -> F::Output {
-    F::enter(arguments)
-}
-
-#[inline(never)]
-#[target_feature(enable = "avx2,fma")]
-pub(super) fn apart256<F: Room<A>, A>(arguments: A) -> F::Output {
-    F::enter(arguments)
-}
+double!(F64x16: 16, __m512d, double512, run_avx512);
+double!(F64x8: 8, __m256d, double256, run_avx2);
+single!(F32x16: 16, F64x16, __m512, single512, run_avx512, border512);
+single!(F32x8: 8, F64x8, __m256, single256, run_avx2, border256);
 
 border!(
     border512,
@@ -153,17 +142,17 @@ border!(
 impl Square for F32x16 {
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: behind the gate; the caller says that as many numbers lie there as there are lanes.
+        // SAFETY: the CPU has the level; the caller says that as many numbers lie there as there are lanes.
         F32x16(unsafe { _mm512_loadu_ps(from) })
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: behind the gate; the caller says that as many numbers lie there as there are lanes.
+        // SAFETY: the CPU has the level; the caller says that as many numbers lie there as there are lanes.
         unsafe { _mm512_storeu_ps(to, self.0) }
     }
     #[inline(always)]
-    fn turn(block: &mut [Self]) {
-        // SAFETY: behind the gate.
+    fn transpose(block: &mut [Self]) {
+        // SAFETY: the CPU has the level.
         unsafe {
             // Within quarters of 4 × 4 first, then the quarters among each other.
             for group in block.chunks_exact_mut(4) {
@@ -191,17 +180,17 @@ impl Square for F32x16 {
 impl Square for F32x8 {
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: behind the gate; the caller says that as many numbers lie there as there are lanes.
+        // SAFETY: the CPU has the level; the caller says that as many numbers lie there as there are lanes.
         F32x8(unsafe { _mm256_loadu_ps(from) })
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: behind the gate; the caller says that as many numbers lie there as there are lanes.
+        // SAFETY: the CPU has the level; the caller says that as many numbers lie there as there are lanes.
         unsafe { _mm256_storeu_ps(to, self.0) }
     }
     #[inline(always)]
-    fn turn(block: &mut [Self]) {
-        // SAFETY: behind the gate.
+    fn transpose(block: &mut [Self]) {
+        // SAFETY: the CPU has the level.
         unsafe {
             for group in block.chunks_exact_mut(4) {
                 let [a, b, c, d] = [group[0].0, group[1].0, group[2].0, group[3].0];

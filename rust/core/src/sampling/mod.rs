@@ -5,20 +5,16 @@
 //! more of a sample than a number or two, such as its height: these are interpolated from the vertices' numbers
 //! ([`Walk`]), and what a room finds for each sample is added to the vertices by the same weights.
 
-mod points;
 mod walk;
 
-pub use points::{Place, Points};
-pub use walk::{CHUNK, Chunk, Row, SUMS, Walk, fold, sum_row};
+use walk::Weights;
+pub use walk::{CHUNK, Chunk, Row, Walk, fold, sum_row};
 
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::mesh::Mesh;
 use crate::number::vector::{Vec3, add_scaled, add_to, cross, dot, narrow, sub, widen};
-use crate::number::{BLOCK, Data, Real, Room, Scalar, WideScalar};
-use crate::quantity::Quantity;
-use crate::scene::Scene;
-use crate::template::Template;
+use crate::number::{BLOCK, Real, Scalar, WideScalar};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -36,24 +32,6 @@ pub struct Samples {
     /// Σ of the samples of each part as a sparse row over the vertices.
     pub part_sums: Vec<PartSum>,
     pub walk: Walk,
-}
-
-/// Constants that are kept in both precisions, so that no loop has to convert them.
-#[derive(Clone, Debug, Default)]
-pub struct Weights {
-    single: Vec<f32>,
-    double: Vec<f64>,
-}
-
-impl Weights {
-    pub fn new(double: Vec<f64>) -> Self {
-        Weights { single: memory::collect(double.iter().map(|&weight| weight as f32)), double }
-    }
-
-    #[inline(always)]
-    pub fn get<R: Real>(&self, index: usize) -> R {
-        R::splat(R::Data::pick(&self.single, &self.double)[index])
-    }
 }
 
 /// Σ_{i in part} (W V)_i = Σ weight · vertex.
@@ -194,55 +172,6 @@ fn part_sums(mesh: &Mesh, parts: &[u32], corners: &[[u32; 3]], barycentric: &[[f
         sum.vertices = memory::copied(&touched);
     }
     sums
-}
-
-/// The samples' positions in the world, metres: W V.
-pub struct SampleSurface;
-
-impl Quantity for SampleSurface {
-    type Saved<R: Real> = ();
-
-    fn len(&self, template: &Template) -> usize {
-        3 * template.samples.len()
-    }
-
-    fn check(&self, _: &Template) -> Result<()> {
-        Ok(())
-    }
-
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) {
-        R::apart::<SurfaceForward, _>((scene, out));
-    }
-
-    fn backward<R: Real>(&self, scene: &Scene<R>, _: &(), d_out: &[R], d_points: &mut [Vec3<R>]) {
-        R::apart::<SurfaceBackward, _>((&scene.template.samples, d_out, d_points));
-    }
-}
-
-struct SurfaceForward;
-
-impl<R: Real> Room<(&Scene<'_, R>, &mut [R])> for SurfaceForward {
-    type Output = ();
-
-    #[inline(always)]
-    fn enter((scene, out): (&Scene<'_, R>, &mut [R])) {
-        for (sample, out) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-            scene.put(widen(scene.template.samples.point(sample, scene.points)), out);
-        }
-    }
-}
-
-struct SurfaceBackward;
-
-impl<R: Real> Room<(&Samples, &[R], &mut [Vec3<R>])> for SurfaceBackward {
-    type Output = ();
-
-    #[inline(always)]
-    fn enter((samples, d_out, d_points): (&Samples, &[R], &mut [Vec3<R>])) {
-        for (sample, &d_point) in d_out.as_chunks::<3>().0.iter().enumerate() {
-            samples.point_backward(sample, d_point, d_points);
-        }
-    }
 }
 
 impl PartSum {

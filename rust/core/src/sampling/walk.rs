@@ -1,9 +1,26 @@
 //! The walk: the order in which passes visit the samples, and how numbers go from vertices to samples and back.
 
-use super::Weights;
 use crate::memory;
-use crate::number::{Data, Real, Room};
+use crate::number::{Data, Kernel, Real, SUMS};
 use std::ops::Range;
+
+/// Constants that are kept in both precisions, so that no loop has to convert them.
+#[derive(Clone, Debug, Default)]
+pub struct Weights {
+    single: Vec<f32>,
+    double: Vec<f64>,
+}
+
+impl Weights {
+    pub fn new(double: Vec<f64>) -> Self {
+        Weights { single: memory::collect(double.iter().map(|&weight| weight as f32)), double }
+    }
+
+    #[inline(always)]
+    pub fn get<R: Real>(&self, index: usize) -> R {
+        R::splat(R::Data::pick(&self.single, &self.double)[index])
+    }
+}
 
 /// The order in which passes visit the samples: faces with equally many samples one after the other, so that the loops
 /// over a face's samples have lengths that the compiler knows.
@@ -61,14 +78,14 @@ impl Walk {
     /// (W x)_i for the samples of a chunk: the vertices' numbers x interpolated.
     pub fn interpolate<R: Real>(&self, chunk: &Chunk, vertices: &[R], row: &mut Row<R>) {
         match chunk.group_size() {
-            1 => R::apart::<Interpolate<1>, _>((self, chunk, vertices, row)),
-            2 => R::apart::<Interpolate<2>, _>((self, chunk, vertices, row)),
-            3 => R::apart::<Interpolate<3>, _>((self, chunk, vertices, row)),
-            4 => R::apart::<Interpolate<4>, _>((self, chunk, vertices, row)),
-            5 => R::apart::<Interpolate<5>, _>((self, chunk, vertices, row)),
-            6 => R::apart::<Interpolate<6>, _>((self, chunk, vertices, row)),
-            7 => R::apart::<Interpolate<7>, _>((self, chunk, vertices, row)),
-            _ => R::apart::<Interpolate<8>, _>((self, chunk, vertices, row)),
+            1 => R::dispatch::<Interpolate<1>, _>((self, chunk, vertices, row)),
+            2 => R::dispatch::<Interpolate<2>, _>((self, chunk, vertices, row)),
+            3 => R::dispatch::<Interpolate<3>, _>((self, chunk, vertices, row)),
+            4 => R::dispatch::<Interpolate<4>, _>((self, chunk, vertices, row)),
+            5 => R::dispatch::<Interpolate<5>, _>((self, chunk, vertices, row)),
+            6 => R::dispatch::<Interpolate<6>, _>((self, chunk, vertices, row)),
+            7 => R::dispatch::<Interpolate<7>, _>((self, chunk, vertices, row)),
+            _ => R::dispatch::<Interpolate<8>, _>((self, chunk, vertices, row)),
         }
     }
 
@@ -87,14 +104,14 @@ impl Walk {
     /// Adds (Wᵀ y)_v of a chunk's samples to the vertices' numbers.
     pub fn scatter<R: Real>(&self, chunk: &Chunk, row: &Row<R>, vertices: &mut [R]) {
         match chunk.group_size() {
-            1 => R::apart::<Scatter<1>, _>((self, chunk, row, vertices)),
-            2 => R::apart::<Scatter<2>, _>((self, chunk, row, vertices)),
-            3 => R::apart::<Scatter<3>, _>((self, chunk, row, vertices)),
-            4 => R::apart::<Scatter<4>, _>((self, chunk, row, vertices)),
-            5 => R::apart::<Scatter<5>, _>((self, chunk, row, vertices)),
-            6 => R::apart::<Scatter<6>, _>((self, chunk, row, vertices)),
-            7 => R::apart::<Scatter<7>, _>((self, chunk, row, vertices)),
-            _ => R::apart::<Scatter<8>, _>((self, chunk, row, vertices)),
+            1 => R::dispatch::<Scatter<1>, _>((self, chunk, row, vertices)),
+            2 => R::dispatch::<Scatter<2>, _>((self, chunk, row, vertices)),
+            3 => R::dispatch::<Scatter<3>, _>((self, chunk, row, vertices)),
+            4 => R::dispatch::<Scatter<4>, _>((self, chunk, row, vertices)),
+            5 => R::dispatch::<Scatter<5>, _>((self, chunk, row, vertices)),
+            6 => R::dispatch::<Scatter<6>, _>((self, chunk, row, vertices)),
+            7 => R::dispatch::<Scatter<7>, _>((self, chunk, row, vertices)),
+            _ => R::dispatch::<Scatter<8>, _>((self, chunk, row, vertices)),
         }
     }
 }
@@ -102,11 +119,11 @@ impl Walk {
 /// [`Walk::interpolate`] for groups of N samples.
 struct Interpolate<const N: usize>;
 
-impl<R: Real, const N: usize> Room<(&Walk, &Chunk, &[R], &mut Row<R>)> for Interpolate<N> {
+impl<R: Real, const N: usize> Kernel<(&Walk, &Chunk, &[R], &mut Row<R>)> for Interpolate<N> {
     type Output = ();
 
     #[inline(always)]
-    fn enter((walk, chunk, vertices, row): (&Walk, &Chunk, &[R], &mut Row<R>)) {
+    fn run((walk, chunk, vertices, row): (&Walk, &Chunk, &[R], &mut Row<R>)) {
         let weights = walk.weights.of_samples::<R, N>(chunk);
         let rows = row.as_chunks_mut::<N>().0;
         for ((&[a, b, c], weights), row) in walk.corners[chunk.groups.clone()].iter().zip(weights).zip(rows) {
@@ -122,11 +139,11 @@ impl<R: Real, const N: usize> Room<(&Walk, &Chunk, &[R], &mut Row<R>)> for Inter
 /// [`Walk::scatter`] for groups of N samples.
 struct Scatter<const N: usize>;
 
-impl<R: Real, const N: usize> Room<(&Walk, &Chunk, &Row<R>, &mut [R])> for Scatter<N> {
+impl<R: Real, const N: usize> Kernel<(&Walk, &Chunk, &Row<R>, &mut [R])> for Scatter<N> {
     type Output = ();
 
     #[inline(always)]
-    fn enter((walk, chunk, row, vertices): (&Walk, &Chunk, &Row<R>, &mut [R])) {
+    fn run((walk, chunk, row, vertices): (&Walk, &Chunk, &Row<R>, &mut [R])) {
         let weights = walk.weights.of_samples::<R, N>(chunk);
         let rows = row.as_chunks::<N>().0;
         for ((&[a, b, c], weights), row) in walk.corners[chunk.groups.clone()].iter().zip(weights).zip(rows) {
@@ -167,9 +184,6 @@ impl Weights {
         weights.as_chunks::<3>().0.as_chunks::<N>().0
     }
 }
-
-/// Running sums over a row: one body alone sums in the same order as in a lane, and yet its sums vectorise.
-pub const SUMS: usize = 8;
 
 /// Σ of a row's first `len` numbers.
 #[inline(always)]

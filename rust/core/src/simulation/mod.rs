@@ -9,14 +9,15 @@ mod world;
 
 use crate::batch::Batch;
 use crate::error::{Error, Result, status};
+use crate::mass_properties::MassProperties;
 use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, dot};
 use crate::number::{Data, all_finite};
 use crate::options::{not_negative, positive};
 use crate::solid::Solid;
 use crate::threads;
-use crate::volume::MassProperties;
 use contact::Shape;
+pub use world::Placement;
 
 /// How bodies are put on their ground and let go.
 pub struct Simulation {
@@ -33,29 +34,12 @@ pub struct Simulation {
     pub looks: Vec<usize>,
 }
 
-/// Where a body is: its centre of mass in the world, and how it has turned since its pose.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
-    pub centre: Vec3<f64>,
-    pub rotation: [Vec3<f64>; 3],
-}
-
 /// What became of one body.
 #[derive(Clone, Debug)]
 pub struct Motion {
     pub status: u32,
     /// Where it was let go, then one place a look; NaN for a body that is not simulated.
-    pub places: Vec<Place>,
-}
-
-impl Place {
-    fn nowhere() -> Self {
-        Place { centre: [f64::NAN; 3], rotation: [[f64::NAN; 3]; 3] }
-    }
-
-    fn at(centre: Vec3<f64>) -> Self {
-        Place { centre, rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }
-    }
+    pub places: Vec<Placement>,
 }
 
 impl Simulation {
@@ -73,7 +57,7 @@ impl Simulation {
     }
 
     fn unknown(&self, status: u32) -> Motion {
-        Motion { status, places: memory::filled(Place::nowhere(), 1 + self.looks.len()) }
+        Motion { status, places: memory::filled(Placement::nowhere(), 1 + self.looks.len()) }
     }
 
     /// Whatever the engine may do to one body, the others must not notice.
@@ -87,7 +71,7 @@ impl Simulation {
                 add_scaled(&mut centre, up, normal);
             }
             let fall = world::Fall { solid, normal, height, points: &points, friction: self.friction, step: self.step };
-            let mut places = vec![Place::at(centre)];
+            let mut places = vec![Placement::at(centre)];
             places.extend(fall.run(centre, &self.looks)?);
             Some(places)
         });

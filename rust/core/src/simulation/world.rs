@@ -1,6 +1,5 @@
 //! One body in a world of its own, in the engine rapier.
 
-use super::Place;
 use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, scale};
 use crate::solid::{GRAVITY, Solid};
@@ -8,6 +7,23 @@ use rapier3d_f64::prelude::*;
 
 /// Of the balls at the corners, m. They touch where their corner would, for the half-space lies lower by as much.
 const RADIUS: f64 = 1e-4;
+
+/// Where a body is: its centre of mass in the world, and how it has turned since its pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    pub centre: Vec3<f64>,
+    pub rotation: [Vec3<f64>; 3],
+}
+
+impl Placement {
+    pub(super) fn nowhere() -> Self {
+        Placement { centre: [f64::NAN; 3], rotation: [[f64::NAN; 3]; 3] }
+    }
+
+    pub(super) fn at(centre: Vec3<f64>) -> Self {
+        Placement { centre, rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }
+    }
+}
 
 pub struct Fall<'a> {
     pub solid: &'a Solid,
@@ -23,7 +39,7 @@ pub struct Fall<'a> {
 
 impl Fall<'_> {
     /// Where the body is after so many steps, ascending; None if the engine loses it.
-    pub fn run(&self, centre: Vec3<f64>, looks: &[usize]) -> Option<Vec<Place>> {
+    pub fn run(&self, centre: Vec3<f64>, looks: &[usize]) -> Option<Vec<Placement>> {
         let mut world = PhysicsWorld::new();
         world.gravity = vector(scale(-GRAVITY, self.normal));
         self.set_accuracy(&mut world.integration_parameters);
@@ -76,12 +92,12 @@ impl Fall<'_> {
         body
     }
 
-    fn place(&self, body: &RigidBody) -> Option<Place> {
+    fn place(&self, body: &RigidBody) -> Option<Placement> {
         let centre = body.translation().to_array();
         let columns = Matrix::from_quat(*body.rotation()).to_cols_array_2d();
         let rotation = [0, 1, 2].map(|row| [0, 1, 2].map(|column| columns[column][row]));
         let finite = centre.iter().chain(rotation.as_flattened()).all(|x| x.is_finite());
-        finite.then_some(Place { centre, rotation })
+        finite.then_some(Placement { centre, rotation })
     }
 }
 

@@ -161,3 +161,24 @@ pub fn all<V: Real>(number: V::Scalar) -> V {
 
 /// Directions whose sums stay in registers together.
 const TOGETHER: usize = 3;
+
+#[inline(always)]
+pub fn constants<V: Real, C: Scalar, const W: usize, const P: usize>(tile: &Tile<C, W>) -> Registers<V, P> {
+    let mut numbers = [[V::zero(); P]; 3];
+    for axis in 0..3 {
+        for part in 0..P {
+            numbers[axis][part] = load(&tile[axis], part);
+        }
+    }
+    numbers
+}
+
+#[inline(always)]
+pub fn plus<V: Real, const P: usize>(mut a: Registers<V, P>, b: Registers<V, P>) -> Registers<V, P> {
+    for axis in 0..3 {
+        for part in 0..P {
+            a[axis][part] = a[axis][part] + b[axis][part];
+        }
+    }
+    a
+}

@@ -9,9 +9,9 @@
 //!
 //! and φ = (world rotation of j's parent) · vee(dR Rᵀ) for a change dR of j's own rotation R. Double precision.
 
-use super::chain::apply;
+use super::matrix::{Mat3, apply};
 use super::rotation::Form;
-use super::{Body, Mat3, Skin};
+use super::{Body, Skin};
 use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, cross, scale, sub, zero};
 use crate::number::{Dual, Scalar};

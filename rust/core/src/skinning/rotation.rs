@@ -1,6 +1,6 @@
 //! Rotation matrices of a pose, in either form, and their derivatives. For double precision (or its duals).
 
-use super::Mat3;
+use super::matrix::Mat3;
 use crate::number::Real;
 use crate::number::vector::{Vec3, add, add_scaled, cross, dot, scale, sub};
 use std::f64::consts::PI;

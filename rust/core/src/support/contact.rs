@@ -1,13 +1,12 @@
 //! Contact: which samples touch the ground. Double precision decides, so that single and double precision agree on the
 //! contacts; single precision is asked first, and its answer counts where it is further from τ than its rounding.
 
-use crate::error::Result;
+use crate::error::{Result, unknown_choice};
 use crate::ground::Plane;
 use crate::memory;
-use crate::number::{Data, Real, Room, Scalar, WideScalar};
+use crate::number::{Data, Kernel, Real, Scalar, WideScalar};
 use crate::options::positive;
-use crate::quantity::unknown_choice;
-use crate::scene::Scene;
+use crate::posed::PosedBody;
 
 /// Which samples touch the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,14 +70,14 @@ impl Contact {
         positive("threshold", self.threshold)
     }
 
-    pub fn find<R: Real>(&self, scene: &Scene<R>) -> Contacts<R> {
-        R::apart::<Find, _>((self, scene))
+    pub fn find<R: Real>(&self, posed: &PosedBody<R>) -> Contacts<R> {
+        R::dispatch::<Find, _>((self, posed))
     }
 
     /// Decides about one sample in double precision, for the lanes that are asked for.
     #[inline(always)]
-    fn decide<R: Real>(&self, scene: &Scene<R>, sample: usize, lanes: u32) -> u32 {
-        let height = scene.ground.signed_height(scene.template.samples.wide_point(sample, scene.points));
+    fn decide<R: Real>(&self, posed: &PosedBody<R>, sample: usize, lanes: u32) -> u32 {
+        let height = posed.ground.signed_height(posed.template.samples.wide_point(sample, posed.points));
         let mut touching = 0;
         for lane in 0..R::LANES {
             let touches = self.rule.distance(height.lane(lane)).value() < self.threshold;
@@ -91,18 +90,18 @@ impl Contact {
 /// [`Contact::find`]
 struct Find;
 
-impl<R: Real> Room<(&Contact, &Scene<'_, R>)> for Find {
+impl<R: Real> Kernel<(&Contact, &PosedBody<'_, R>)> for Find {
     type Output = Contacts<R>;
 
     #[inline(always)]
-    fn enter((contact, scene): (&Contact, &Scene<R>)) -> Contacts<R> {
+    fn run((contact, posed): (&Contact, &PosedBody<R>)) -> Contacts<R> {
         let all = u32::MAX >> (32 - R::LANES);
-        let walk = &scene.template.samples.walk;
-        let plane = scene.narrow_plane();
+        let walk = &posed.template.samples.walk;
+        let plane = posed.narrow_plane();
         let threshold = R::of(contact.threshold);
-        let rounding = rounding(scene, contact.threshold);
+        let rounding = rounding(posed, contact.threshold);
         let high = threshold + rounding;
-        let heights = scene.heights();
+        let heights = posed.heights();
         let above = lanes_above(&heights, high);
         let mut touches = Vec::new();
         let mut count = R::zero();
@@ -115,8 +114,8 @@ impl<R: Real> Room<(&Contact, &Scene<'_, R>)> for Find {
                 }
                 let start = heights[a];
                 let (to_b, to_c) = (heights[b] - start, heights[c] - start);
-                let flat_a = plane.flatten(scene.points[a]);
-                let (flat_b, flat_c) = (plane.flatten(scene.points[b]), plane.flatten(scene.points[c]));
+                let flat_a = plane.flatten(posed.points[a]);
+                let (flat_b, flat_c) = (plane.flatten(posed.points[b]), plane.flatten(posed.points[c]));
                 let edges_x = (flat_b[0] - flat_a[0], flat_c[0] - flat_a[0]);
                 let edges_y = (flat_b[1] - flat_a[1], flat_c[1] - flat_a[1]);
                 for place in chunk.samples.start + group * size..chunk.samples.start + (group + 1) * size {
@@ -128,7 +127,7 @@ impl<R: Real> Room<(&Contact, &Scene<'_, R>)> for Find {
                     let mut lanes = inside;
                     let unsure = all & !(inside | outside);
                     if unsure != 0 {
-                        lanes |= contact.decide(scene, walk.order[place] as usize, unsure);
+                        lanes |= contact.decide(posed, walk.order[place] as usize, unsure);
                         test = R::from_lanes(|lane| Real::of(if lanes >> lane & 1 == 1 { -1.0 } else { 1.0 }));
                     }
                     if lanes != 0 {
@@ -148,12 +147,12 @@ impl<R: Real> Room<(&Contact, &Scene<'_, R>)> for Find {
 /// product with a vertex and two interpolations; each of the about 20 roundings is at most half ε of the longest vector
 /// and of the ground's height, and the bound is three times their sum.
 #[inline(always)]
-fn rounding<R: Real>(scene: &Scene<R>, threshold: f64) -> R {
+fn rounding<R: Real>(posed: &PosedBody<R>, threshold: f64) -> R {
     let mut longest = R::zero();
-    for vertex in &scene.points[..scene.template.mesh.num_vertices] {
+    for vertex in &posed.points[..posed.template.mesh.num_vertices] {
         longest = longest.at_least(vertex[0].abs() + vertex[1].abs() + vertex[2].abs());
     }
-    let height = R::narrow(scene.ground.height).abs();
+    let height = R::narrow(posed.ground.height).abs();
     R::of(32.0 * R::Data::EPSILON) * (longest + height + R::of(threshold.abs()))
 }
 
@@ -176,34 +175,34 @@ impl<R: Real> Contacts<R> {
 
     /// The contacts' positions on the ground in one lane, in double precision.
     #[cfg(feature = "lp")]
-    pub fn positions(&self, scene: &Scene<R>, lane: usize) -> Vec<[f64; 2]> {
+    pub fn positions(&self, posed: &PosedBody<R>, lane: usize) -> Vec<[f64; 2]> {
         if self.count(lane) == 0 {
             return Vec::new();
         }
-        let body = OneBody::new(scene, lane);
+        let body = OneBody::new(posed, lane);
         let touches = self.touches.iter().filter(|touch| touch.lanes >> lane & 1 == 1);
         memory::collect(touches.map(|touch| body.flat(touch.sample)))
     }
 }
 
-/// One lane of a scene in double precision.
+/// One lane of a posed in double precision.
 pub(super) struct OneBody<'a, R: Real> {
-    scene: &'a Scene<'a, R>,
+    posed: &'a PosedBody<'a, R>,
     lane: usize,
     plane: Plane<WideScalar<R>>,
 }
 
 impl<'a, R: Real> OneBody<'a, R> {
     #[inline(always)]
-    pub fn new(scene: &'a Scene<'a, R>, lane: usize) -> Self {
+    pub fn new(posed: &'a PosedBody<'a, R>, lane: usize) -> Self {
         let of = |vector: [R::Wide; 3]| [vector[0].lane(lane), vector[1].lane(lane), vector[2].lane(lane)];
-        OneBody { scene, lane, plane: Plane { axes: [of(scene.plane.axes[0]), of(scene.plane.axes[1])] } }
+        OneBody { posed, lane, plane: Plane { axes: [of(posed.plane.axes[0]), of(posed.plane.axes[1])] } }
     }
 
     /// A sample's position on the ground.
     #[inline(always)]
     pub fn flat(&self, sample: u32) -> [f64; 2] {
-        let point = self.scene.template.samples.point_of_lane(sample as usize, self.scene.points, self.lane);
+        let point = self.posed.template.samples.point_of_lane(sample as usize, self.posed.points, self.lane);
         let [x, y] = self.plane.flatten(point);
         [x.value(), y.value()]
     }

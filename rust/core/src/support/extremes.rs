@@ -2,8 +2,8 @@
 //! some directions (after Akl and Toussaint) cannot be a corner. What is left is for the exact hull.
 
 use crate::memory;
-use crate::number::{Real, Room, Scalar};
-use crate::scene::Scene;
+use crate::number::{Kernel, Real, Scalar};
+use crate::posed::PosedBody;
 use crate::support::contact::{Contacts, OneBody};
 use crate::support::hull;
 
@@ -19,9 +19,9 @@ pub struct Hull {
 
 impl<R: Real> Contacts<R> {
     /// The hull of each lane.
-    pub fn hulls(&self, scene: &Scene<R>) -> Vec<Hull> {
-        let edges = Edges::new(self, scene, &R::apart::<Extremes, _>((self,)));
-        R::apart::<Hulls, _>((self, scene, edges))
+    pub fn hulls(&self, posed: &PosedBody<R>) -> Vec<Hull> {
+        let edges = Edges::new(self, posed, &R::dispatch::<Extremes, _>((self,)));
+        R::dispatch::<Hulls, _>((self, posed, edges))
     }
 }
 
@@ -31,11 +31,11 @@ const DIRECTIONS: usize = 16;
 /// In each direction the place of the extreme contact among the touches, −1 in a lane without contacts.
 struct Extremes;
 
-impl<R: Real> Room<(&Contacts<R>,)> for Extremes {
+impl<R: Real> Kernel<(&Contacts<R>,)> for Extremes {
     type Output = [R; DIRECTIONS];
 
     #[inline(always)]
-    fn enter((contacts,): (&Contacts<R>,)) -> [R; DIRECTIONS] {
+    fn run((contacts,): (&Contacts<R>,)) -> [R; DIRECTIONS] {
         let mut normals = [[R::zero(); 2]; DIRECTIONS];
         for (k, normal) in normals.iter_mut().enumerate() {
             let (sin, cos) = (std::f64::consts::TAU * k as f64 / DIRECTIONS as f64).sin_cos();
@@ -64,8 +64,8 @@ struct Edges<R> {
 }
 
 impl<R: Real> Edges<R> {
-    fn new(contacts: &Contacts<R>, scene: &Scene<R>, extremes: &[R; DIRECTIONS]) -> Self {
-        let of_lane = |lane: usize| lane_edges(contacts, scene, lane, extremes);
+    fn new(contacts: &Contacts<R>, posed: &PosedBody<R>, extremes: &[R; DIRECTIONS]) -> Self {
+        let of_lane = |lane: usize| lane_edges(contacts, posed, lane, extremes);
         let lanes: Vec<_> = (0..R::LANES).map(of_lane).collect();
         let number = |k: usize, i: usize| R::from_lanes(|lane| Real::of(lanes[lane][k][i]));
         Edges {
@@ -90,13 +90,13 @@ impl<R: Real> Edges<R> {
 /// directions the edges repeat. Nothing is inside a polygon without area.
 fn lane_edges<R: Real>(
     contacts: &Contacts<R>,
-    scene: &Scene<R>,
+    posed: &PosedBody<R>,
     lane: usize,
     extremes: &[R; DIRECTIONS],
 ) -> [[f64; 3]; DIRECTIONS] {
     let nowhere = [[0.0, 0.0, -1.0]; DIRECTIONS];
     let rounding = contacts.rounding.lane(lane).value();
-    let body = OneBody::new(scene, lane);
+    let body = OneBody::new(posed, lane);
     let mut points = memory::with_capacity(DIRECTIONS);
     for place in extremes {
         let place = place.lane(lane).value();
@@ -120,11 +120,11 @@ fn lane_edges<R: Real>(
 /// [`Contacts::hulls`]
 struct Hulls;
 
-impl<R: Real> Room<(&Contacts<R>, &Scene<'_, R>, Edges<R>)> for Hulls {
+impl<R: Real> Kernel<(&Contacts<R>, &PosedBody<'_, R>, Edges<R>)> for Hulls {
     type Output = Vec<Hull>;
 
     #[inline(always)]
-    fn enter((contacts, scene, edges): (&Contacts<R>, &Scene<R>, Edges<R>)) -> Vec<Hull> {
+    fn run((contacts, posed, edges): (&Contacts<R>, &PosedBody<R>, Edges<R>)) -> Vec<Hull> {
         let mut candidates = memory::filled(Vec::new(), R::LANES);
         for touch in &contacts.touches {
             let mut lanes = touch.lanes & !edges.inside(touch.flat);
@@ -142,7 +142,7 @@ impl<R: Real> Room<(&Contacts<R>, &Scene<'_, R>, Edges<R>)> for Hulls {
             }
             // In public order: of equal points the first is the corner.
             samples.sort_unstable();
-            let body = OneBody::new(scene, lane);
+            let body = OneBody::new(posed, lane);
             let mut positions = memory::with_capacity(samples.len());
             for &sample in &samples {
                 positions.push(body.flat(sample));

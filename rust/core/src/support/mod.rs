@@ -15,8 +15,8 @@ use crate::mass::{Centre, Method};
 use crate::memory;
 use crate::number::vector::{Vec3, narrow};
 use crate::number::{Real, Scalar, WideScalar};
+use crate::posed::{self, PosedBody};
 use crate::quantity::Quantity;
-use crate::scene::{self, Scene};
 use crate::support::extremes::Hull;
 use crate::support::margin::{Margin, Nearest};
 use crate::template::Template;
@@ -35,25 +35,25 @@ pub struct BaseOfSupport {
 
 impl BaseOfSupport {
     /// That of each lane, with its centre of mass.
-    pub fn new<R: Real>(scene: &Scene<R>, contact: &Contact, centre: &Centre<R>) -> Vec<Self> {
-        let centre = scene.plane.flatten(centre.point);
-        let hulls = contact.find(scene).hulls(scene);
+    pub fn new<R: Real>(posed: &PosedBody<R>, contact: &Contact, centre: &Centre<R>) -> Vec<Self> {
+        let centre = posed.plane.flatten(centre.point);
+        let hulls = contact.find(posed).hulls(posed);
         hulls
             .iter()
             .enumerate()
-            .map(|(lane, hull)| Self::of_hull(scene, hull, scene::lane(centre, lane), lane))
+            .map(|(lane, hull)| Self::of_hull(posed, hull, posed::lane(centre, lane), lane))
             .collect()
     }
 
-    fn of_hull<R: Real>(scene: &Scene<R>, hull: &Hull, centre: [f64; 2], lane: usize) -> Self {
+    fn of_hull<R: Real>(posed: &PosedBody<R>, hull: &Hull, centre: [f64; 2], lane: usize) -> Self {
         let margin = match Nearest::find(&hull.corners, centre) {
             Some(nearest) => Margin::new(nearest.map(|i| hull.corners[i]), centre).value,
             None => f64::NEG_INFINITY,
         };
         let value = |x: R::Wide| x.lane(lane).value();
         let [e1, e2, normal, origin] =
-            [scene.plane.axes[0], scene.plane.axes[1], scene.ground.normal, scene.origin].map(|v| v.map(value));
-        let lift = value(scene.ground.height);
+            [posed.plane.axes[0], posed.plane.axes[1], posed.ground.normal, posed.origin].map(|v| v.map(value));
+        let lift = value(posed.ground.height);
         let place = |&[x, y]: &[f64; 2]| std::array::from_fn(|k| x * e1[k] + y * e2[k] + lift * normal[k] + origin[k]);
         BaseOfSupport {
             polygon: memory::collect(hull.corners.iter().map(place)),
@@ -75,10 +75,10 @@ impl BaseOfSupport {
 
 /// BoSE of each lane by the paper's linear programme: g(m̄) is a convex combination of the contact points.
 #[cfg(feature = "lp")]
-pub fn is_supported_lp<R: Real>(scene: &Scene<R>, contact: &Contact, method: Method) -> Vec<bool> {
-    let centre = scene.plane.flatten(method.forward(scene).point);
-    let contacts = contact.find(scene);
-    let supported = |lane| program::is_convex_combination(&contacts.positions(scene, lane), scene::lane(centre, lane));
+pub fn is_supported_lp<R: Real>(posed: &PosedBody<R>, contact: &Contact, method: Method) -> Vec<bool> {
+    let centre = posed.plane.flatten(method.forward(posed).point);
+    let contacts = contact.find(posed);
+    let supported = |lane| program::is_convex_combination(&contacts.positions(posed, lane), posed::lane(centre, lane));
     (0..R::LANES).map(supported).collect()
 }
 
@@ -95,11 +95,11 @@ pub struct SavedMargin<R: Real> {
 }
 
 impl SupportMargin {
-    fn nearest<R: Real>(&self, scene: &Scene<R>, centre: &Centre<R>) -> Vec<Option<Nearest<u32>>> {
-        let point = scene.plane.flatten(centre.point);
-        let hulls = self.contact.find(scene).hulls(scene);
+    fn nearest<R: Real>(&self, posed: &PosedBody<R>, centre: &Centre<R>) -> Vec<Option<Nearest<u32>>> {
+        let point = posed.plane.flatten(centre.point);
+        let hulls = self.contact.find(posed).hulls(posed);
         let nearest = |(lane, hull): (usize, &Hull)| {
-            Some(Nearest::find(&hull.corners, scene::lane(point, lane))?.map(|i| hull.samples[i]))
+            Some(Nearest::find(&hull.corners, posed::lane(point, lane))?.map(|i| hull.samples[i]))
         };
         hulls.iter().enumerate().map(nearest).collect()
     }
@@ -107,14 +107,14 @@ impl SupportMargin {
     /// The margin and its derivatives, with the nearest boundary held.
     #[inline(always)]
     fn margin<R: Real>(
-        scene: &Scene<R>,
+        posed: &PosedBody<R>,
         centre: &Centre<R>,
         nearest: Nearest<u32>,
         lane: usize,
     ) -> Margin<WideScalar<R>> {
-        let flatten = |point| scene.plane.flatten(point).map(|x: R::Wide| x.lane(lane));
-        let samples = &scene.template.samples;
-        let ends = nearest.map(|sample| flatten(samples.wide_point(sample as usize, scene.points)));
+        let flatten = |point| posed.plane.flatten(point).map(|x: R::Wide| x.lane(lane));
+        let samples = &posed.template.samples;
+        let ends = nearest.map(|sample| flatten(samples.wide_point(sample as usize, posed.points)));
         Margin::new(ends, flatten(centre.point))
     }
 }
@@ -122,7 +122,7 @@ impl SupportMargin {
 impl Quantity for SupportMargin {
     type Saved<R: Real> = SavedMargin<R>;
 
-    fn len(&self, _: &Template) -> usize {
+    fn num_outputs(&self, _: &Template) -> usize {
         1
     }
 
@@ -130,26 +130,26 @@ impl Quantity for SupportMargin {
         self.contact.check()
     }
 
-    fn forward<R: Real>(&self, scene: &Scene<R>, out: &mut [R]) -> SavedMargin<R> {
-        let centre = self.method.forward(scene);
-        let nearest = self.nearest(scene, &centre);
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> SavedMargin<R> {
+        let centre = self.method.forward(posed);
+        let nearest = self.nearest(posed, &centre);
         let lanes = R::Wide::from_lanes(|lane| match nearest[lane] {
-            Some(nearest) => Self::margin(scene, &centre, nearest, lane).value,
+            Some(nearest) => Self::margin(posed, &centre, nearest, lane).value,
             None => Real::of(f64::NEG_INFINITY),
         });
         out[0] = R::narrow(lanes);
         SavedMargin { centre, nearest }
     }
 
-    fn backward<R: Real>(&self, scene: &Scene<R>, saved: &SavedMargin<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &SavedMargin<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
         let margins: Vec<_> =
-            (0..R::LANES).map(|lane| Some(Self::margin(scene, &saved.centre, saved.nearest[lane]?, lane))).collect();
+            (0..R::LANES).map(|lane| Some(Self::margin(posed, &saved.centre, saved.nearest[lane]?, lane))).collect();
         // The direction of each lane's derivative; no contact, no derivative.
         let direction: [R::Wide; 2] = std::array::from_fn(|k| {
             R::Wide::from_lanes(|lane| margins[lane].as_ref().map_or(Real::zero(), |margin| margin.direction[k]))
         });
-        let d_centre = scene.plane.raise(direction.map(|x| x * d_out[0].widen()));
-        self.method.backward(scene, &saved.centre, d_centre, d_points);
+        let d_centre = posed.plane.raise(direction.map(|x| x * d_out[0].widen()));
+        self.method.backward(posed, &saved.centre, d_centre, d_points);
         for lane in 0..R::LANES {
             let (Some(nearest), Some(margin)) = (saved.nearest[lane], &margins[lane]) else { continue };
             for (sample, share) in nearest.ends().into_iter().zip(margin.shares) {
@@ -157,7 +157,7 @@ impl Quantity for SupportMargin {
                     R::Wide::from_lanes(|l| if l == lane { -(share * x.lane(lane)) } else { Real::zero() })
                 };
                 let d_point = narrow::<R>(d_centre.map(only));
-                scene.template.samples.point_backward(sample as usize, d_point, d_points);
+                posed.template.samples.point_backward(sample as usize, d_point, d_points);
             }
         }
     }

@@ -9,23 +9,20 @@ pub mod roll;
 
 use crate::error::{Error, Result};
 use crate::ground::{Ground, Plane};
+use crate::mass_properties::MassProperties;
 use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, dot, scale};
-use crate::number::{Data, Real, Room, Scalar};
+use crate::number::{Data, Kernel, Real, Scalar};
 use crate::options::{not_negative, positive};
+use crate::posed::PosedBody;
 use crate::quantity::Quantity;
-use crate::scene::Scene;
 use crate::solid::{Extent, GRAVITY, Solid};
 use crate::support::hull::convex_hull;
 use crate::support::margin::{Margin, Nearest};
 use crate::template::Template;
-use crate::volume::MassProperties;
-use roll::{Cloud, Place, Roller, angle};
+pub use roll::BAND;
+use roll::{Cloud, Orientation, Roller, angle};
 use std::f64::consts::TAU;
-
-/// Vertices up to this height above the lowest are collected at first, m; the higher ones are looked at when the body
-/// rolls so far that they may touch.
-pub const BAND: f64 = 0.03;
 
 /// What is asked of each body.
 pub struct TipTest {
@@ -112,13 +109,13 @@ impl TipTest {
     }
 
     /// What the lanes know of each body.
-    pub fn footings<R: Real>(&self, scene: &Scene<R>) -> Vec<Footing> {
-        let extent = Extent::of(scene);
-        let solids = Solid::of_lanes(scene, &extent, &self.densities, self.contact);
-        let low = R::apart::<Low, _>((&extent,));
+    pub fn footings<R: Real>(&self, posed: &PosedBody<R>) -> Vec<Footing> {
+        let extent = Extent::of(posed);
+        let solids = Solid::of_lanes(posed, &extent, &self.densities, self.contact);
+        let low = R::dispatch::<Low, _>((&extent,));
         let footing = |(lane, (solid, low)): (usize, (Solid, Vec<u32>))| {
             let value = |x: R::Wide| x.lane(lane).value();
-            let (down, origin) = (scene.ground.normal.map(|x| -value(x)), scene.origin.map(value));
+            let (down, origin) = (posed.ground.normal.map(|x| -value(x)), posed.origin.map(value));
             Footing { solid, down, origin, low, bounds: extent.bounds_of(lane) }
         };
         solids.into_iter().zip(low).enumerate().map(footing).collect()
@@ -146,7 +143,7 @@ impl TipTest {
     }
 
     /// A pose that rests on a facet of a millimetre only does not stand: the largest tilt after a nudge in any direction.
-    fn nudged_tilt(&self, roller: &mut Roller<impl Cloud>, start: Vec3<f64>, end: Place, tilt: f64) -> f64 {
+    fn nudged_tilt(&self, roller: &mut Roller<impl Cloud>, start: Vec3<f64>, end: Orientation, tilt: f64) -> f64 {
         let mut largest = tilt;
         let [e1, e2] = Ground { normal: end.down, height: 0.0 }.axes();
         for k in 0..HEADINGS {
@@ -318,11 +315,11 @@ impl<T: Data> Cloud for Vertices<'_, T> {
 /// For each lane its vertices within [`BAND`] of the lowest.
 struct Low;
 
-impl<R: Real> Room<(&Extent<R>,)> for Low {
+impl<R: Real> Kernel<(&Extent<R>,)> for Low {
     type Output = Vec<Vec<u32>>;
 
     #[inline(always)]
-    fn enter((extent,): (&Extent<R>,)) -> Vec<Vec<u32>> {
+    fn run((extent,): (&Extent<R>,)) -> Vec<Vec<u32>> {
         let limit = extent.lowest + R::of(BAND);
         let mut low = memory::filled(Vec::new(), R::LANES);
         for (vertex, &height) in extent.heights.iter().enumerate() {

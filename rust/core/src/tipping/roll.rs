@@ -8,11 +8,13 @@
 use crate::ground::{Ground, Plane};
 use crate::memory;
 use crate::number::vector::{Vec3, add, cross, dot, scale, sub};
-use crate::number::{Fused, Real, Room};
+use crate::number::{Fused, Kernel, Real};
 use crate::support::hull::convex_hull;
 use crate::support::margin::{Margin, Nearest};
-use crate::tipping::BAND;
 
+/// Vertices up to this height above the lowest are collected at first, m; the higher ones are looked at when the body
+/// rolls so far that they may touch.
+pub const BAND: f64 = 0.03;
 /// Points within this height of the lowest touch, m.
 const TOUCH: f64 = 1e-9;
 /// The same of a body that rolls on: wide enough for some ten degrees.
@@ -52,19 +54,19 @@ impl<'a, C: Cloud> Roller<'a, C> {
 
     /// Rolls until it rests, from the orientation in which `down` is down. None for a body whose centre of mass lies
     /// outside of its own hull.
-    pub fn to_rest(&mut self, down: Vec3<f64>) -> Option<Place> {
+    pub fn to_rest(&mut self, down: Vec3<f64>) -> Option<Orientation> {
         self.while_within(down, down, std::f64::consts::PI)
     }
 
     /// [`Roller::to_rest`], or where the body has turned by more than `most` from where `start` was down.
-    pub fn while_within(&mut self, down: Vec3<f64>, start: Vec3<f64>, most: f64) -> Option<Place> {
+    pub fn while_within(&mut self, down: Vec3<f64>, start: Vec3<f64>, most: f64) -> Option<Orientation> {
         let mut down = down;
         for _ in 0..MOST_TURNS {
             let stop = self.stop(down);
             if angle(start, down) > most {
-                return Some(Place { down, height: stop.height });
+                return Some(Orientation { down, height: stop.height });
             }
-            let Some(way) = stop.downhill(down) else { return Some(Place { down, height: stop.height }) };
+            let Some(way) = stop.downhill(down) else { return Some(Orientation { down, height: stop.height }) };
             down = self.turn(down, &way, stop.height)?;
         }
         None
@@ -106,7 +108,7 @@ impl<'a, C: Cloud> Roller<'a, C> {
 
 /// An orientation, and the height of the centre of mass in it.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct Orientation {
     pub down: Vec3<f64>,
     pub height: f64,
 }
@@ -172,7 +174,7 @@ impl Points {
 
     /// Of all points, towards `down`, and the largest.
     fn heights(&self, down: Vec3<f64>) -> (Vec<f64>, f64) {
-        Fused::<f64>::apart::<Along, _>((self, down))
+        Fused::<f64>::dispatch::<Along, _>((self, down))
     }
 
     fn stop(&self, down: Vec3<f64>) -> Stop {
@@ -195,7 +197,7 @@ impl Points {
     fn turned(&self, down: Vec3<f64>, way: &Way, height: f64) -> Option<Vec3<f64>> {
         // At the angle θ a point touches that is a above the ground and b beyond the pivot with a cos θ = b sin θ.
         let steepest =
-            Fused::<f64>::apart::<Steepest, _>((self, down, way.towards, height, dot(way.pivot, way.towards)));
+            Fused::<f64>::dispatch::<Steepest, _>((self, down, way.towards, height, dot(way.pivot, way.towards)));
         if steepest <= 0.0 {
             return None;
         }
@@ -207,11 +209,11 @@ impl Points {
 /// [`Points::heights`]
 struct Along;
 
-impl Room<(&Points, Vec3<f64>)> for Along {
+impl Kernel<(&Points, Vec3<f64>)> for Along {
     type Output = (Vec<f64>, f64);
 
     #[inline(always)]
-    fn enter((points, down): (&Points, Vec3<f64>)) -> (Vec<f64>, f64) {
+    fn run((points, down): (&Points, Vec3<f64>)) -> (Vec<f64>, f64) {
         let [x, y, z] = &points.axes;
         let mut out = memory::filled(0.0, x.len());
         for (((out, x), y), z) in out.iter_mut().zip(x).zip(y).zip(z) {
@@ -244,11 +246,11 @@ fn largest(numbers: &[f64], least: f64) -> f64 {
 /// The largest b / a of [`Points::turned`].
 struct Steepest;
 
-impl Room<(&Points, Vec3<f64>, Vec3<f64>, f64, f64)> for Steepest {
+impl Kernel<(&Points, Vec3<f64>, Vec3<f64>, f64, f64)> for Steepest {
     type Output = f64;
 
     #[inline(always)]
-    fn enter((points, down, towards, height, pivot): (&Points, Vec3<f64>, Vec3<f64>, f64, f64)) -> f64 {
+    fn run((points, down, towards, height, pivot): (&Points, Vec3<f64>, Vec3<f64>, f64, f64)) -> f64 {
         let [x, y, z] = &points.axes;
         let mut slopes = memory::filled(0.0, x.len());
         for (((out, &x), &y), &z) in slopes.iter_mut().zip(x).zip(y).zip(z) {

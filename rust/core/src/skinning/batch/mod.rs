@@ -1,61 +1,27 @@
 //! Many posed bodies of one model, over threads. A few bodies at a time share each pass over the model's tables; the
 //! bits of a body depend neither on the number of threads nor on its neighbours.
 
+mod arguments;
 mod passes;
 
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::number::gate::{Level, Work};
-use crate::number::{Data, Dual, Real, Scalar, all_finite};
+use crate::number::simd_level::Level;
+use crate::number::{Data, Dual, Real, Scalar, Work, all_finite};
 use crate::skinning::blend::Tile;
 use crate::skinning::rotation::Form;
 use crate::skinning::{Body, Gradient, Parameters, Skin, Start, Wanted};
 use crate::threads::{self, num_threads};
-use passes::{Backward, Forward, Place, Shape, run};
-use std::mem::take;
+pub use arguments::{Bodies, Gradients, Rows, TILE, Upstream};
+use arguments::{check, check_direction, check_rows, front, fronts, gradient_widths, read, rows, triple, used};
+use passes::{Backward, Forward, PlaceJoints, Shape, run};
 use std::ops::Range;
 
-/// Vertices a tile: one to four vector registers, by the machine.
-pub const TILE: usize = 16;
 /// Bodies that share a pass over the model's tables.
 const GROUP: usize = 16;
 
-/// One row of `width` numbers a body, or a single one that all bodies share; of width 0 where nothing is given.
-#[derive(Clone, Copy)]
-pub struct Rows<'a, T> {
-    pub numbers: &'a [T],
-    pub width: usize,
-    pub shared: bool,
-}
-
-impl<'a, T> Rows<'a, T> {
-    fn of(&self, body: usize) -> &'a [T] {
-        let start = if self.shared { 0 } else { body * self.width };
-        &self.numbers[start..start + self.width]
-    }
-}
-
-/// The parameters of all bodies, or a direction in their space.
-#[derive(Clone, Copy)]
-pub struct Bodies<'a, T> {
-    pub pose: Rows<'a, T>,       // J·3 axis-angle or J·6
-    pub betas: Rows<'a, T>,      // up to B
-    pub expression: Rows<'a, T>, // up to E
-    pub transl: Rows<'a, T>,     // 3 or none
-}
-
-/// The gradient by the posed bodies; an empty array counts as zeros.
-#[derive(Clone, Copy)]
-pub struct Upstream<'a, T> {
-    pub vertices: &'a [T], // (B, V, 3)
-    pub joints: &'a [T],   // (B, J, 3)
-}
-
-/// Gradients by pose, betas, expression and translation, one row a body; an empty one is not asked for.
-pub type Gradients<'a, T> = [&'a mut [T]; 4];
-
 /// Bodies of one model in their poses.
-pub struct Posing<'a, T> {
+pub struct PosedBatch<'a, T> {
     skin: &'a Skin<T, TILE>,
     num_bodies: usize,
     form: Form,
@@ -67,7 +33,7 @@ pub struct Posing<'a, T> {
     interrupted: &'a (dyn Fn() -> bool + Sync + 'a),
 }
 
-impl<'a, T: Data> Posing<'a, T> {
+impl<'a, T: Data> PosedBatch<'a, T> {
     pub fn new(
         skin: &'a Skin<T, TILE>,
         num_bodies: usize,
@@ -78,17 +44,17 @@ impl<'a, T: Data> Posing<'a, T> {
         let level = Level::current()?;
         let form = Form::of_width(bodies.pose.width / skin.num_joints()).expect("checked");
         let used = [bodies.betas, bodies.expression].map(used);
-        Ok(Posing { skin, num_bodies, form, level, bodies, used, interrupted })
+        Ok(PosedBatch { skin, num_bodies, form, level, bodies, used, interrupted })
     }
 
     /// Vertices (B, V, 3) and joints (B, J, 3).
     pub fn forward(&self, vertices: &mut [T], joints: &mut [T]) -> Result<()> {
-        memory::guarded(|| T::enter_registers(self.level, Pose { posing: self, vertices, joints }))
+        memory::guarded(|| T::run_on_registers(self.level, ForwardWork { batch: self, vertices, joints }))
     }
 
     /// Their derivatives along a direction.
     pub fn jvp(&self, along: &Bodies<T>, vertices: &mut [T], joints: &mut [T]) -> Result<()> {
-        self.check_direction(along)?;
+        check_direction(&self.bodies, along, self.num_bodies)?;
         let slope = |x: Dual| if x.slope.is_finite() { T::of(x.slope) } else { T::zero() };
         memory::guarded(|| {
             self.write::<Dual>(self.skin.start(), |body| self.dual(body, along), slope, vertices, joints)
@@ -97,18 +63,18 @@ impl<'a, T: Data> Posing<'a, T> {
 
     /// The gradient of Σ d_vertices · vertices + Σ d_joints · joints.
     pub fn vjp(&self, upstream: Upstream<T>, gradients: Gradients<T>) -> Result<()> {
-        memory::guarded(|| T::enter_registers(self.level, Pull { posing: self, upstream, gradients }))
+        memory::guarded(|| T::run_on_registers(self.level, BackwardWork { batch: self, upstream, gradients }))
     }
 
     /// The derivative of that gradient along a direction.
     pub fn vjp_jvp(&self, upstream: Upstream<T>, along: &Bodies<T>, gradients: Gradients<T>) -> Result<()> {
-        self.check_direction(along)?;
+        check_direction(&self.bodies, along, self.num_bodies)?;
         let parameters = |body| self.dual(body, along);
         let (constant, number) = (|x: T| Dual::of(x.value()), |x: Dual| T::of(x.slope));
         memory::guarded(|| self.pull::<Dual>(self.skin.start(), parameters, constant, number, upstream, gradients))
     }
 
-    /// Numbers of [`Posing::jacobian`] a body.
+    /// Numbers of [`PosedBatch::jacobian`] a body.
     pub fn jacobian_width(&self) -> usize {
         let parameters = 3 * self.skin.num_joints() + self.bodies.betas.width;
         parameters * (self.skin.num_vertices + self.skin.num_joints()) * 3
@@ -156,7 +122,7 @@ impl<'a, T: Data> Posing<'a, T> {
         });
         self.run(groups, |(bodies, vertices, joints)| {
             let bodies: Vec<_> =
-                bodies.map(|body| V::Scalar::apart::<Place, _>((self.skin, parameters(body)))).collect();
+                bodies.map(|body| V::Scalar::dispatch::<PlaceJoints, _>((self.skin, parameters(body)))).collect();
             let places = bodies.iter().flat_map(Body::joints).flatten();
             joints.iter_mut().zip(places).for_each(|(out, x)| *out = number(x));
             run::<V, _>(Forward { skin: self.skin, start, bodies: &bodies, vertices, number });
@@ -176,7 +142,8 @@ impl<'a, T: Data> Posing<'a, T> {
         for (name, d, row) in [("d_vertices", upstream.vertices, points), ("d_joints", upstream.joints, count)] {
             check(name, d.len(), if d.is_empty() { 0 } else { self.num_bodies * row })?;
         }
-        let widths = self.gradient_widths(&gradients)?;
+        let given = [self.bodies.pose.width, self.skin.num_betas(), self.skin.num_expressions(), 3];
+        let widths = gradient_widths(&gradients, given, self.num_bodies)?;
         let wanted = Wanted { pose: widths[0] > 0, betas: widths[1], expression: widths[2] };
         let mut gradients = gradients;
         let groups = self.groups(|bodies| {
@@ -184,14 +151,16 @@ impl<'a, T: Data> Posing<'a, T> {
             (bodies, gradients)
         });
         self.run(groups, |(range, mut gradients)| {
-            let bodies: Vec<_> =
-                range.clone().map(|body| V::Scalar::apart::<Place, _>((self.skin, parameters(body)))).collect();
+            let bodies: Vec<_> = range
+                .clone()
+                .map(|body| V::Scalar::dispatch::<PlaceJoints, _>((self.skin, parameters(body))))
+                .collect();
             let d_vertices = rows(upstream.vertices, range.clone(), points);
             let d_joints = rows(upstream.joints, range, count);
-            let hand_out = |i: usize, body: &Body<V::Scalar>, gradient: Gradient<V::Scalar>| {
+            let write_gradient = |i: usize, body: &Body<V::Scalar>, gradient: Gradient<V::Scalar>| {
                 let finite =
                     || all_finite(rows(d_vertices, i..i + 1, points)) && all_finite(rows(d_joints, i..i + 1, count));
-                hand_out(body, &gradient, fronts(&mut gradients, widths), number, finite);
+                write_gradient(body, &gradient, fronts(&mut gradients, widths), number, finite);
             };
             run::<V, _>(Backward {
                 skin: self.skin,
@@ -201,38 +170,9 @@ impl<'a, T: Data> Posing<'a, T> {
                 d_joints,
                 constant,
                 wanted,
-                take: hand_out,
+                take: write_gradient,
             });
         })
-    }
-
-    /// A direction has the shape of the parameters, as far as it is given.
-    fn check_direction(&self, along: &Bodies<T>) -> Result<()> {
-        let bodies = &self.bodies;
-        let pairs = [
-            ("along_pose", bodies.pose, along.pose),
-            ("along_betas", bodies.betas, along.betas),
-            ("along_expression", bodies.expression, along.expression),
-            ("along_transl", bodies.transl, along.transl),
-        ];
-        for (name, values, slopes) in pairs {
-            check(name, slopes.width, slopes.width.min(1) * values.width)?;
-            check(name, slopes.numbers.len(), slopes.width * if slopes.shared { 1 } else { self.num_bodies })?;
-        }
-        Ok(())
-    }
-
-    /// Numbers a body in each of the gradients.
-    fn gradient_widths(&self, gradients: &Gradients<T>) -> Result<[usize; 4]> {
-        let given = [self.bodies.pose.width, self.skin.num_betas(), self.skin.num_expressions(), 3];
-        let names = ["d_pose", "d_betas", "d_expression", "d_transl"];
-        let mut widths = [0; 4];
-        for (k, numbers) in gradients.iter().enumerate() {
-            let width = numbers.len() / self.num_bodies.max(1);
-            check(names[k], numbers.len(), width.min(given[k]) * self.num_bodies)?;
-            widths[k] = width;
-        }
-        Ok(widths)
     }
 
     fn parameters<R: Scalar<Data = T>>(&self, body: usize) -> Parameters<R> {
@@ -292,42 +232,42 @@ impl<'a, T: Data> Posing<'a, T> {
     }
 }
 
-struct Pose<'a, T> {
-    posing: &'a Posing<'a, T>,
+struct ForwardWork<'a, T> {
+    batch: &'a PosedBatch<'a, T>,
     vertices: &'a mut [T],
     joints: &'a mut [T],
 }
 
-impl<T: Data> Work<T> for Pose<'_, T> {
+impl<T: Data> Work<T> for ForwardWork<'_, T> {
     type Output = Result<()>;
 
     fn run<V: Real<Data = T>>(self) -> Result<()> {
-        let Pose { posing, vertices, joints } = self;
-        let shaped = posing.shaped::<V>();
-        let parameters = |body| posing.parameters::<V::Scalar>(body);
-        posing.write::<V>(posing.start(&shaped), parameters, Scalar::data, vertices, joints)
+        let ForwardWork { batch, vertices, joints } = self;
+        let shaped = batch.shaped::<V>();
+        let parameters = |body| batch.parameters::<V::Scalar>(body);
+        batch.write::<V>(batch.start(&shaped), parameters, Scalar::data, vertices, joints)
     }
 }
 
-struct Pull<'a, 'b, T> {
-    posing: &'a Posing<'a, T>,
+struct BackwardWork<'a, 'b, T> {
+    batch: &'a PosedBatch<'a, T>,
     upstream: Upstream<'a, T>,
     gradients: Gradients<'b, T>,
 }
 
-impl<T: Data> Work<T> for Pull<'_, '_, T> {
+impl<T: Data> Work<T> for BackwardWork<'_, '_, T> {
     type Output = Result<()>;
 
     fn run<V: Real<Data = T>>(self) -> Result<()> {
-        let Pull { posing, upstream, gradients } = self;
-        let shaped = posing.shaped::<V>();
-        let parameters = |body| posing.parameters::<V::Scalar>(body);
-        posing.pull::<V>(posing.start(&shaped), parameters, V::Scalar::read, Scalar::data, upstream, gradients)
+        let BackwardWork { batch, upstream, gradients } = self;
+        let shaped = batch.shaped::<V>();
+        let parameters = |body| batch.parameters::<V::Scalar>(body);
+        batch.pull::<V>(batch.start(&shaped), parameters, V::Scalar::read, Scalar::data, upstream, gradients)
     }
 }
 
 /// Writes one body's gradient: zero for a body that is not finite, unless the upstream gradient is to blame.
-fn hand_out<R: Scalar, T: Scalar>(
+fn write_gradient<R: Scalar, T: Scalar>(
     body: &Body<R>,
     gradient: &Gradient<R>,
     outs: Gradients<T>,
@@ -342,61 +282,4 @@ fn hand_out<R: Scalar, T: Scalar>(
             *out = if good { number(d) } else { T::zero() };
         }
     }
-}
-
-/// How many leading columns have a number other than zero.
-fn used<T: Scalar>(rows: Rows<T>) -> usize {
-    let last = |row: &[T]| row.iter().rposition(|x| x.value() != 0.0).map_or(0, |last| last + 1);
-    rows.numbers.chunks_exact(rows.width.max(1)).map(last).max().unwrap_or(0)
-}
-
-fn read<R: Scalar>(numbers: &[R::Data]) -> Vec<R> {
-    numbers.iter().map(|&x| R::read(x)).collect()
-}
-
-fn triple<R: Real>(numbers: &[R]) -> [R; 3] {
-    std::array::from_fn(|axis| numbers.get(axis).copied().unwrap_or(R::zero()))
-}
-
-/// The rows of some bodies, if there are any.
-fn rows<T>(numbers: &[T], bodies: Range<usize>, row: usize) -> &[T] {
-    numbers.get(bodies.start * row..bodies.end * row).unwrap_or_default()
-}
-
-/// Cuts off the first n.
-fn front<'a, T>(rest: &mut &'a mut [T], n: usize) -> &'a mut [T] {
-    let (front, back) = take(rest).split_at_mut(n);
-    *rest = back;
-    front
-}
-
-fn fronts<'a, T>(rest: &mut Gradients<'a, T>, sizes: [usize; 4]) -> Gradients<'a, T> {
-    std::array::from_fn(|k| front(&mut rest[k], sizes[k]))
-}
-
-fn check(name: &'static str, got: usize, expected: usize) -> Result<()> {
-    match got == expected {
-        true => Ok(()),
-        false => Err(Error::Argument { name, expected: format!("{expected} numbers"), got: got.to_string() }),
-    }
-}
-
-fn check_rows<T: Scalar>(skin: &Skin<T, TILE>, num_bodies: usize, bodies: &Bodies<T>) -> Result<()> {
-    let joints = skin.num_joints();
-    let form = Form::of_width(bodies.pose.width / joints);
-    if form.is_none() || !bodies.pose.width.is_multiple_of(joints) {
-        let expected = format!("{joints} joints of 3 or 6 numbers");
-        return Err(Error::Argument { name: "pose", expected, got: format!("{} numbers", bodies.pose.width) });
-    }
-    let rows = [
-        ("pose", bodies.pose, bodies.pose.width),
-        ("betas", bodies.betas, bodies.betas.width.min(skin.num_betas())),
-        ("expression", bodies.expression, bodies.expression.width.min(skin.num_expressions())),
-        ("transl", bodies.transl, if bodies.transl.width == 0 { 0 } else { 3 }),
-    ];
-    for (name, rows, width) in rows {
-        check(name, rows.width, width)?;
-        check(name, rows.numbers.len(), width * if rows.shared { 1 } else { num_bodies })?;
-    }
-    Ok(())
 }

@@ -2,11 +2,11 @@
 //! Jacobian that its backward needs, in one pass.
 
 use crate::batch::Batch;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, unknown_choice};
 use crate::losses::terms::{NUM_TERMS, Terms};
 use crate::memory;
 use crate::number::Data;
-use crate::quantity::{Quantity, unknown_choice};
+use crate::quantity::Quantity;
 use crate::threads;
 
 /// How bodies are put together.
@@ -55,7 +55,7 @@ impl Pool<'_> {
         weights: &[f64],
         gradient: &mut [T],
     ) -> Result<(Vec<f64>, Pooled)> {
-        let (bodies, size) = (batch.len(), quantity.len(batch.template()));
+        let (bodies, size) = (batch.len(), quantity.num_outputs(batch.template()));
         if size != weights.len() {
             let expected = format!("{size} numbers, one a term");
             return Err(Error::Argument { name: "weights", expected, got: weights.len().to_string() });
@@ -83,7 +83,7 @@ impl Pool<'_> {
 
     /// The terms. Writes the Jacobian of [`Batch::value_and_jacobian_into`].
     pub fn terms<T: Data, Q: Terms>(&self, batch: &Batch<T>, quantity: &Q, jacobian: &mut [T]) -> Result<Pooled> {
-        let size = quantity.len(batch.template());
+        let size = quantity.num_outputs(batch.template());
         let mut values = memory::guarded(|| Ok(memory::filled(T::zero(), batch.len() * size)))?;
         batch.value_and_jacobian_into(quantity, &mut values, jacobian)?;
         Ok(self.pool(&values, size)?.0)

@@ -1,9 +1,9 @@
 //! The passes over a model's tiles: every tile is read once for a group of bodies.
 
-use super::{TILE, rows};
-use crate::number::{Data, Real, Room, Scalar};
+use super::arguments::{TILE, rows};
+use crate::number::{Data, Kernel, Real, Scalar};
 use crate::skinning::blend::{Registers, Tile};
-use crate::skinning::{Block, Body, Gradient, Parameters, Pulls, Skin, Start, Sums, Totals, Wanted};
+use crate::skinning::{Block, Body, Gradient, Parameters, Skin, Start, Sums, Totals, VertexGradient, Wanted};
 
 /// A pass with vertices in the registers V: P of them make up a tile, and the sums of N bodies over a tile fill those
 /// that the CPU has.
@@ -13,16 +13,16 @@ pub(super) trait Pass<V: Real>: Sized {
 
 /// Runs a pass behind the gate of its registers.
 pub(super) fn run<V: Real, A: Pass<V>>(pass: A) {
-    V::apart::<Widths<V>, _>((pass,))
+    V::dispatch::<Widths<V>, _>((pass,))
 }
 
 struct Widths<V>(std::marker::PhantomData<V>);
 
-impl<V: Real, A: Pass<V>> Room<(A,)> for Widths<V> {
+impl<V: Real, A: Pass<V>> Kernel<(A,)> for Widths<V> {
     type Output = ();
 
     #[inline(always)]
-    fn enter((pass,): (A,)) {
+    fn run((pass,): (A,)) {
         match (V::LANES, size_of::<V>()) {
             (16, 64) => pass.run::<1, 8>(),
             (16, _) => pass.run::<1, 4>(),
@@ -149,7 +149,7 @@ impl<T: Scalar, R: Scalar, F: Fn(T) -> R, G: FnMut(usize, &Body<R>, Gradient<R>)
         let d_joints = rows(self.d_joints, at..at + 1, 3 * self.skin.num_joints());
         let d_joints: Vec<R> = d_joints.iter().map(|&x| (self.constant)(x)).collect();
         let body = &self.bodies[at];
-        (self.take)(at, body, R::apart::<Finish, _>((self.skin, body, &totals, &d_joints[..])));
+        (self.take)(at, body, R::dispatch::<Finish, _>((self.skin, body, &totals, &d_joints[..])));
     }
 }
 
@@ -160,7 +160,7 @@ struct Separate<'a, T, F> {
     constant: &'a F,
 }
 
-impl<T: Copy, V: Real, F: Fn(T) -> V::Scalar, const P: usize> Pulls<V, P> for Separate<'_, T, F> {
+impl<T: Copy, V: Real, F: Fn(T) -> V::Scalar, const P: usize> VertexGradient<V, P> for Separate<'_, T, F> {
     #[inline(always)]
     fn of(&self, body: usize, tile: usize) -> Registers<V, P> {
         let d = &self.d[body * self.row + 3 * TILE * tile..(body + 1) * self.row];
@@ -208,13 +208,13 @@ fn together<R: Real, const N: usize>(bodies: &[[Body<R>; N]]) -> Vec<Block<'_, R
 }
 
 /// [`Skin::place`] in a function of its own.
-pub(super) struct Place;
+pub(super) struct PlaceJoints;
 
-impl<T: Scalar, R: Scalar> Room<(&Skin<T, TILE>, Parameters<R>)> for Place {
+impl<T: Scalar, R: Scalar> Kernel<(&Skin<T, TILE>, Parameters<R>)> for PlaceJoints {
     type Output = Body<R>;
 
     #[inline(always)]
-    fn enter((skin, parameters): (&Skin<T, TILE>, Parameters<R>)) -> Body<R> {
+    fn run((skin, parameters): (&Skin<T, TILE>, Parameters<R>)) -> Body<R> {
         skin.place(parameters)
     }
 }
@@ -222,11 +222,11 @@ impl<T: Scalar, R: Scalar> Room<(&Skin<T, TILE>, Parameters<R>)> for Place {
 /// [`Skin::gradient`] in a function of its own.
 struct Finish;
 
-impl<T: Scalar, R: Scalar> Room<(&Skin<T, TILE>, &Body<R>, &Totals<R>, &[R])> for Finish {
+impl<T: Scalar, R: Scalar> Kernel<(&Skin<T, TILE>, &Body<R>, &Totals<R>, &[R])> for Finish {
     type Output = Gradient<R>;
 
     #[inline(always)]
-    fn enter((skin, body, totals, d_joints): (&Skin<T, TILE>, &Body<R>, &Totals<R>, &[R])) -> Gradient<R> {
+    fn run((skin, body, totals, d_joints): (&Skin<T, TILE>, &Body<R>, &Totals<R>, &[R])) -> Gradient<R> {
         skin.gradient(body, totals, d_joints)
     }
 }

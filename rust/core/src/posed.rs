@@ -1,4 +1,4 @@
-//! A scene: one closed body a lane over its ground, in coordinates local to the body.
+//! A posed: one closed body a lane over its ground, in coordinates local to the body.
 //!
 //! The origin is near the first vertex ([`origin`]). Far from the world's origin this keeps single precision; positions
 //! that leave a room get the origin back.
@@ -6,11 +6,10 @@
 use crate::ground::{Ground, Plane};
 use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, narrow};
-use crate::number::{Real, Room, Scalar};
-use crate::sampling::SUMS;
+use crate::number::{Kernel, Real, SUMS, Scalar};
 use crate::template::Template;
 
-pub struct Scene<'a, R: Real> {
+pub struct PosedBody<'a, R: Real> {
     pub template: &'a Template,
     /// The mesh's vertices, then the virtual vertices of its closing.
     pub points: &'a [Vec3<R>],
@@ -21,14 +20,14 @@ pub struct Scene<'a, R: Real> {
     pub origin: Vec3<R::Wide>,
 }
 
-impl<'a, R: Real> Scene<'a, R> {
+impl<'a, R: Real> PosedBody<'a, R> {
     /// `grounds` and `origins` have one entry a lane.
     pub fn new(template: &'a Template, points: &'a [Vec3<R>], grounds: &[Ground<f64>], origins: &[Vec3<f64>]) -> Self {
         let number = |value: &dyn Fn(usize) -> f64| R::Wide::from_lanes(|lane| Real::of(value(lane)));
         let local: Vec<_> = grounds.iter().zip(origins).map(|(ground, &origin)| ground.seen_from(origin)).collect();
         let axes: Vec<_> = local.iter().map(Ground::axes).collect();
         let vector = |of: &dyn Fn(usize) -> Vec3<f64>| std::array::from_fn(|k| number(&|lane| of(lane)[k]));
-        Scene {
+        PosedBody {
             template,
             points,
             ground: Ground { normal: vector(&|lane| local[lane].normal), height: number(&|lane| local[lane].height) },
@@ -54,36 +53,36 @@ impl<'a, R: Real> Scene<'a, R> {
     /// h of each vertex of the mesh: that of any point of a face is interpolated from them.
     pub fn heights(&self) -> Vec<R> {
         let vertices = &self.points[..self.template.mesh.num_vertices];
-        R::apart::<Heights, _>((self.narrow_ground(), vertices))
+        R::dispatch::<Heights, _>((self.narrow_ground(), vertices))
     }
 
     /// The lowest and the highest coordinates of the mesh's vertices.
     pub fn bounds(&self) -> [Vec3<R>; 2] {
-        R::apart::<Bounds, _>((&self.points[..self.template.mesh.num_vertices],))
+        R::dispatch::<Bounds, _>((&self.points[..self.template.mesh.num_vertices],))
     }
 
     /// Adds the gradient by the vertices' heights to that by their positions.
     pub fn heights_backward(&self, d_heights: &[R], d_points: &mut [Vec3<R>]) {
-        R::apart::<HeightsBackward, _>((self.narrow_ground().normal, d_heights, d_points));
+        R::dispatch::<HeightsBackward, _>((self.narrow_ground().normal, d_heights, d_points));
     }
 
     /// Writes a local position as a position in the world.
     #[inline(always)]
-    pub fn put(&self, point: Vec3<R::Wide>, out: &mut [R]) {
+    pub fn write_world(&self, point: Vec3<R::Wide>, out: &mut [R]) {
         for (out, x) in out.iter_mut().zip(add(point, self.origin)) {
             *out = R::narrow(x);
         }
     }
 }
 
-/// [`Scene::heights`]
+/// [`PosedBody::heights`]
 struct Heights;
 
-impl<R: Real> Room<(Ground<R>, &[Vec3<R>])> for Heights {
+impl<R: Real> Kernel<(Ground<R>, &[Vec3<R>])> for Heights {
     type Output = Vec<R>;
 
     #[inline(always)]
-    fn enter((ground, vertices): (Ground<R>, &[Vec3<R>])) -> Vec<R> {
+    fn run((ground, vertices): (Ground<R>, &[Vec3<R>])) -> Vec<R> {
         let mut heights = memory::filled(R::zero(), vertices.len());
         for (height, &vertex) in heights.iter_mut().zip(vertices) {
             *height = ground.signed_height(vertex);
@@ -94,22 +93,22 @@ impl<R: Real> Room<(Ground<R>, &[Vec3<R>])> for Heights {
 
 /// The least of some heights.
 pub fn lowest<R: Real>(heights: &[R]) -> R {
-    R::apart::<Lowest, _>((heights, R::of(1.0)))
+    R::dispatch::<Lowest, _>((heights, R::of(1.0)))
 }
 
 /// The largest of some heights.
 pub fn highest<R: Real>(heights: &[R]) -> R {
-    -R::apart::<Lowest, _>((heights, R::of(-1.0)))
+    -R::dispatch::<Lowest, _>((heights, R::of(-1.0)))
 }
 
 /// [`lowest`] of the heights times a sign.
 struct Lowest;
 
-impl<R: Real> Room<(&[R], R)> for Lowest {
+impl<R: Real> Kernel<(&[R], R)> for Lowest {
     type Output = R;
 
     #[inline(always)]
-    fn enter((heights, sign): (&[R], R)) -> R {
+    fn run((heights, sign): (&[R], R)) -> R {
         let mut lowest = [R::of(1e30); SUMS];
         let (whole, rest) = heights.as_chunks::<SUMS>();
         for heights in whole {
@@ -127,14 +126,14 @@ impl<R: Real> Room<(&[R], R)> for Lowest {
     }
 }
 
-/// [`Scene::bounds`]
+/// [`PosedBody::bounds`]
 struct Bounds;
 
-impl<R: Real> Room<(&[Vec3<R>],)> for Bounds {
+impl<R: Real> Kernel<(&[Vec3<R>],)> for Bounds {
     type Output = [Vec3<R>; 2];
 
     #[inline(always)]
-    fn enter((vertices,): (&[Vec3<R>],)) -> [Vec3<R>; 2] {
+    fn run((vertices,): (&[Vec3<R>],)) -> [Vec3<R>; 2] {
         let (mut low, mut high) = (vertices[0], vertices[0]);
         for vertex in vertices {
             for k in 0..3 {
@@ -146,14 +145,14 @@ impl<R: Real> Room<(&[Vec3<R>],)> for Bounds {
     }
 }
 
-/// [`Scene::heights_backward`]
+/// [`PosedBody::heights_backward`]
 struct HeightsBackward;
 
-impl<R: Real> Room<(Vec3<R>, &[R], &mut [Vec3<R>])> for HeightsBackward {
+impl<R: Real> Kernel<(Vec3<R>, &[R], &mut [Vec3<R>])> for HeightsBackward {
     type Output = ();
 
     #[inline(always)]
-    fn enter((normal, d_heights, d_points): (Vec3<R>, &[R], &mut [Vec3<R>])) {
+    fn run((normal, d_heights, d_points): (Vec3<R>, &[R], &mut [Vec3<R>])) {
         for (d_point, &d_height) in d_points.iter_mut().zip(d_heights) {
             add_scaled(d_point, d_height, normal);
         }

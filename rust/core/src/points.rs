@@ -1,10 +1,9 @@
 //! The points that a loss looks at, samples or vertices, a row of them at a time.
 
-use super::walk::{CHUNK, Chunk, Row, Walk};
-use crate::error::Result;
+use crate::error::{Result, unknown_choice};
 use crate::memory;
 use crate::number::Real;
-use crate::quantity::unknown_choice;
+use crate::sampling::{CHUNK, Chunk, Row, Walk};
 use crate::template::Template;
 use std::ops::Range;
 
@@ -16,7 +15,7 @@ pub enum Points {
 }
 
 /// Up to [`CHUNK`] points that are looked at together.
-pub enum Place<'a> {
+pub enum PointChunk<'a> {
     Samples(&'a Walk, &'a Chunk),
     Vertices(Range<usize>),
 }
@@ -38,25 +37,25 @@ impl Points {
     }
 
     /// All points, in the order of the sums over them.
-    pub fn places(self, template: &Template) -> Vec<Place<'_>> {
+    pub fn chunks(self, template: &Template) -> Vec<PointChunk<'_>> {
         let walk = &template.samples.walk;
         let count = template.mesh.num_vertices;
         match self {
-            Points::Samples => memory::collect(walk.chunks.iter().map(|chunk| Place::Samples(walk, chunk))),
+            Points::Samples => memory::collect(walk.chunks.iter().map(|chunk| PointChunk::Samples(walk, chunk))),
             Points::Vertices => {
-                let place = |start| Place::Vertices(start..count.min(start + CHUNK));
-                memory::collect((0..count).step_by(CHUNK).map(place))
+                let chunk = |start| PointChunk::Vertices(start..count.min(start + CHUNK));
+                memory::collect((0..count).step_by(CHUNK).map(chunk))
             }
         }
     }
 }
 
-impl Place<'_> {
+impl PointChunk<'_> {
     #[inline(always)]
     pub fn len(&self) -> usize {
         match self {
-            Place::Samples(_, chunk) => chunk.len(),
-            Place::Vertices(range) => range.len(),
+            PointChunk::Samples(_, chunk) => chunk.len(),
+            PointChunk::Vertices(range) => range.len(),
         }
     }
 
@@ -66,19 +65,19 @@ impl Place<'_> {
 
     /// The vertices' numbers at these points.
     #[inline(always)]
-    pub fn read<R: Real>(&self, vertices: &[R], row: &mut Row<R>) {
+    pub fn gather<R: Real>(&self, vertices: &[R], row: &mut Row<R>) {
         match self {
-            Place::Samples(walk, chunk) => walk.interpolate(chunk, vertices, row),
-            Place::Vertices(range) => row[..range.len()].copy_from_slice(&vertices[range.clone()]),
+            PointChunk::Samples(walk, chunk) => walk.interpolate(chunk, vertices, row),
+            PointChunk::Vertices(range) => row[..range.len()].copy_from_slice(&vertices[range.clone()]),
         }
     }
 
     /// Adds the points' numbers to the vertices', by the transposed weights.
     #[inline(always)]
-    pub fn hand_back<R: Real>(&self, row: &Row<R>, vertices: &mut [R]) {
+    pub fn scatter_add<R: Real>(&self, row: &Row<R>, vertices: &mut [R]) {
         match self {
-            Place::Samples(walk, chunk) => walk.scatter(chunk, row, vertices),
-            Place::Vertices(range) => {
+            PointChunk::Samples(walk, chunk) => walk.scatter(chunk, row, vertices),
+            PointChunk::Vertices(range) => {
                 for (vertex, &number) in vertices[range.clone()].iter_mut().zip(row) {
                     *vertex = *vertex + number;
                 }

@@ -1,8 +1,8 @@
-//! One bench a room: the value and its gradient in one pass, over a body of SMPL's size, float32 and float64, one body
+//! One bench per quantity: the value and its gradient in one pass, over a body of SMPL's size, float32 and float64, one body
 //! and 64, on one thread.
 //!
-//! `cargo bench` runs all, `cargo bench -- volume` one room; `IPMAN_SIMD=scalar|avx2|avx512|neon` chooses the lanes.
-//! `python -m benchmarks.widths` compares the lanes room by room.
+//! `cargo bench` runs all, `cargo bench -- volume` one; `IPMAN_SIMD=scalar|avx2|avx512|neon` chooses the lanes.
+//! `python -m benchmarks.widths` compares the lanes quantity by quantity.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use ipman::losses::balance::{BalanceCost, Wrap};
@@ -10,13 +10,15 @@ use ipman::losses::ground::{GroundLoss, Tanh};
 use ipman::losses::stability::StabilityLoss;
 use ipman::losses::terms::StabilityTerms;
 use ipman::mass::{CenterOfMass, Method};
+use ipman::mass_properties::MassProperties;
 use ipman::number::Data;
+use ipman::points::Points;
 use ipman::pressure::{CenterOfPressure, Pressure, PressureCurve};
 use ipman::quantity::Quantity;
-use ipman::sampling::{Points, SampleSurface};
+use ipman::sample_surface::SampleSurface;
 use ipman::support::{Contact, ContactRule, SupportMargin};
 use ipman::threads::set_num_threads;
-use ipman::volume::{MassProperties, PartVolumes};
+use ipman::volume::PartVolumes;
 use ipman::{Batch, Template};
 use std::hint::black_box;
 use std::time::Duration;
@@ -65,8 +67,8 @@ fn leaning<T: Data>(vertices: &[Vec3], count: usize) -> Vec<T> {
     (0..count).flat_map(|body| vertices.iter().flat_map(move |v| lean(body, v))).map(T::of).collect()
 }
 
-/// Times one room for both precisions and both batch sizes.
-fn room<Q: Quantity>(criterion: &mut Criterion, name: &str, quantity: &Q) {
+/// Times one quantity for both precisions and both batch sizes.
+fn bench<Q: Quantity>(criterion: &mut Criterion, name: &str, quantity: &Q) {
     let (template, vertices) = body();
     let mut group = criterion.benchmark_group(name);
     for count in [1, 64] {
@@ -80,7 +82,7 @@ fn room<Q: Quantity>(criterion: &mut Criterion, name: &str, quantity: &Q) {
 }
 
 fn once<T: Data, Q: Quantity>(template: &Template, quantity: &Q, vertices: &[T], count: usize) {
-    let d_out = vec![T::of(1.0); count * quantity.len(template)];
+    let d_out = vec![T::of(1.0); count * quantity.num_outputs(template)];
     let done = batch(template, vertices, count).value_and_vjp(quantity, &d_out);
     let _ = black_box(done.expect("finite bodies"));
 }
@@ -102,21 +104,21 @@ fn stability() -> StabilityLoss {
     StabilityLoss { method: Method::Pcom, pressure: CenterOfPressure { curve: CURVE, epsilon: 0.0 } }
 }
 
-fn rooms(criterion: &mut Criterion) {
+fn quantities(criterion: &mut Criterion) {
     set_num_threads(Some(1));
-    room(criterion, "volume", &PartVolumes);
-    room(criterion, "mass_properties", &MassProperties { densities: vec![985.0] });
-    room(criterion, "sampling", &SampleSurface);
-    room(criterion, "mass", &CenterOfMass { method: Method::Pcom });
-    room(criterion, "mass_exact", &CenterOfMass { method: Method::Exact });
-    room(criterion, "pressure", &Pressure { curve: CURVE });
-    room(criterion, "center_of_pressure", &CenterOfPressure { curve: CURVE, epsilon: 0.0 });
-    room(criterion, "support", &SupportMargin { contact: CONTACT, method: Method::Pcom });
-    room(criterion, "stability", &stability());
-    room(criterion, "ground", &ground());
+    bench(criterion, "volume", &PartVolumes);
+    bench(criterion, "mass_properties", &MassProperties { densities: vec![985.0] });
+    bench(criterion, "sampling", &SampleSurface);
+    bench(criterion, "mass", &CenterOfMass { method: Method::Pcom });
+    bench(criterion, "mass_exact", &CenterOfMass { method: Method::Exact });
+    bench(criterion, "pressure", &Pressure { curve: CURVE });
+    bench(criterion, "center_of_pressure", &CenterOfPressure { curve: CURVE, epsilon: 0.0 });
+    bench(criterion, "support", &SupportMargin { contact: CONTACT, method: Method::Pcom });
+    bench(criterion, "stability", &stability());
+    bench(criterion, "ground", &ground());
     let balance = BalanceCost { method: Method::Pcom, wrap: Wrap::Log, curve: CURVE, sigma: 0.02 };
-    room(criterion, "balance", &balance);
-    room(criterion, "terms", &StabilityTerms { stability: stability(), ground: ground() });
+    bench(criterion, "balance", &balance);
+    bench(criterion, "terms", &StabilityTerms { stability: stability(), ground: ground() });
     closing(criterion);
     hulls(criterion);
 }
@@ -154,6 +156,6 @@ criterion_group! {
         .sample_size(10)
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(1));
-    targets = rooms
+    targets = quantities
 }
 criterion_main!(benches);
