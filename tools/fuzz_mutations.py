@@ -28,7 +28,8 @@ ODD_WORDS = (0, 1, 2, 127, 128, 255, 256, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0x80000000
 ODD_ARRAYS: tuple[Callable[[np.ndarray], np.ndarray], ...] = (
     lambda a: np.full_like(a, np.nan, dtype=float), lambda a: np.full(a.shape, 1e308), lambda a: a.astype(complex,
     copy=True),
-    lambda a: np.empty(a.shape, "datetime64[s]"), lambda a: a[..., None], lambda a: a.reshape(-1), lambda a: np.atleast_1d(a)[:0],
+    lambda a: np.empty(a.shape, "datetime64[s]"), lambda a: a[..., None], lambda a: a.reshape(-1),
+    lambda a: np.atleast_1d(a)[:0],
     lambda a: np.array("text"), lambda a: np.array(7), lambda a: np.zeros((0, 3)), lambda a: np.asfortranarray(a),
     lambda a: np.full(a.shape, -1), lambda a: np.full(a.shape, 2**63, np.uint64), lambda a: np.full(a.shape, "é"),
     lambda a: np.zeros(a.shape, [("x", "f4"), ("y", "i2")]), lambda a: np.full(a.shape, np.inf),

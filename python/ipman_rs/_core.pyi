@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 __version__: str
 
 ANALYSIS_COLUMNS: dict[str, int]
-"""Name and first column of each result in the rows of `analysis`: points take three columns, `inertia` nine, `part_volumes`
-one per part, all others one."""
+"""Name and first column of each result in the rows of `analysis`: points take three columns, `inertia` nine,
+`part_volumes` one per part, all others one."""
 
 _Float = TypeVar("_Float", np.float32, np.float64)
 
@@ -207,7 +207,7 @@ def analysis(
     normal: NDArray[np.float64],
     height: NDArray[np.float64],
 ) -> tuple[NDArray[_Float], NDArray[np.float64], NDArray[np.int64]]:
-    """Rows of results (B, K), by ANALYSIS_COLUMNS, the corners (N, 3) of all bases of support, and how many each has (B,)."""
+    """Rows of results (B, K), by ANALYSIS_COLUMNS; corners (N, 3) of all bases of support; how many each has (B,)."""
 
 def base_of_support(
     template: Template,

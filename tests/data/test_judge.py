@@ -214,3 +214,12 @@ def test_speed(metres, levels):
     places = np.outer(np.arange(50), [metres, 0, 0])
     assert [each.level for each in judge.speed("trans", places, np.arange(50) / 60)] == levels
     assert judge.speed("trans", places, None) == []
+
+
+def test_speed_of_places_that_are_not_finite(recwarn):
+    places = np.outer(np.arange(50), [2.0, 0, 0])
+    places[[3, 4, 20]] = np.inf, np.inf, np.nan
+    places[30], places[31] = 1.5e308, -1.5e308
+    assert [each.level for each in judge.speed("trans", places, np.arange(50) / 60)] == ["odd"]
+    assert judge.speed("trans", np.full((5, 3), np.inf), np.arange(5.0)) == []
+    assert not recwarn

@@ -351,6 +351,7 @@ def test_maps_that_cannot_be(one, old, new, message):
         ("center-x (mm)", "center-x (m)", r"no column 'Pressure, .* center-x \(mm\)'"),
         ("0.150000,", "0.152000,", None),
         ("0.150000,", "0.250000,", "time: expected steps of 1/60 s, without a gap"),
+        ("0.150000,", "1e308,", "time: expected steps of 1/60 s, without a gap"),
         ("0.150000,", "soon,", "row 2: expected a number, got 'soon'"),
     ],
 )
