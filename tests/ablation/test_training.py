@@ -21,9 +21,9 @@ from ipman_rs.body import load_body
 from ipman_rs.cli import main
 from ipman_rs.training.augment import normalised
 from ipman_rs.training.lifting import views
-from ipman_rs.training.lifting.views import KEYPOINTS
 from ipman_rs.training.metrics import figures
 from ipman_rs.training.model import Estimate
+from ipman_rs.training.model.keypoint_encoder import KEYPOINTS
 from ipman_rs.training.sources.images import Images
 from ipman_rs.training.train_loop import Drill
 

@@ -13,7 +13,7 @@ import ipman_rs.torch as ipt
 from ipman_rs.body import joints, poses, rotations
 from ipman_rs.training.augment import MEAN, SPREAD, Augmentation, Augmenting, crop, follow, to_crop
 from ipman_rs.training.batch import Batch
-from ipman_rs.training.lifting.views import KEYPOINTS
+from ipman_rs.training.model.keypoint_encoder import KEYPOINTS
 from ipman_rs.training.world import to_world
 from ipman_rs.view.raster import rasterize
 

@@ -20,8 +20,8 @@ from ipman_rs.data.spin import JOINTS
 from ipman_rs.training import losses
 from ipman_rs.training.augment import Augmentation
 from ipman_rs.training.batch import Batch
-from ipman_rs.training.lifting.views import KEYPOINTS
 from ipman_rs.training.model import Estimate
+from ipman_rs.training.model.keypoint_encoder import KEYPOINTS
 from ipman_rs.training.posed_estimate import REGRESSED, Posing
 from ipman_rs.training.predict import Trained
 from ipman_rs.training.projection import project

@@ -14,7 +14,7 @@ from ipman_rs.body import joints, load_body, rotations
 from ipman_rs.data import Cameras, Frames
 from ipman_rs.training.augment import Augmenting
 from ipman_rs.training.batch import Batch
-from ipman_rs.training.lifting.views import KEYPOINTS
+from ipman_rs.training.model.keypoint_encoder import KEYPOINTS
 from ipman_rs.training.sources import BadSample, Images, Mixture, Share
 from ipman_rs.training.sources.mixture import Steps
 

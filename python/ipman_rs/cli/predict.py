@@ -173,7 +173,7 @@ def _predicted(
     from ..fitting import photo
     from ..fitting.jobs import outputs
     from ..io import write_mesh
-    from ..study.fitted import camera_of
+    from ..study import camera_of
 
     try:
         pixels = photo.read(path)

@@ -22,7 +22,7 @@ from ipman_rs.data.frames import DataSet, Frames
 from ipman_rs.evaluation.tables import predictions
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.files import read_json, safe_npz
-from ipman_rs.study.fitted import camera_of
+from ipman_rs.study import camera_of
 from ipman_rs.view import Study
 
 PHOTOS = (".jpg", ".jpeg", ".png")

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from .camera import Camera
-from .fitted import Fitted, camera_of
-from .study import Study, study
+from .camera import Camera, camera_of
+from .study import Fitted, Study, study
 
 __all__ = ["Camera", "Fitted", "Study", "camera_of", "study"]

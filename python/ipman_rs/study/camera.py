@@ -67,3 +67,10 @@ def look_at(
         reach[k] = (plus + minus) / 2 / half[k]
     eye[2] = max(reach.max(), local[:, 2].max() + 1e-3)
     return Camera(eye @ axes, axes, focal, ((left + end) / 2, (top + bottom) / 2))
+
+
+def camera_of(rotation: np.ndarray, translation: np.ndarray, focal: np.ndarray, center: np.ndarray) -> Camera:
+    """The picture's camera of extrinsics R, t (x right, y down, z forward) and pixels."""
+    axes = rotation * np.array([[1.0], [-1.0], [-1.0]])
+    (fx, fy), (cx, cy) = focal, center
+    return Camera(-rotation.T @ translation, axes, (float(fx), float(fy)), (float(cx), float(cy)))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .fitted import Fitted
+from .camera import Camera
 
 # Frames of a long sequence that are drawn and whose pressure samples are stored.
 MAX_KEY_FRAMES = 48
@@ -22,6 +21,35 @@ _ROOMS = (
     "center_of_pressure", "bose", "stability", "pull", "push", "balance", "lowest",
 )  # fmt: skip
 _SUPPORT = ("area", "margin", "inside", "has_contact", "num_contacts")
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a study of a fitted body knows more: its camera, its keypoints, the body before the physics terms.
+
+    `camera` in pixels of the photo, whose width and height are `size`; `photo` its pixels (h, w, 3) uint8; `seen`
+    (K, 3) x, y and confidence of the points that were detected, `projected` (K, 2) where the fitted body has them;
+    `before` a study of one frame; `record` is shown in `report.json`.
+    """
+
+    camera: Camera
+    size: tuple[float, float]
+    seen: np.ndarray
+    projected: np.ndarray
+    photo: np.ndarray | None = None
+    before: Study | None = None
+    pictured: bool = True
+    record: dict[str, Any] = field(default_factory=dict)
+
+    def pictures(self) -> tuple[tuple[str, str], ...]:
+        """File names of the pictures that the page shows, and their titles. The side view is half of the pair."""
+        if not self.pictured:
+            return ()
+        over = "Over the photo" if self.photo is not None else "Over the keypoints"
+        side = ("side.png", "From the side")
+        if self.before is not None:
+            side = ("before_after.png", "Before and after the physics terms, from the side")
+        return ("overlay.png", over), side, ("floor.png", "The floor from above")
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,9 @@ from ipman_rs.data import DataSet
 
 from .augment import ROOM, Augmentation, crop, to_crop
 from .batch import Batch
-from .lifting.views import KEYPOINTS
 from .model import HMR
 from .model.build import made
+from .model.keypoint_encoder import KEYPOINTS
 from .model.trained_weights import read_trained
 from .posed_estimate import HIPS, REGRESSED_HIPS, Posing, check_regressor
 from .sources import BadSample, Images

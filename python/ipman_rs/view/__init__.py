@@ -6,8 +6,7 @@ view.write_report([study], Path("out"))                    # report.html, report
 
 from __future__ import annotations
 
-from ..study.fitted import Fitted
-from ..study.study import Study, study
+from ..study.study import Fitted, Study, study
 from .floor import draw_floor_view
 from .html import page
 from .picture import draw_picture

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ipman_rs.files import being_written
-from ipman_rs.study.fitted import Fitted
+from ipman_rs.study import Fitted
 
 from ..study.camera import Camera
 from . import colors

@@ -21,9 +21,9 @@ from ipman_rs.files import being_written
 from ...training.augment import Augmenting, normalised
 from ...training.batch import Batch
 from ...training.lifting.network import lifter
-from ...training.lifting.views import KEYPOINTS
 from ...training.model import HMR, keypoint_maps_loss
 from ...training.model.backbones import Small, mean_positions
+from ...training.model.keypoint_encoder import KEYPOINTS
 from ...training.posed_estimate import Posing
 from ...training.sources import BadSample
 from ...training.sources.images import Images

@@ -12,16 +12,15 @@ from torch import Tensor
 
 import ipman_rs.torch as ipt
 from ipman_rs.body import rotations
-from ipman_rs.data.keypoints import coco
 
 from ...synthetic.population import BODY, Bodies
 from ..batch import Batch
+from ..model.keypoint_encoder import KEYPOINTS
 from ..posed_estimate import HIPS, Posing
 
 Array = NDArray[np.floating]
 Draw = np.random.Generator
 
-KEYPOINTS = (*coco.NAMES, "left_big_toe", "right_big_toe", "left_heel", "right_heel")
 DISTANCE, PITCH, ROLL = (3.0, 6.0), (-20.0, 60.0), 15.0  # m, degrees the camera looks down, degrees
 ROOM = 1.2  # side of the crop over the larger extent of the keypoints
 NOISE, DROPPED = 0.02, 0.05  # in half sides of the crop (each coordinate), share of keypoints that are not seen

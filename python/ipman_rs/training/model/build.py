@@ -9,6 +9,7 @@ from ipman_rs.body import BodyModel
 
 from .backbones import backbone
 from .hmr import HMR
+from .keypoint_encoder import WIDTH, KeypointEncoder
 from .mean_parameters import MeanParameters
 from .spin_checkpoint import load_spin
 from .trained_weights import read_trained
@@ -39,8 +40,6 @@ def _go_on_from(model: HMR, path: str) -> None:
 
 
 def _made(settings: Config, body: BodyModel, start: bool) -> HMR:
-    from ..lifting.network import WIDTH, KeypointEncoder
-
     told = settings.model
     mean = MeanParameters.read(Path(told.mean)) if told.mean and start else MeanParameters.of(body)
     if told.backbone == "keypoints":

@@ -13,7 +13,7 @@ from ipman_rs.body import BodyModel
 from ipman_rs.body.joint_regressors import JointRegressor, read
 
 from ..batch import Batch
-from ..lifting.views import KEYPOINTS
+from ..model.keypoint_encoder import KEYPOINTS
 from ..posed_estimate import REGRESSED
 from ..sources import BadSample, Images, Mixture, People, Share, Source
 from ..sources.mixture import Steps
