@@ -24,6 +24,7 @@ def fit(tmp_path, *arguments, code=0, pose="standing"):
     return (json.loads(record.read_text()) if record.is_file() else None), done
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", poses.NAMES)
 @pytest.mark.parametrize("preset", ["ipman-o", "smplify-xmc", "balanced"])
 def test_each_preset_on_each_named_pose(preset, name, tmp_path, lite):
