@@ -79,6 +79,7 @@ def test_compile_inductor(tiny):
     torch.testing.assert_close(vertices.grad, again.grad, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", ["value", "vjp", "jvp", "vjp_jvp", "value_and_vjp"])
 def test_opcheck(room, tiny, verb):
     vertices, batch = tiny.vertices, len(tiny.vertices)
