@@ -36,13 +36,14 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(wildcard rust-toolchain.toml) 
 	$(shell find rust -type d -o -name '*.rs' -o -name Cargo.toml)
 BINARY := python/ipman_rs/_core.abi3.so
 
-.PHONY: help demo demo-poses demo-fit test test-rust test-python test-levels fuzz fuzz-rust fuzz-python lint format wheel \
-	bench lock audit deny clean FORCE
+.PHONY: help demo demo-poses demo-fit check test test-rust test-python test-levels fuzz fuzz-rust fuzz-python lint format \
+	wheel bench lock audit deny clean FORCE
 
 help:
 	@echo 'make demo     demo-poses: the named poses of the embedded body, analysed, report in $(OUT); and'
 	@echo '              demo-fit: a body fitted to the keypoints of a photo, report in $(FIT_OUT) (IMAGE=photo.png draws it'
 	@echo '              under them; installs torch, some minutes the first time, and takes ten seconds afterwards)'
+	@echo 'make check    the fast Python tests, in two minutes on two cores (installs torch and the test tools)'
 	@echo 'make test     every test, Rust and Python (installs torch and the test tools)'
 	@echo 'make lint     formats and lints checked, nothing changed'
 	@echo 'make format   sources formatted'
@@ -67,6 +68,12 @@ demo-fit: $(VENV)/fit-tools | $(if $(filter demo,$(MAKECMDGOALS)),demo-poses)
 	@echo
 	@echo 'The fitted body: $(abspath $(FIT_OUT))/report.html   (parameters, mesh and pictures: $(FIT_OUT)/basketball)'
 
+# One process a core, one thread each: torch would otherwise start its threads in every process.
+PYTEST := OMP_NUM_THREADS=1 python -m pytest -n auto
+
+check: $(VENV)/test-tools
+	$(PYTEST) -m 'not slow' $(PYTEST_ARGS)
+
 test: test-rust test-python test-levels fuzz
 	@echo
 	@echo 'All tests passed: Rust (cargo) and Python (pytest).'
@@ -76,9 +83,8 @@ test-rust:
 		cargo nextest run --locked --features simulation && cargo test --locked --features simulation --doc; \
 	else cargo test --locked --features simulation; fi
 
-# One process a core, one thread each: torch would otherwise start its threads in every process.
 test-python: $(VENV)/test-tools $(VENV)/browser | test-rust
-	OMP_NUM_THREADS=1 python -m pytest -n auto $(PYTEST_ARGS)
+	$(PYTEST) $(PYTEST_ARGS)
 
 # The numbers once more on every other CPU level that this machine has (IPMAN_SIMD).
 LEVEL_TESTS := $(addprefix tests/,$(patsubst %,physics/test_%.py,volume_mass sampling pressure support losses analysis \
@@ -87,7 +93,7 @@ LEVEL_TESTS := $(addprefix tests/,$(patsubst %,physics/test_%.py,volume_mass sam
 test-levels: $(VENV)/test-tools | test-python
 	for level in $$(python -c 'from ipman_rs import _core; print(*_core.simd_levels()[1:])'); do \
 		echo "CPU level $$level"; \
-		IPMAN_SIMD=$$level OMP_NUM_THREADS=1 python -m pytest -n auto $(LEVEL_TESTS); done
+		IPMAN_SIMD=$$level $(PYTEST) $(LEVEL_TESTS); done
 
 # FUZZ_SECONDS of each target. The same FUZZ_SEED tries the same cases; one that went wrong is repeated with --case.
 FUZZ_SECONDS ?= 60

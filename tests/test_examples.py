@@ -47,6 +47,7 @@ def test_analyze_a_body():
     assert margins[0] > 0 > margins[-1], "a body on one leg stands, and no longer when it leans by 25 degrees"
 
 
+@pytest.mark.slow
 def test_train_with_physics():
     shown = example(2)
     tilt, lowest, margin = (
@@ -72,6 +73,7 @@ def test_balance_and_gradients():
     assert min(first, first * second - cross**2) > 0, "balance is a minimum: the Hessian is positive definite"
 
 
+@pytest.mark.slow
 def test_physics_in_your_trainer():
     shown = example(5)
     errors, costs = numbers(r"off by (\d+)", shown), numbers(r"cost ([\d.]+)", shown)

@@ -120,6 +120,7 @@ def test_rows_differ_in_their_terms_alone():
         assert all(stage.options.iterations <= 100 for config in made.values() for stage in config.stages)
 
 
+@pytest.mark.slow
 def test_command(tmp_path):
     arguments = ["benchmark", "fit", "-o", str(tmp_path), "-n", "4", "--controls", "2", "--iterations", "2"]
     arguments += ["--split", "tune", "--only", "calibrated, good", "--only", "calibrated, jump"]

@@ -101,6 +101,7 @@ def test_the_settings_have_all_rows(task):
     assert (settings(task).plan.first is None) == (task == "keypoints")
 
 
+@pytest.mark.slow
 def test_command(tmp_path):
     arguments = ["benchmark", "train", "-o", str(tmp_path), "-n", "14", "--people", "14", "--seeds", "2"]
     arguments += ["--split", "tune", "--part", "0.001", "--tilt", "0", "--tilt", "8", "-j", "1"]
@@ -132,6 +133,7 @@ def test_command(tmp_path):
     assert (tmp_path / "other/training_benchmark.csv").read_text() == lines
 
 
+@pytest.mark.slow
 def test_command_on_images(tmp_path):
     pytest.importorskip("embreex", reason="embreex is not installed")
     images = ["data", "render", "-o", str(tmp_path / "images"), "-n", "8", "--val", "0", "--test", "8", "--size", "64"]

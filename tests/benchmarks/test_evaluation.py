@@ -23,6 +23,7 @@ def test_made_frames(tmp_path):
         assert 0.08 < np.nanstd(noisy["pose"] - truth["pose"]) < 0.12
 
 
+@pytest.mark.slow
 def test_the_command_measures_them(tmp_path):
     evaluation.write_truth(tmp_path / "truth-40.npz", 40)
     evaluation.write_predictions(tmp_path / "noisy-40.npz", 40)

@@ -64,6 +64,7 @@ def test_best_torch_on_three_part_junctions(blob):
     assert relative_error(best, Vectorised(template).terms(vertices)) < 1e-4  # volumes of scattered parts are small
 
 
+@pytest.mark.slow
 def test_compiled_best_torch(template):
     vertices = torch.tensor(bodies.posed_batch(bodies.body("lite"), 2), dtype=torch.float32)
     compiled, plain = BestTorch(template), BestTorch(template, compiled=False)
@@ -118,6 +119,7 @@ def test_the_first_call_of_a_turn_is_kept_apart():
     assert times.medians() == (1.5, 6.0)
 
 
+@pytest.mark.slow
 def test_page(tmp_path, monkeypatch):
     def rows(budget):
         assert budget.batches == (1, 8, 64)
@@ -143,6 +145,7 @@ def test_widths_flag_a_quantity_out_of_line():
     assert "10.00×" in lines[-1]
 
 
+@pytest.mark.slow
 def test_every_case_once(monkeypatch):
     """The smallest grid through the real code."""
     monkeypatch.setitem(cases.LOSS_PEERS, "best torch", lambda template, preset: BestTorch(template, preset, False))

@@ -110,6 +110,7 @@ def test_oversized_file(tmp_path):
     refused(path, "more than any body model has")
 
 
+@pytest.mark.slow
 def test_deep_nesting_does_not_overflow_the_stack(tmp_path):
     path = tmp_path / "deep.pkl"
     path.write_bytes(b"\x80\x02}N" + b"\x85" * 1_000_000 + b"Ns.")

@@ -174,6 +174,7 @@ def test_opcheck(op):
     torch.library.opcheck(getattr(ops, op), (pose, betas, None, transl, *more, body._key))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("forced", [False, True])
 def test_compile_fullgraph(forced):
     torch.compiler.reset()

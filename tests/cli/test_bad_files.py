@@ -146,6 +146,7 @@ def test_a_bad_body_model(run, tmp_path):
         assert str(model) in result.err
 
 
+@pytest.mark.slow
 def test_a_bad_file_among_good_ones_loses_nothing(run, tmp_path):
     trimesh.creation.icosphere(3, radius=0.25).export(tmp_path / "ball.ply")
     (tmp_path / "bad.obj").write_bytes(b"no mesh")
@@ -191,6 +192,7 @@ def test_the_real_program(tmp_path):
     assert strict(bad.stdout)["bodies"] == []
 
 
+@pytest.mark.slow
 def test_a_reader_that_leaves_early_costs_no_report(tmp_path):
     """`ipman analyze ... | head -0`: the page is written before anything is printed."""
     trimesh.creation.icosphere(2, radius=0.25).export(tmp_path / "ball.ply")

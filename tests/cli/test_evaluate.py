@@ -43,6 +43,7 @@ def own(folder):
     return "--data", "own", "--path", folder / "truth.npz"
 
 
+@pytest.mark.slow
 def test_two_methods_of_a_data_set(run, folder, own, tmp_path):
     done = run("evaluate", folder / "far.npz", folder / "near.npz", *own, "-o", tmp_path / "out")
     assert done.code == 0, done.err
@@ -69,6 +70,7 @@ def test_two_methods_of_a_data_set(run, folder, own, tmp_path):
     assert re.search(r"\| PVE, mm \| −\d+\.\d \[−\d+\.\d, −\d+\.\d\] \| 0\.\d{4} \| 30 \| better \|", page)
 
 
+@pytest.mark.slow
 def test_frames_are_in_parquet(run, folder, own, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     assert run("evaluate", folder / "near.npz", *own, "-o", tmp_path / "out").code == 0
@@ -79,6 +81,7 @@ def test_frames_are_in_parquet(run, folder, own, tmp_path):
     assert all(value > 0 for value in table["pve"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("table", TABLES)
 def test_every_table_is_printed(table, run, folder, own, tmp_path):
     done = run("evaluate", folder / "near.npz", "--table", table, *own, "-o", tmp_path / "out")
@@ -119,6 +122,7 @@ def test_what_a_table_cannot_tell_is_said(run, folder, own, tmp_path):
     assert "CoP error: not to be had without a measured centre of pressure" in page
 
 
+@pytest.mark.slow
 def test_shards_and_a_report_when_all_are_there(run, folder, own, tmp_path, monkeypatch):
     monkeypatch.setattr(job.Job, "piece", 8)
     monkeypatch.setattr(job.Job.__init__, "__defaults__", (*job.Job.__init__.__defaults__[:-1], 8))

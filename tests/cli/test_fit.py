@@ -49,6 +49,7 @@ def arrays(path):
         return dict(stored)
 
 
+@pytest.mark.slow
 def test_a_standing_body(fit, tmp_path, standing):
     said = fit(files.write(tmp_path / "anna.json", standing), preset="fast", pictures=1)
     assert said.code == 0, said.err
@@ -197,6 +198,7 @@ def test_scenes_that_cannot_be(fit, tmp_path, standing, option):
     assert all(np.isfinite(value).all() for value in stored.values() if value.dtype.kind == "f")
 
 
+@pytest.mark.slow
 def test_image_of_one_pixel(fit, tmp_path, standing):
     said = fit(files.write(tmp_path / "tiny.json", standing, (1, 1)), pictures=1)
     assert said.code == 0
@@ -321,6 +323,7 @@ def test_a_photo_of_another_size(fit, tmp_path, standing):
     assert "the photo has 96 × 128 pixels, --image-size says 480 × 640" in notes[0]
 
 
+@pytest.mark.slow
 def test_a_video_of_mmpose(fit, tmp_path, standing):
     """Three frames, of which the second shows nobody: two bodies, or one over time."""
     from ipman_rs.data.keypoints import coco, mediapipe
@@ -410,6 +413,7 @@ def test_focal_length_is_the_diagonal(fit, tmp_path, standing):
     assert arrays(said.folder / "anna" / "anna.npz")["focal"][0] == pytest.approx([math.hypot(*files.SIZE)] * 2)
 
 
+@pytest.mark.slow
 def test_frames_of_one_person(fit, tmp_path):
     """A sequence has one shape, its poses over time in one file, and leaves out a frame that cannot be read."""
     folder = tmp_path / "walk"
@@ -432,6 +436,7 @@ def test_frames_of_one_person(fit, tmp_path):
     assert (said.folder / "walk" / "fit.json").stat().st_mtime_ns == before
 
 
+@pytest.mark.slow
 def test_markers(fit, shared):
     said = fit(shared("gait2354") / "subject01_static.trc", "--every", "100", preset="markers")
     assert said.code == 0

@@ -57,6 +57,7 @@ def record(folder, name):
     return json.loads((folder / name / "fit.json").read_text())
 
 
+@pytest.mark.slow
 def test_a_file_that_says_nothing_rightly(points, tmp_path):
     """z up, in millimetres though it says metres, with a laboratory's own names: refused three times, then fitted."""
     plain = write(tmp_path / "plain.trc", points)
@@ -88,6 +89,7 @@ def test_a_file_that_says_nothing_rightly(points, tmp_path):
     assert 0.005 < np.median(list(found["skin_distances_m"].values())) < 0.015  # they were put 10 mm off the skin
 
 
+@pytest.mark.slow
 def test_markers_that_do_not_say_all(points, tmp_path):
     """Legs and pelvis alone, one marker that was never seen and one that nobody knows: told on the screen and kept."""
     legs = [name for name in NAMES if name[1:] in ("ASI", "PSI", "KNE", "ANK", "HEE", "TOE")]
@@ -113,6 +115,7 @@ def test_markers_that_do_not_say_all(points, tmp_path):
         assert stored["mocap_frame_rate"] == pytest.approx(100)
 
 
+@pytest.mark.slow
 def test_what_is_no_person_is_fitted_by_force_only(points, tmp_path):
     """Markers that are nowhere near a body are no fit that converged."""
     scattered = np.random.default_rng(5).uniform(-0.9, 0.9, points.shape[1:])

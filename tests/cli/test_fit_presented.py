@@ -24,6 +24,7 @@ def fit(tmp_path, *arguments, code=0, pose="standing"):
     return (json.loads(record.read_text()) if record.is_file() else None), done
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", poses.NAMES)
 @pytest.mark.parametrize("preset", ["ipman-o", "smplify-xmc", "balanced"])
 def test_each_preset_on_each_named_pose(preset, name, tmp_path, lite):
@@ -45,6 +46,7 @@ def test_each_preset_on_each_named_pose(preset, name, tmp_path, lite):
         np.testing.assert_allclose(stored["transl"][0], 0.0, atol=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["ipman-o", "smplify-xmc", "balanced"])
 def test_a_pose_from_a_file(preset, tmp_path, lite):
     """The file of a body in a pose: the same fit as by the pose's name."""

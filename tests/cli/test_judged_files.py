@@ -87,6 +87,7 @@ def test_units_that_are_none(run, mesh, wrong):
     assert "is none of m, dm, cm, mm" in result.err
 
 
+@pytest.mark.slow
 def test_a_body_on_its_head_is_marked_everywhere(run, mesh, tmp_path):
     path = mesh("down.obj", np.diag([1.0, -1.0, -1.0]), pose="tree")
     result = run("analyze", path, "-o", tmp_path / "out")
@@ -359,6 +360,7 @@ def test_a_frame_of_another_size_among_many_is_marked_without_a_python_warning(r
         assert result.err == f"ipman: warning: {tmp_path / 'one.npz'}: {flag}\n"
 
 
+@pytest.mark.slow
 def test_other_files_go_on(run, mesh, tmp_path):
     files = mesh("good.ply"), mesh("mm.ply", scale=1e3)
     result = run("analyze", *files, "-o", tmp_path / "out")

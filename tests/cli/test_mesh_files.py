@@ -34,6 +34,7 @@ def stray(standing):
     return np.concatenate([standing, [[0.3, -0.4, 0.0]]])
 
 
+@pytest.mark.slow
 def test_a_loose_vertex_is_no_part_of_the_body(run, tmp_path, lite_body, standing):
     """0.4 m below the soles: the ground stays at them, and the body's ten parts are still known."""
     for name, vertices in (("whole", standing), ("stray", stray(standing))):

@@ -76,6 +76,7 @@ def test_poses(page, tmp_path, lite_body):
     is_quiet(page)
 
 
+@pytest.mark.slow
 def test_a_sequence_has_curves_and_a_slider(page, tmp_path, run):
     np.savez(tmp_path / "walk.npz", **walk_parameters(60))
     assert run("analyze", tmp_path / "walk.npz", "--body", "anny-lite", "-o", tmp_path / "out").code == 0

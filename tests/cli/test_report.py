@@ -36,6 +36,7 @@ def study(lite_body):
     return view.study("warrior", vertices, lite_body.template, ip.Ground())
 
 
+@pytest.mark.slow
 def test_pictures_show_the_body_and_the_paper_colours(study, tmp_path):
     view.draw_picture(study, 0, tmp_path / "a.png")
     view.draw_floor_view(study, 0, tmp_path / "b.png")
@@ -51,6 +52,7 @@ def test_pictures_show_the_body_and_the_paper_colours(study, tmp_path):
     assert grey.mean() > 0.03
 
 
+@pytest.mark.slow
 def test_the_picture_has_a_body_without_contact_and_one_of_nan(lite_body, standing, tmp_path):
     for shift in (2.0, np.nan):
         odd = view.study("odd", standing + shift, lite_body.template, ip.Ground())
@@ -61,6 +63,7 @@ def test_the_picture_has_a_body_without_contact_and_one_of_nan(lite_body, standi
         assert frame["status"] == (["NON_FINITE"] if np.isnan(shift) else ["NO_CONTACT"])
 
 
+@pytest.mark.slow
 def test_npz_is_what_analyze_gives(lite_body, tmp_path):
     names = ("standing", "tree", "cobra")
     vertices = np.stack([ip.body.posed(lite_body, name) for name in names])
@@ -92,6 +95,7 @@ def test_skin_pressure_is_the_core_pressure(study):
     np.testing.assert_allclose(pressure_at(heights - 0.05, 100.0, 10.0), sunk, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_long_sequence_keeps_key_frames_and_all_numbers(run, tmp_path):
     np.savez(tmp_path / "walk.npz", **walk_parameters(70))
     result = run("analyze", tmp_path / "walk.npz", "--body", "anny-lite", "-o", tmp_path / "out")
@@ -108,6 +112,7 @@ def test_a_long_sequence_keeps_key_frames_and_all_numbers(run, tmp_path):
     assert {"perspective_00.png", "floor_69.png"} <= {p.name for p in (tmp_path / "out").iterdir()}
 
 
+@pytest.mark.slow
 def test_names_cannot_leave_the_folder_or_the_text(lite_body, standing, tmp_path, monkeypatch):
     names = ["../../up", "<script>alert(1)</script>", "a/b\\c", "", "...", "BODY", "body", "x" * 300, "\x1b[31mred\n"]
     studies = [view.study(n, standing, lite_body.template, ip.Ground(), source=n, notes=[n]) for n in names]
@@ -127,6 +132,7 @@ def test_safe_names():
     assert safe_names(["a b", "a_b", "A_B", "../x", "é"]) == ["a_b", "a_b_2", "A_B_3", "x", "body"]
 
 
+@pytest.mark.slow
 def test_hostile_file_names(run, tmp_path, lite_body, standing):
     folder = tmp_path / "in"
     folder.mkdir()
@@ -139,6 +145,7 @@ def test_hostile_file_names(run, tmp_path, lite_body, standing):
     assert "<script>alert" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_demo(run, tmp_path, monkeypatch):
     """The whole command with two poses of the light body: all poses take half a minute to draw."""
     monkeypatch.setattr(ip.body.poses, "NAMES", ("tree", "lean_past_toes"))

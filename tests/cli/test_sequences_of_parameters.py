@@ -37,6 +37,7 @@ def thousand(folder):
     return folder / "many.npz", pose.reshape(-1, 24, 3), np.full(10, 0.2, np.float32), transl
 
 
+@pytest.mark.slow
 def test_a_thousand_frames(run, tmp_path, lite_body, no_pictures):
     file, pose, betas, transl = thousand(tmp_path)
     assert not isinstance(read_npz(file, "anny-lite").vertices, np.ndarray)
@@ -73,6 +74,7 @@ def test_the_ground_is_found_for_any_piece(up, run, tmp_path, monkeypatch):
     assert len(heights) == 1
 
 
+@pytest.mark.slow
 def test_a_long_recording_is_listed_in_part(run, tmp_path, monkeypatch, no_pictures):
     """The figures of all frames are in report.npz; 20 evenly spaced ones and the drawn ones in the page's lists."""
     np.savez(tmp_path / "walk.npz", **walk_parameters(70))

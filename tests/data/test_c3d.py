@@ -50,6 +50,7 @@ def test_unsigned_channels():
     np.testing.assert_array_equal(found.analogs, 40000 - 32768)
 
 
+@pytest.mark.slow
 def test_more_than_255_points_and_more_frames_than_two_bytes_count(tmp_path):
     points = np.ones((3, 300, 3))
     (tmp_path / "a.c3d").write_bytes(raw.c3d(points))
@@ -175,6 +176,7 @@ def test_a_file_without_points():
         c3d_format.content(raw.c3d().replace(b"POINT", b"PAINT"))
 
 
+@pytest.mark.slow
 def test_thousands_of_damaged_files(tmp_path):
     """Bytes changed, cut out, put in, cut off: an error that names the file, or a recording; at once, and no more."""
     chance = random.Random(17)

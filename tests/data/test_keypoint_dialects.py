@@ -406,6 +406,7 @@ def damaged(content, rng):
     return content
 
 
+@pytest.mark.slow
 def test_damaged_files_end_in_one_line(tmp_path):
     """2,000 damaged files of all dialects: read, or refused with the file's name, and nothing else."""
     rng = random.Random(5)

@@ -39,6 +39,7 @@ def write(path, mesh, frames):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "frames"), [("two.obj", 1), ("two.ply", 1), ("two.npz", 1), ("film.npz", 3)])
 def test_two_bodies_in_one_file_are_marked_everywhere(tmp_path, person, name, frames):
     path = write(tmp_path / name, beside(person, person, [1, 0, 0]), frames)

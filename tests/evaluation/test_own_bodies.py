@@ -89,6 +89,7 @@ def make(table, folder, bodies, regressor):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("with_regressor", [True, False])
 @pytest.mark.parametrize("table", TABLES)
 def test_own_bodies_have_no_error(table, with_regressor, bodies, regressors, tmp_path):
@@ -215,6 +216,7 @@ def test_one_camera_of_rich(bodies, tmp_path):
     assert record(tmp_path / "out")["printed"]["IPMAN-O*"] == {"mpjpe": 240.9, "pve": 217.1, "bose": 98.0}
 
 
+@pytest.mark.slow
 def test_measured_joints_of_spin_s_definition_take_its_extra_regressor(bodies, regressors, tmp_path):
     """RICH in IPMAN's form without bodies: joints as SPIN defines them, limbs the body's own, the middle regressed."""
     file, _ = rich_ipman.write(tmp_path)

@@ -71,6 +71,7 @@ def test_shards_of_other_machines_are_copied_together(evaluated, again):
     the_same(evaluated, job)
 
 
+@pytest.mark.slow
 def test_killed_twice_it_goes_on_and_ends_the_same(evaluated, again):
     folder, job = again
     for pieces in (2, 5):
@@ -179,6 +180,7 @@ def test_threads_do_not_change_a_bit(evaluated, again):
     the_same(evaluated, job)
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_frames(tmp_path):
     """What numpy and Python hold at the most while pieces are measured: six times the frames would be six times as much
     if it grew with them. A block of 256 bodies may wait for the collection of garbage, hence the factor of two."""

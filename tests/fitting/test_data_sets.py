@@ -126,6 +126,7 @@ def arrays(path):
         return dict(stored)
 
 
+@pytest.mark.slow
 def test_table_2_in_two_commands(yoga, models, tmp_path, preset):
     """One still frame of each sequence of the validation split, seen by camera 1, as the paper has it."""
     said = fit_moyo(yoga, models, tmp_path / "out", preset(PRESENTED))
@@ -155,6 +156,7 @@ def test_table_2_in_two_commands(yoga, models, tmp_path, preset):
     assert "| IPMAN-O (printed) | 71.9 | 34.3 | 11.4 | 98.6 |" in (tmp_path / "table" / "evaluation.md").read_text()
 
 
+@pytest.mark.slow
 def test_rich_in_two_commands(scans, models, tmp_path, preset):
     where = "--data", "rich", "--path", scans.root, "--models", models
     said = run(
@@ -175,6 +177,7 @@ def test_rich_in_two_commands(scans, models, tmp_path, preset):
     assert "IPMAN-O* (printed) | 240.9 |" in (tmp_path / "table" / "evaluation.md").read_text()
 
 
+@pytest.mark.slow
 def test_killed_half_way_the_bits_are_the_same(yoga, models, tmp_path, preset, monkeypatch):
     """In pieces of 3 frames with a death in the second one, as in one piece."""
     source = Source("moyo", str(yoga.root), "val", (("camera", 1),))

@@ -346,6 +346,7 @@ def folded(name: str) -> dict[str, torch.Tensor]:
     return {**cases.zeros(1), "orient": pose[:, 0], "pose": pose[:, 1:]}
 
 
+@pytest.mark.slow
 def test_contact_normals_against_all_pairs():
     """Every sample against every other, by plain distances."""
     problem = cases.problem(1)
@@ -371,6 +372,7 @@ def test_contact_normals_against_all_pairs():
     assert ContactNormals(problem).cost(apart).item() == 0
 
 
+@pytest.mark.slow
 def test_contact_normals_forget_nothing_as_a_body_moves():
     """A term that has seen a path says at its end, and on the way, what one says that sees that body first."""
     problem = cases.problem(1)

@@ -119,6 +119,7 @@ def body(request):
     return ipt.BodyModel(request.param, torch.float64)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("named", [OPENCAP, OPENSIM_GAIT, PLUG_IN_GAIT])
 def test_markers_are_their_radius_off_the_skin(body, named):
     sites = markers.sites(body.body, named, radius=0.012)

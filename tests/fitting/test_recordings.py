@@ -42,6 +42,7 @@ def solid(fit):
         return ipt.mass_properties(fit.candidate.vertices, fit.problem.body.template)
 
 
+@pytest.mark.slow
 def test_standing_still(shared, standing):
     assert standing.fit.converged.all()
     assert standing.unknown == ()
@@ -64,6 +65,7 @@ def test_standing_still(shared, standing):
     assert 0.005 < np.median(list(distances.values())) < 0.015
 
 
+@pytest.mark.slow
 def test_squats(shared, squatting):
     assert squatting.fit.converged.all()
     assert np.nanmean(squatting.errors) < 0.015
@@ -82,6 +84,7 @@ def test_the_shape_is_that_of_the_other_recording(standing, squatting):
     assert squatting.sites["C7"] == standing.sites["C7"]
 
 
+@pytest.mark.slow
 def test_markers_in_millimetres_of_another_person(shared, body):
     tracks = markers.read(shared("gait2354") / "subject01_static.trc")
     found = marker_fit.fit_tracks(body, tracks, every=150)

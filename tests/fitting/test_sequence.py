@@ -230,6 +230,7 @@ def test_key_frames_come_first():
     assert list(sequence.rounds(0, 1, 1)) == []
 
 
+@pytest.mark.slow
 def test_a_film_with_a_ground_that_is_found():
     """2D points, terms that look at the mesh, and a free focal length."""
     frames = 3

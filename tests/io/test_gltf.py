@@ -371,6 +371,7 @@ def test_an_array_of_zeros_is_no_larger_than_the_file(read):
         read(file)
 
 
+@pytest.mark.slow
 def test_many_instances_are_quick_and_bounded(read):
     """30,000 nodes of one box are read; of a body of 12,272 vertices they are refused before any memory is asked."""
     file = gltf_files.of(POINTS, FACES)

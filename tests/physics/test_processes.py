@@ -80,6 +80,7 @@ def test_fork_after_use():
     assert others == [first] * 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["fork", "spawn", "forkserver"])
 def test_process_pools(method, tmp_path):
     """A template travels by pickle; each worker gives the parent's bits."""
@@ -147,6 +148,7 @@ template = ip.BodyTemplate(tetrahedron, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0,
     assert re.fullmatch(r'ValueError: IPMAN_SIMD: expected one of .*scalar, got "mmx"', last)
 
 
+@pytest.mark.slow
 def test_threads_follow_torch():
     pytest.importorskip("torch")
     script = """
@@ -166,6 +168,7 @@ def test_threads_follow_torch():
     assert child(script, RAYON_NUM_THREADS="5") == ["5", "2", "5"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
 @pytest.mark.parametrize(
     "call",

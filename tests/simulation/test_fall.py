@@ -92,6 +92,7 @@ def test_the_start_is_the_pose_put_on_its_ground(box):
     assert found.times.tolist() == [0.0]
 
 
+@pytest.mark.slow
 def test_people_agree_over_engines(anny):
     names = ("standing", "warrior", "squat", "plank", "lying", "lean_past_toes")
     vertices = np.stack([ip.body.posed(anny, name) for name in names])

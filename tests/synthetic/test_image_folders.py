@@ -52,6 +52,7 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 def test_any_number_of_workers_gives_the_same_bytes(whole, tmp_path):
     environment = {**os.environ, "OMP_NUM_THREADS": "3"}
     script = "from ipman_rs.cli import main; main()"
@@ -59,6 +60,7 @@ def test_any_number_of_workers_gives_the_same_bytes(whole, tmp_path):
     assert contents(tmp_path / "two") == contents(whole)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
 def test_goes_on_after_a_kill(whole, tmp_path):
     """SIGKILL once the first shard is there: its file is not touched again, workers end, the rest becomes the same."""
@@ -94,6 +96,7 @@ def any_of_session(leader):
     return False
 
 
+@pytest.mark.slow
 def test_goes_on_in_the_middle_of_a_shard(whole, tmp_path):
     def stop(done):
         if done == 6:

@@ -31,6 +31,7 @@ def test_what_does_not_fit_is_a_memory_error(case):
     assert ending(case, 0.1, backtrace=True) == "MemoryError"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["simulate", "analyze of 1e6 samples", "tip_test", "self_contact_loss"])
 @pytest.mark.parametrize("spare", [0.1, 0.2])
 def test_many_small_vectors_are_asked_for_too(case, spare):

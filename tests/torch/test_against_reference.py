@@ -37,6 +37,7 @@ def compare(case, body):
     return relative(value, expected), relative(gradient, slope), relative(single.double(), slope)
 
 
+@pytest.mark.slow
 def test_random_poses_of_the_embedded_body(main_case, poses):
     value, gradient, single = compare(main_case, poses)
     assert value < VALUE
@@ -44,6 +45,7 @@ def test_random_poses_of_the_embedded_body(main_case, poses):
     assert single < SINGLE
 
 
+@pytest.mark.slow
 def test_real_people_y_down(main_case, people):
     value, gradient, single = compare(main_case, people)
     assert value < VALUE

@@ -48,6 +48,7 @@ def test_derivatives(tiny):
     cases.check_derivatives(tiny)
 
 
+@pytest.mark.slow
 def test_compile_fullgraph(tiny):
     cases.check_compiled(tiny)
 
@@ -122,6 +123,7 @@ def test_nothing_waits_for_the_device(tiny, run, device):
     assert "index_select" in recorder.names  # the tuned path ran
 
 
+@pytest.mark.slow
 def test_importing_needs_no_triton():
     code = "import sys; sys.modules['triton'] = None; import ipman_rs.torch as t"
     code += "; assert not t.device.triton_terms.INSTALLED"

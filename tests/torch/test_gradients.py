@@ -34,6 +34,7 @@ def test_gradgradcheck(main_case, tiny):
     )
 
 
+@pytest.mark.slow
 def test_hessian_four_ways(room, tiny):
     """func.hessian (forward over reverse), reverse over reverse, reverse over forward, and the reference agree."""
     vertices = tiny.vertices[0]

@@ -23,6 +23,7 @@ def fresh_compiler():
     torch.compiler.reset()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["compiled core", "reference"])
 def test_compile_fullgraph(room, tiny, path):
     """One graph, forward and backward, on both paths. The backend is the tracer alone: no C++ compiler is needed."""
@@ -40,6 +41,7 @@ def test_compile_fullgraph(room, tiny, path):
         torch.testing.assert_close(gradient_of(compiled, tiny.vertices), slope, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_compile_with_a_numpy_ground_and_another_batch(tiny):
     ground = ip.Ground((0.1, 1.0, 0.05), 0.01)
 
@@ -62,6 +64,7 @@ def test_compile_with_a_ground_made_inside(tiny):
     assert torch.equal(compiled(tiny.vertices, normals, heights), f(tiny.vertices, normals, heights))
 
 
+@pytest.mark.slow
 def test_compile_inductor(tiny):
     """The default backend on the loss that trainers compile."""
     loss = ipt.IntuitivePhysicsLoss(tiny.template)
@@ -76,6 +79,7 @@ def test_compile_inductor(tiny):
     torch.testing.assert_close(vertices.grad, again.grad, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", ["value", "vjp", "jvp", "vjp_jvp", "value_and_vjp"])
 def test_opcheck(room, tiny, verb):
     vertices, batch = tiny.vertices, len(tiny.vertices)
@@ -172,6 +176,7 @@ def test_dataloader_workers_forked_after_use(tiny):
         assert torch.equal(batch[0], expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("forced", [False, True])
 def test_compiled_code_tells_templates_apart(tiny, forced):
     """The template is a constant of the graph: another one of the same size must not run through the first one's."""

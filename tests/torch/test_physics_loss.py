@@ -272,6 +272,7 @@ def test_it_is_a_plain_module(tiny):
     assert "paper-r" in repr(loss)
 
 
+@pytest.mark.slow
 @PRESETS
 @pytest.mark.parametrize("reduction", ["mean", "none"])
 def test_compile_fullgraph(tiny, preset, reduction):

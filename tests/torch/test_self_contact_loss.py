@@ -38,6 +38,7 @@ def with_gradient(vertices, template, **options):
     return value.detach(), torch.autograd.grad(value.sum(), vertices)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"push_width": 0.1, "pull_weight": 1.0, "near": 0.05, "geodesic": 0.2}])
 def test_as_all_faces_against_all_vertices(lite, arms, options):
     found = with_gradient(arms[1:], lite.template, **options)
@@ -53,6 +54,7 @@ def test_numpy_has_the_same_bits(lite, arms):
         assert (ours.numpy() == theirs).all()
 
 
+@pytest.mark.slow
 def test_gradcheck(balls):
     template, vertices = balls
     push, pull = ipt.self_contact_loss(vertices, template, near=0.1, pull_width=0.05)

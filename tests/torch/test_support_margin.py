@@ -50,6 +50,7 @@ def test_embedded_bodies_against_qhull(poses, forced):
     assert (ours < 0).any()
 
 
+@pytest.mark.slow
 def test_nearest_edge_of_random_clouds():
     """Clouds of 3 to 200 points, on circles (every point a corner), on grids (many on one line) and with copies."""
     generator = np.random.default_rng(4)

@@ -20,6 +20,7 @@ pytestmark = pytest.mark.skipif(find_spec("triton") is None, reason="triton is n
 inside = pytest.mark.skipif(not INTERPRETED, reason="run by test_in_the_interpreter, in a process of its own")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(INTERPRETED, reason="already in the interpreter")
 def test_in_the_interpreter():
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", "0", __file__]

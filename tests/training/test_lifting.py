@@ -90,6 +90,7 @@ def test_noise(static):
     assert torch.equal(noisy.keypoints, truth.keypoints)
 
 
+@pytest.mark.slow
 def test_it_learns_and_repeats_itself(static, posing):
     data = views.views(static, seed=1, per_body=4)
     plan = Drill(60, 1e-3, 32)

@@ -146,6 +146,7 @@ def test_maps_learn_where_keypoints_are():
     torch.testing.assert_close(found, entropy[keypoints[..., 2] > 0].mean(), atol=1e-6, rtol=0)
 
 
+@pytest.mark.slow
 def test_the_small_backbone_finds_a_spot():
     """Bright squares on noise: some steps halve the loss and bring the first map's position to them."""
     generator = torch.Generator().manual_seed(0)

@@ -73,6 +73,7 @@ def data(tmp_path, monkeypatch):
     return root
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("recipe", ["ipman-r", "hmr-star"])
 def test_training_and_predicting(data, tmp_path, recipe, recwarn):
     done = CliRunner().invoke(main, ["train", recipe, "-o", "out", *SMALL])
@@ -96,6 +97,7 @@ def test_training_and_predicting(data, tmp_path, recipe, recwarn):
     np.testing.assert_allclose(hips, labelled, atol=1e-6)  # labels are single precision
 
 
+@pytest.mark.slow
 def test_a_regressor_of_predict(data, tmp_path):
     """Another one takes precedence; none is of use without a data set."""
     done = CliRunner().invoke(main, ["train", "hmr-star", "-o", "out", *SMALL, "steps=1", 'model.regressor=""'])

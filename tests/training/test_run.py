@@ -82,6 +82,7 @@ def test_a_run(whole):
     assert (whole / "best.ckpt").exists()
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_as_if_nothing_had_been(whole, settings, tmp_path):
     folder = tmp_path / "out"
     process = subprocess.Popen(
@@ -151,6 +152,7 @@ def test_the_rate_falls_along_half_a_cosine(settings):
     assert rates == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_with_its_rate(settings, tmp_path):
     changes = ["steps=300", "validate=0", "schedule=cosine"]
     process = subprocess.Popen(
@@ -193,6 +195,7 @@ def ended(processes: list[subprocess.Popen]) -> None:
         assert process.returncode == 0, said[-2000:]
 
 
+@pytest.mark.slow
 def test_two_processes_are_one_with_twice_the_batch(settings, tmp_path):
     """Equal but for the order of sums: weights after six steps within 1e-4. Lightning, torchrun and SLURM start them
     in their own ways, and the same comes out."""
@@ -327,6 +330,7 @@ def test_data_that_does_not_fit(settings, tmp_path, changes, said):
     assert re.search(said, result.output), result.output
 
 
+@pytest.mark.slow
 def test_rendered_images(tmp_path, monkeypatch):
     """From rendering to a checkpoint, with a network for images."""
     pytest.importorskip("embreex", reason="embreex is not installed")
