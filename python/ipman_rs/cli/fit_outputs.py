@@ -88,9 +88,8 @@ def study_of(
     path = folder / f"{item.name}.npz"
     arrays = {name: safe_npz.read(path, name) for name in safe_npz.names(path)}
     vertices = posed(body, arrays)
-    normal = arrays.get("ground_normal", np.array([[0.0, 1.0, 0.0]]))[0]
-    height = arrays["ground_height"][0] if "ground_height" in arrays else (vertices @ normal).min()
-    ground = ip.Ground(normal, height)
+    known = "ground_height" in arrays
+    ground = ip.Ground(arrays["ground_normal"][0], arrays["ground_height"][0]) if known else ip.Ground.under(vertices)
     before = None
     if pictured and f"{_BEFORE}betas" in arrays:
         before = view.study("Before the physics terms", posed(body, arrays, _BEFORE), body.template, ground)

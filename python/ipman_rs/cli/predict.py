@@ -194,7 +194,7 @@ def _predicted(
     }  # fmt: skip
     files = {f"{path.stem}.npz": arrays, f"{path.stem}.glb": mesh_files.glb(vertices, body.faces)}
     fit_outputs.write_files(output / path.stem, files, {"name": path.stem, "source": str(path)})
-    ground = ip.Ground.y_up(vertices[:, 1].min())
+    ground = ip.Ground.under(vertices)
     note = "predicted in one look; the floor lies under the lowest vertex"
     flags = _flags(path, vertices, body.template, ground.normal)
     study = view.study(path.stem, vertices, body.template, ground, source=str(path), notes=[note], flags=flags)

@@ -129,7 +129,7 @@ def _posed(body: BodyModel, arrays: Mapping[str, NDArray[Any]], path: Path) -> N
 def _ground(arrays: Mapping[str, NDArray[Any]], vertices: NDArray[np.float64]) -> tuple[ip.Ground, str]:
     if "ground_normal" in arrays and "ground_height" in arrays:
         return ip.Ground(arrays["ground_normal"][0], arrays["ground_height"][0]), "ground: of the fit"
-    return ip.Ground.y_up(vertices[:, 1].min()), "ground: under the lowest vertex"
+    return ip.Ground.under(vertices), "ground: under the lowest vertex"
 
 
 @dataclass(frozen=True)

@@ -61,9 +61,8 @@ def figures(estimate: Estimate, truth: Batch, posing: Posing) -> Figures:
     true_vertices, true_joints = _in_world(posing(known), truth)
     template, ground = posing.body.template, truth.ground
     lowest = ground.signed_height(vertices).amin(dim=1)
-    snapped = vertices - lowest[:, None, None] * truth.up[:, None].double()
     balanced = ipt.support_margin(vertices, template, ground) >= 0
-    strict = ipt.support_margin(snapped, template, ground, STRICT, "exact") >= 0
+    strict = ipt.support_margin(vertices, template, ipt.Ground.under(vertices, ground.normal), STRICT, "exact") >= 0
     roots = joints[:, 0].numpy(), true_joints[:, 0].numpy()
     body, world = truth.has_body.numpy(), truth.has_world.numpy()
     return Figures(
