@@ -15,8 +15,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-import ipman_rs.torch as ipt
-from ipman_rs.evaluation import mpjpe, pa_mpjpe, pve, root_tilt
+from ipman_rs.evaluation import bose, mpjpe, pa_mpjpe, pve, root_tilt
 
 from .batch import Batch
 from .model import Estimate
@@ -25,14 +24,12 @@ from .world import to_world
 
 Array = NDArray[np.floating]
 
-STRICT = 0.025  # m, of contact
-
 
 @dataclass(frozen=True, eq=False)
 class Figures:
     """Errors: pelvis on pelvis. bose: the paper's, its centre of mass within the base of support at 10 cm, the hips
-    where the true ones are. strict: the exact centre of mass, 2.5 cm, the body moved onto the floor. lowest: of the
-    vertices above the floor. tilt: radians between true and estimated "up", seen from the pelvis."""
+    where the true ones are. strict: the strict BoSE (`evaluation.bose`), but of the exact centre of mass. lowest: of
+    the vertices above the floor. tilt: radians between true and estimated "up", seen from the pelvis."""
 
     mpjpe: Array
     pa_mpjpe: Array
@@ -61,8 +58,8 @@ def figures(estimate: Estimate, truth: Batch, posing: Posing) -> Figures:
     true_vertices, true_joints = _in_world(posing(known), truth)
     template, ground = posing.body.template, truth.ground
     lowest = ground.signed_height(vertices).amin(dim=1)
-    balanced = ipt.support_margin(vertices, template, ground) >= 0
-    strict = ipt.support_margin(vertices, template, ipt.Ground.under(vertices, ground.normal), STRICT, "exact") >= 0
+    balanced = bose(vertices, template, ground)
+    strict = bose(vertices, template, ground, bose_mode="strict", method="exact")
     roots = joints[:, 0].numpy(), true_joints[:, 0].numpy()
     body, world = truth.has_body.numpy(), truth.has_world.numpy()
     return Figures(
