@@ -17,8 +17,7 @@ import numpy as np
 import ipman_rs as ip
 
 from .. import view
-from ..body import BodyModel, safe_npz
-from ..body.pose_arrays import joints_of
+from ..body import BodyModel, pose_arrays, safe_npz
 from ..files import read_json, write_whole
 from ..view.fitted import camera_of
 from . import mesh_files
@@ -68,9 +67,7 @@ def complete(folder: Path, identity: str) -> dict[str, Any] | None:
 
 def posed(body: BodyModel, arrays: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
     """The vertices (V, 3) of stored parameters."""
-    pose = np.zeros((body.num_joints, 3))
-    for name, columns in joints_of(body).items():
-        pose[columns] = arrays[prefix + name].reshape(-1, 3)
+    pose = pose_arrays.joined(arrays, body, prefix)
     betas, transl, expression = (arrays.get(prefix + name) for name in ("betas", "transl", "expression"))
     rows = (None if each is None else each[0] for each in (betas, transl, expression))
     return np.asarray(body(pose, *rows).vertices)

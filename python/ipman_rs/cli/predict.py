@@ -170,6 +170,7 @@ def _predicted(
     import ipman_rs as ip
 
     from .. import view
+    from ..body import pose_arrays
     from ..fitting import photo
     from ..view.fitted import camera_of
     from . import fit_outputs, mesh_files
@@ -188,8 +189,8 @@ def _predicted(
         "focal": np.full(2, found.focal), "center": found.center,
     }  # fmt: skip
     arrays: dict[str, Any] = {
-        "global_orient": found.pose[:1], "body_pose": found.pose[None, 1:].reshape(1, -1), "betas": found.betas[None],
-        "transl": found.transl[None], "image_size": np.array([[width, height]], float), "model": np.array(body.name),
+        **pose_arrays.split(found.pose[None], body), "betas": found.betas[None], "transl": found.transl[None],
+        "image_size": np.array([[width, height]], float), "model": np.array(body.name),
         **{name: value[None] for name, value in camera.items()},
     }  # fmt: skip
     files = {f"{path.stem}.npz": arrays, f"{path.stem}.glb": mesh_files.glb(vertices, body.faces)}
