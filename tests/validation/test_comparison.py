@@ -11,10 +11,10 @@ import ipman_rs as ip
 from ipman_rs import Ground
 from ipman_rs.body.soles import sole_vertices
 from ipman_rs.data.force_plates import ForcePlates
+from ipman_rs.gravity import GRAVITY
 from ipman_rs.validation import Comparison, computed, figures
 from ipman_rs.validation.comparison import beside_plates
 from ipman_rs.validation.computed import SOLE, first_shares
-from ipman_rs.validation.zero_moment_point import GRAVITY
 
 RATE, FRAMES = 50.0, 100
 TIMES = np.arange(FRAMES) / RATE

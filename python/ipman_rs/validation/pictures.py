@@ -13,10 +13,10 @@ import ipman_rs as ip
 
 from ..body.sequence import PosedSequence
 from ..body.soles import sole_vertices
+from ..gravity import GRAVITY
 from ..view import colors
 from .comparison import Comparison
 from .computed import ALPHA, GAMMA, SOLE, carried
-from .zero_moment_point import GRAVITY
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
