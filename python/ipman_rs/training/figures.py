@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from ipman_rs.evaluation import bose, mpjpe, pa_mpjpe, pve, root_tilt
+from ipman_rs.evaluation import body_errors, bose, lowest, root_tilt
 
 from .batch import Batch
 from .model import Estimate
@@ -57,18 +57,17 @@ def figures(estimate: Estimate, truth: Batch, posing: Posing) -> Figures:
     vertices, joints = _in_world(posing(estimate), truth)
     true_vertices, true_joints = _in_world(posing(known), truth)
     template, ground = posing.body.template, truth.ground
-    lowest = ground.signed_height(vertices).amin(dim=1)
     balanced = bose(vertices, template, ground)
     strict = bose(vertices, template, ground, bose_mode="strict", method="exact")
-    roots = joints[:, 0].numpy(), true_joints[:, 0].numpy()
+    errors = body_errors(vertices, joints, true_vertices, true_joints)
     body, world = truth.has_body.numpy(), truth.has_world.numpy()
     return Figures(
-        mpjpe=np.where(body, mpjpe(joints.numpy(), true_joints.numpy()), np.nan),
-        pa_mpjpe=np.where(body, pa_mpjpe(joints.numpy(), true_joints.numpy()), np.nan),
-        pve=np.where(body, pve(vertices.numpy(), true_vertices.numpy(), *roots), np.nan),
+        mpjpe=np.where(body, errors.mpjpe.numpy(), np.nan),
+        pa_mpjpe=np.where(body, errors.pa_mpjpe.numpy(), np.nan),
+        pve=np.where(body, errors.pve.numpy(), np.nan),
         bose=np.where(world, balanced.numpy(), np.nan),
         strict=np.where(world, strict.numpy(), np.nan),
-        lowest=np.where(world, lowest.numpy(), np.nan),
+        lowest=np.where(world, lowest(vertices, ground).numpy(), np.nan),
         tilt=np.where(body & world, _tilt(estimate.rotations[:, 0].double(), truth), np.nan),
     )
 
