@@ -18,7 +18,8 @@ from ..data.tracks import Tracks
 from ..files import write_whole
 from ..fitting import config, markers
 from ..fitting.markers import own
-from ..fitting.markers.judged import FEWEST, of_tracks
+from ..fitting.markers.judged import of_tracks
+from ..fitting.sites import FEWEST_POINTS
 from ..validation import Comparison, computed, figures, measured, pictures, report
 from ..validation.figures import SPREAD
 from ..validation.folder import Kinds, Trial, find
@@ -74,7 +75,7 @@ class Measured:
         seen = self.tracks.confidence > 0
         paths = np.where(seen[..., None], self.tracks.points, np.nan)[:, seen.all(axis=0)]
         least, lasted = STILL[0], float(self.tracks.times[-1] - self.tracks.times[0])
-        return paths.shape[1] >= FEWEST and lasted >= STILL[1] and float(paths.std(axis=0).max()) < least
+        return paths.shape[1] >= FEWEST_POINTS and lasted >= STILL[1] and float(paths.std(axis=0).max()) < least
 
 
 @dataclass
@@ -289,7 +290,7 @@ def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told)
             found,
             plates,
             None if one.reference is None else one.reference[rows],
-            confidence.sum(axis=1) >= FEWEST,
+            confidence.sum(axis=1) >= FEWEST_POINTS,
             "reference" if trial.com is None else measured.judge(trial.com),
             weight,
         )

@@ -30,6 +30,7 @@ from .markers.sets import Meaning
 from .markers.skin_distance import mean_distances
 from .problem import Problem
 from .sequence import fit_sequence
+from .sites import FEWEST_POINTS
 from .start import at_points
 
 WEIGHED = 8  # bodies
@@ -108,9 +109,9 @@ def fit_tracks(
     config = load("markers") if config is None else config
     seen, unseen = judged.seen_names(tracks)
     sites = markers.sites(body.body, seen, own=own)
-    if len(sites) < judged.FEWEST:
+    if len(sites) < FEWEST_POINTS:
         raise ValueError(
-            f"{tracks.source}: expected at least {judged.FEWEST} markers with known places, got {len(sites)} of "
+            f"{tracks.source}: expected at least {FEWEST_POINTS} markers with known places, got {len(sites)} of "
             f"{', '.join(seen)}"
         )
     unknown = tuple(name for name in seen if name not in sites)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ipman_rs.body import BodyModel
 
-from ..sites import MIDPOINTS, Inner, Site
-from ..surface import SIDES, Skin
+from ..sites import Inner, Site
+from ..surface import MIDPOINTS, SIDES, Skin
 
 Array = NDArray[np.float64]
 Place = tuple[Mapping[str, float], tuple[float, float, float]]  # where to look from, and where to

@@ -21,7 +21,7 @@ from ipman_rs.checks import positive
 from ..candidate import Candidate
 from ..landmarks import Landmarks, known
 from ..problem import Problem
-from ..sites import MIDPOINTS
+from ..surface import MIDPOINTS
 from ..variables import Variables
 
 DIFFERENCES = {1: (-1.0, 1.0), 2: (1.0, -2.0, 1.0)}
