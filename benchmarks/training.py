@@ -27,6 +27,7 @@ from ipman_rs.training.lifting import views
 from ipman_rs.training.lifting.network import lifter
 from ipman_rs.training.losses import Loss, Physics
 from ipman_rs.training.model import HMR, MeanParameters
+from ipman_rs.training.model.keypoint_encoder import KEYPOINTS
 from ipman_rs.training.posed_estimate import Posed, Posing
 from ipman_rs.training.world import to_world
 
@@ -71,7 +72,7 @@ def main(rounds: int, out: Path | None) -> None:
 
 def measured(backbone: str, size: int, count: int, body: str, rounds: int) -> dict[str, Any]:
     """Medians of ms an image: of steps, and of the terms alone."""
-    posing = Posing(ipt.BodyModel(body), views.KEYPOINTS)
+    posing = Posing(ipt.BodyModel(body), KEYPOINTS)
     template = posing.body.template
     terms = {name: Physics(template, name) for name in ("paper-r", "balanced")} | {"literal": LiteralTerms(template)}
     batch = _batch(count, size, posing)

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 import ipman_rs as ip
 from ipman_rs.data import opensim
+from ipman_rs.gravity import GRAVITY
 from ipman_rs.validation import measured
-from ipman_rs.validation.zero_moment_point import GRAVITY
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("IPMAN_SHARED_DATA") or ROOT.parent / "shared" / "data")

@@ -51,6 +51,25 @@ class Ground:
         """The floor of a world whose z axis points up."""
         return cls((0.0, 0.0, 1.0), height)
 
+    @classmethod
+    def under(cls, vertices: ArrayLike, normal: ArrayLike = (0.0, 1.0, 0.0)) -> Ground:
+        """The ground under the lowest vertex of each body: vertices (..., V, 3) m -> a ground for each of the batch.
+
+        A body that is not finite has no lowest vertex, and a ground is finite: that body's lies at height 0.
+
+        Args:
+            normal: (3,) for all bodies or (..., 3) for each.
+
+        Raises:
+            ValueError: the normal is zero or not finite, or there are no vertices.
+        """
+        level = cls(normal)
+        heights = level.signed_height(vertices)
+        if heights.ndim == 0 or not heights.shape[-1]:
+            raise ValueError(f"vertices: expected (..., V, 3) with V > 0, got {np.shape(vertices)}")
+        lowest = np.where(np.isfinite(heights).all(axis=-1), heights.min(axis=-1), 0.0)
+        return cls(np.broadcast_to(level.normal, (*lowest.shape, 3)), lowest)
+
     def signed_height(self, points: ArrayLike) -> NDArray[np.float64]:
         """h(u), metres above the ground. points (..., 3) for one ground, (..., N, 3) for one ground a body."""
         normal, height = self._beside_points()

@@ -136,3 +136,27 @@ def test_the_turn_that_easymocap_has_beside_its_poses(columns):
     outer = Rotation.from_rotvec(turn[:, 0]).as_matrix()
     expected = (body(vectors).vertices - pelvis) @ outer.swapaxes(1, 2) + pelvis
     np.testing.assert_allclose(turned, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [24, 52, 55])
+def test_the_pieces_of_a_pose_are_those_of_the_smplx_package(lifelike_arrays, tmp_path, count):
+    """Their joints as the package has them, 0 the pelvis; and a pose comes back from its pieces."""
+    path = tmp_path / "model.npz"
+    np.savez(path, **lifelike_arrays(count))
+    body = ip.load_body(path)
+    pose = np.random.default_rng(count).normal(size=(2, count, 3))
+    found = pose_arrays.split(pose, body)
+    fingers = {24: None, 52: 22, 55: 25}[count]
+    expected = {"global_orient": (0, 1), "body_pose": (1, 24 if count == 24 else 22)}
+    if count == 55:
+        expected |= {"jaw_pose": (22, 23), "leye_pose": (23, 24), "reye_pose": (24, 25)}
+    if fingers is not None:
+        hands = {"left_hand_pose": (fingers, fingers + 15), "right_hand_pose": (fingers + 15, fingers + 30)}
+        expected |= hands
+    assert list(found) == list(expected)
+    for name, (first, last) in expected.items():
+        np.testing.assert_array_equal(found[name], pose[:, first:last].reshape(2, -1))
+    one = {f"before_{name}": array[1:] for name, array in found.items()}
+    np.testing.assert_array_equal(pose_arrays.joined(one, body, "before_"), pose[1])
+    with pytest.raises(ValueError, match="before_body_pose: expected"):
+        pose_arrays.joined({**one, "before_body_pose": np.zeros(5)}, body, "before_")

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
+from ipman_rs.body.soles import sole_vertices
 from ipman_rs.evaluation import paired, paired_test
 from ipman_rs.evaluation.tables import Job, Source, frame_metrics, read
 from ipman_rs.evaluation.tables.metrics import FIGURES
@@ -65,7 +66,7 @@ def test_balance_and_ground_are_those_of_the_engine(record, bodies):
 def test_skating_knows_the_frame_before_a_piece(evaluated, bodies):
     """Against a loop over the whole recording, which knows no pieces."""
     _, job = evaluated
-    soles = frame_metrics.soles(ip.load_body("anny-lite"))
+    soles = sole_vertices(ip.load_body("anny-lite").template, frame_metrics.SOLE)
     assert 20 < len(soles) < 200
     feet = bodies[1].vertices[:, soles].astype(float)
     found = np.concatenate([piece["skating"] for piece in job.results()])

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
-from ipman_rs.evaluation import com_error, cop_error, foot_skating, hover, penetration, root_tilt, tilt
+from ipman_rs.evaluation import com_error, cop_error, foot_skating, hover, lowest, penetration, root_tilt, tilt
 
 SLOPE = ip.Ground((0.3, 1.0, -0.2), 0.1)
 GROUNDS = [ip.Ground.y_up(), ip.Ground.z_up(-0.4), SLOPE]
@@ -33,9 +33,9 @@ def test_penetration_and_hover_by_loops(draw, ground):
     bodies = draw.standard_normal((30, 50, 3)) + 3 * draw.standard_normal((30, 1, 3))
     deep, high = penetration(bodies, ground), hover(bodies, ground)
     for i, body in enumerate(bodies):
-        lowest = min(dot(point, up(ground)) - float(ground.height) for point in body)
-        assert deep[i] == pytest.approx(max(-lowest, 0), abs=1e-12)
-        assert high[i] == pytest.approx(max(lowest, 0), abs=1e-12)
+        least = min(dot(point, up(ground)) - float(ground.height) for point in body)
+        assert deep[i] == pytest.approx(max(-least, 0), abs=1e-12)
+        assert high[i] == pytest.approx(max(least, 0), abs=1e-12)
     assert (deep > 0).any()
     assert (high > 0).any()
     assert not (deep * high).any()
@@ -141,6 +141,16 @@ def test_errors_of_the_centres_by_loops(draw, ground):
         assert in_space[i] == pytest.approx(math.dist(p, q), rel=1e-12)
         height = dot(p - q, up(ground))
         assert along[i] == pytest.approx(math.dist(p - height * ground.normal, q), rel=1e-9)
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_lowest_is_hover_less_penetration(ground):
+    """Of which one is 0; along whatever normal."""
+    bodies = np.random.default_rng(5).standard_normal((6, 20, 3)) + 4.0 * np.arange(-3, 3)[:, None, None]
+    found = lowest(bodies, ground)
+    np.testing.assert_array_equal(found, hover(bodies, ground) - penetration(bodies, ground))
+    for body, height in zip(bodies, found, strict=True):
+        assert height == pytest.approx(min(dot(point, up(ground)) for point in body) - float(ground.height), abs=1e-12)
 
 
 def test_nan():

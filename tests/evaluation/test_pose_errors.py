@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial import procrustes
 from scipy.spatial.transform import Rotation
 
-from ipman_rs.evaluation import aligned, mpjpe, pa_mpjpe, pve, similarity
+from ipman_rs.evaluation import aligned, body_errors, mpjpe, pa_mpjpe, pve, similarity
 
 
 @pytest.fixture
@@ -35,6 +35,21 @@ def test_mpjpe_by_loops(pairs):
         assert in_world[i] == pytest.approx(mean_distance(body, truth), rel=1e-12)
         moved = [p - (body[1] + body[2]) / 2 + (truth[1] + truth[2]) / 2 for p in body]
         assert hips[i] == pytest.approx(mean_distance(moved, truth), rel=1e-12)
+
+
+def test_the_errors_of_bodies_are_pelvis_on_pelvis(pairs, draw):
+    """A body that is the true one moved has none of the three; one that is scaled has no PA-MPJPE, and errors as long
+    as its points are from the pelvis, times the scale."""
+    _, joints = pairs
+    vertices = draw.standard_normal((40, 50, 3))
+    moved = body_errors(vertices + [1.0, 2.0, 3.0], joints + [1.0, 2.0, 3.0], vertices, joints)
+    assert max(np.abs(error).max() for error in moved) < 1e-14
+    scaled = body_errors(1.25 * vertices, 1.25 * joints, vertices, joints)
+    assert scaled.pa_mpjpe.max() < 1e-14
+    for i, (skin, bones) in enumerate(zip(vertices, joints, strict=True)):
+        pelvis = np.broadcast_to(bones[0], (50, 3))
+        assert scaled.mpjpe[i] == pytest.approx(0.25 * mean_distance(bones, pelvis[:24]), rel=1e-12)
+        assert scaled.pve[i] == pytest.approx(0.25 * mean_distance(skin, pelvis), rel=1e-12)
 
 
 def test_pve_by_loops(pairs):

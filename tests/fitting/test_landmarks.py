@@ -9,8 +9,9 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="torch is an extra")
 
+import ipman_rs as ip  # noqa: E402
 import ipman_rs.torch as ipt  # noqa: E402
-from ipman_rs.body.landmarks import skin_points  # noqa: E402
+from ipman_rs.body.landmarks import ends, point_rows, skin_points  # noqa: E402
 from ipman_rs.fitting.landmarks import Landmarks, Site, known  # noqa: E402
 
 
@@ -141,3 +142,17 @@ def test_pose_blend_shapes_and_finger_joints(body):
     found = landmarks(*people(torch_body, 2))
     torch.testing.assert_close(found[:, [0, 2]], torch.stack(expected, 1), rtol=0, atol=1e-14)
     torch.testing.assert_close(found[:, 1], posed.joints[:, -1], rtol=0, atol=1e-14)
+
+
+def test_a_name_means_a_point_or_the_midpoint_of_two():
+    """The knee's row among vertices and joints is where the posed body has its knee; the nose is in front."""
+    lite = ip.load_body("anny-lite")
+    rows, posed = point_rows(lite), lite()
+    points = np.concatenate([posed.vertices, posed.joints])
+    np.testing.assert_array_equal(points[rows["left_knee"]], posed.joints[lite.joint_names.index("left_knee")])
+    head = points[rows["head"]]
+    assert points[rows["nose"], 2] > head[2] + 0.05
+    assert ends(["mid_hip", "nose"], rows, "lite") == [("left_hip", "right_hip"), ("nose", "nose")]
+    assert ends(["mid_hip"], {"mid_hip": 0}, "lite") == [("mid_hip", "mid_hip")]  # a point of that name comes first
+    with pytest.raises(ValueError, match="keypoints: the body 'lite' has no landmark 'left_hip'; it has nose, mid_hip"):
+        ends(["mid_hip"], ["nose"], "lite", "keypoints")

@@ -16,7 +16,7 @@ from ipman_rs.fitting.landmarks import Landmarks
 RATE, FRAMES = 50, 40
 MASS = 64.0  # kg
 OFF = np.array([0.012, 0.0, -0.005])  # m, from g(CoM) to the made-up CoP
-G = 9.80665
+G = 9.81
 
 
 def person() -> SimpleNamespace:

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
 from ipman_rs import Status
+from ipman_rs.gravity import GRAVITY
 from ipman_rs.simulation import fall, simulate, tip_test
 from tests.helpers import solids
 
@@ -19,7 +20,7 @@ ENGINES = [
     name for name in fall.ENGINES if name != "bullet" or importlib.util.find_spec("pybullet")
 ]  # no wheels for all
 FLOOR = ip.Ground.y_up()
-GRAVITY = 9.81
+
 SIZE = (0.4, 1.6, 0.6)
 LIMIT = math.atan2(SIZE[0], SIZE[1])
 

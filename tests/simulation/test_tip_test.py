@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 
 import ipman_rs as ip
 from ipman_rs import Status
+from ipman_rs.gravity import GRAVITY
 from ipman_rs.simulation import tip_test
 from tests.helpers import solids
 
 FLOOR = ip.Ground.y_up()
-GRAVITY = 9.81
 
 
 def on_floor(vertices):

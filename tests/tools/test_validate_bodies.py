@@ -39,7 +39,7 @@ def test_volumes_of_real_people(printed):
 def test_force_plates(printed):
     quiet, *_ = re.findall(r"body mass by the plates.* \| ([\d.]+)", printed)
     *_, walking = re.findall(r"body mass by the plates.* \| ([\d.]+)", printed)
-    assert float(quiet) == pytest.approx(60.03, abs=0.05)  # the data's own note; g is 9.81 there, 9.80665 here
+    assert float(quiet) == pytest.approx(60.03, abs=0.05)  # the data's own note
     assert float(walking) == pytest.approx(72.6, rel=0.01)  # the model's mass; its CoM knows nothing of the plates
 
 

@@ -80,3 +80,21 @@ def test_no_silent_zero_gradient(tiny):
     later.height.requires_grad_()
     with pytest.raises(ValueError, match="requires grad"):
         ipt.stability_loss(tiny.vertices, tiny.template, later)
+
+
+def test_the_ground_under_bodies_is_that_of_arrays(rng):
+    """A float32 body and its numbers in double precision: the same bits, and no gradient."""
+    bodies = torch.from_numpy(rng.normal(size=(2, 3, 40, 3))).float().requires_grad_()
+    normals = rng.normal(size=(2, 3, 3))
+    under, expected = ipt.Ground.under(bodies, normals), ip.Ground.under(bodies.detach().double().numpy(), normals)
+    np.testing.assert_allclose(under.height.numpy(), expected.height, rtol=0, atol=1e-15)  # sums in another order
+    np.testing.assert_allclose(under.normal.numpy(), expected.normal, rtol=0, atol=1e-15)
+    assert under.height.dtype == torch.float64
+    assert not under.height.requires_grad
+    assert (under.signed_height(bodies.double()).amin(dim=-1).abs() < 1e-14).all()
+
+
+@pytest.mark.parametrize("shape", [(3,), (0, 3), (5, 2)])
+def test_no_ground_lies_under_no_vertices(shape):
+    with pytest.raises(ValueError, match=r"vertices: expected \(\.\.\., V, 3\)"):
+        ipt.Ground.under(torch.zeros(shape))

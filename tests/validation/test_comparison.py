@@ -9,11 +9,12 @@ import pytest
 
 import ipman_rs as ip
 from ipman_rs import Ground
+from ipman_rs.body.soles import sole_vertices
 from ipman_rs.data.force_plates import ForcePlates
+from ipman_rs.gravity import GRAVITY
 from ipman_rs.validation import Comparison, computed, figures
 from ipman_rs.validation.comparison import beside_plates
-from ipman_rs.validation.computed import first_shares, sole_vertices
-from ipman_rs.validation.zero_moment_point import GRAVITY
+from ipman_rs.validation.computed import SOLE, first_shares
 
 RATE, FRAMES = 50.0, 100
 TIMES = np.arange(FRAMES) / RATE
@@ -200,7 +201,7 @@ def test_a_foot_that_is_down_without_a_centre_of_pressure_is_beside_the_plates(l
     assert found["frames_beside_plates"] == 50
     assert found["flags"] == ["a foot is on the floor beside the plates in 50 of 100 loaded frames: they are left out"]
     lifted = swaying(standing)
-    right = np.isin(np.arange(lite.num_vertices), sole_vertices(lite.template)) & (standing[:, 0] < 0)
+    right = np.isin(np.arange(lite.num_vertices), sole_vertices(lite.template, SOLE)) & (standing[:, 0] < 0)
     lifted[50:, right, 1] += 0.05
     assert not compared(lite, lifted, plates_of(cop, upward)).beside[50:].any()
 
@@ -247,7 +248,7 @@ def test_shares_by_the_nearer_plate():
 
 
 def test_soles_are_on_the_floor(lite, standing):
-    rows = sole_vertices(lite.template)
+    rows = sole_vertices(lite.template, SOLE)
     feet = standing[rows]
     assert feet[:, 1].max() < 0.04
     assert set(np.sign(feet[:, 0])) == {-1, 1}

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ipman_rs.gravity import GRAVITY
 from ipman_rs.validation.movement import Movement, longest, smoothed
-from ipman_rs.validation.zero_moment_point import GRAVITY
 
 RATE = 100.0
 TIMES = np.arange(300) / RATE

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from ipman_rs import Ground
+from ipman_rs.gravity import GRAVITY
 from ipman_rs.validation.acceleration import CUTOFF, accelerations
-from ipman_rs.validation.zero_moment_point import GRAVITY, along_force, zero_moment_point, zero_moment_point_of_parts
+from ipman_rs.validation.zero_moment_point import along_force, zero_moment_point, zero_moment_point_of_parts
 
 FLOOR = Ground.y_up(0.1)
 

@@ -1,4 +1,6 @@
-"""Named points of a body's skin, found by their shape on the mean body in its zero pose, so for any mesh.
+"""Named points of a body: its joints, midpoints of two, and points of its skin.
+
+Those of the skin are found by their shape on the mean body in its zero pose, so for any mesh.
 
 The body stands y up, faces +z, its left at +x and its arms stretched out, palms down. Sides carry `left_` or `right_`:
 
@@ -10,6 +12,7 @@ thumb_tip, index_tip, middle_tip, ring_tip, pinky_tip
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from functools import partial
 
 import numpy as np
@@ -17,11 +20,33 @@ from numpy.typing import NDArray
 
 from ipman_rs.body import BodyModel
 
+MIDPOINTS = {"mid_hip": ("left_hip", "right_hip"), "mid_shoulder": ("left_shoulder", "right_shoulder")}
 SIDES = {"left": 1.0, "right": -1.0}
 # Directions, along the arm and forwards, in which each fingertip of the spread hand is the farthest point.
 FINGERTIPS = {"thumb": (0, 1), "index": (1, 1), "middle": (1, 0), "ring": (1, -0.7), "pinky": (0.5, -1)}
 # Where the knuckles lie on the way from the wrist to the tip.
 KNUCKLES = {"index": 0.47, "pinky": 0.48, "thumb": 0.73}
+
+
+def ends(names: Iterable[str], points: Collection[str], body: str, what: str = "names") -> list[tuple[str, str]]:
+    """The two of a body's `points` whose midpoint each name means; twice the same for a point itself.
+
+    body, what: the names of the body and of the argument, for errors.
+
+    Raises:
+        ValueError: a name is neither one of the points nor a midpoint of two of them.
+    """
+    pairs = [(name, name) if name in points else MIDPOINTS.get(name, (name, name)) for name in names]
+    unknown = [end for pair in pairs for end in pair if end not in points]
+    if unknown:
+        listed = ", ".join(dict.fromkeys([*points, *MIDPOINTS]))
+        raise ValueError(f"{what}: the body {body!r} has no landmark {unknown[0]!r}; it has {listed}")
+    return pairs
+
+
+def point_rows(body: BodyModel) -> dict[str, int]:
+    """The row of each joint and named point of the skin among a body's vertices and, after them, its joints."""
+    return skin_points(body) | {name: body.num_vertices + j for j, name in enumerate(body.joint_names)}
 
 
 def skin_points(body: BodyModel) -> dict[str, int]:

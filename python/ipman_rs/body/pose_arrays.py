@@ -9,7 +9,7 @@ has a turn of the whole body beside its poses, Rh.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,6 +37,10 @@ PIECES: dict[str, tuple[tuple[str, ...], ...]] = {
     "reye_pose": (SMPLX[24:25],),
     "pose_eye": (SMPLX[23:25],),
 }
+# Those of the smplx package, under whose names poses are written.
+_SMPLX_PIECES = (
+    "global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose", "left_hand_pose", "right_hand_pose",
+)  # fmt: skip
 _WHOLE = (SMPL, BODY, SMPLH, SMPLX)
 _VECTORS, _MATRICES, COLUMNS, _QUATERNIONS = "rotation vectors", "rotation matrices", "6D rotations", "quaternions"
 _WIDTHS = {_VECTORS: 3, _MATRICES: 9, COLUMNS: 6, _QUATERNIONS: 4}
@@ -140,11 +144,27 @@ def place(
 def joints_of(body: BodyModel) -> dict[str, list[int]]:
     """The joints of each piece that a body has, under the names that the smplx package gives the pieces."""
     column = {name: index for index, name in enumerate(body.joint_names)}
-    whole = SMPL if set(SMPL) <= set(column) else BODY
-    hands = {"left_hand_pose": LEFT_HAND, "right_hand_pose": RIGHT_HAND}
-    face = {"jaw_pose": SMPLX[22:23], "leye_pose": SMPLX[23:24], "reye_pose": SMPLX[24:25]}
-    pieces = {"global_orient": BODY[:1], "body_pose": whole[1:], **face, **hands}
-    return {name: [column[joint] for joint in piece] for name, piece in pieces.items() if set(piece) <= set(column)}
+    pieces = {name: [piece for piece in PIECES[name] if set(piece) <= set(column)] for name in _SMPLX_PIECES}
+    return {name: [column[joint] for joint in max(each, key=len)] for name, each in pieces.items() if each}
+
+
+def split(pose: Array, body: BodyModel) -> dict[str, Array]:
+    """Poses (T, J, 3) of a body as the arrays of its pieces (T, 3 n), under smplx's names; `joined` reads them."""
+    return {name: pose[:, joints].reshape(len(pose), -1) for name, joints in joints_of(body).items()}
+
+
+def joined(arrays: Mapping[str, Array], body: BodyModel, prefix: str = "") -> NDArray[np.float64]:
+    """The pose (J, 3) in arrays that `split` made of one; `prefix`: of their names.
+
+    Raises:
+        ValueError: an array is missing, or has another size than the body's joints need.
+    """
+    pose = np.zeros((body.num_joints, 3))
+    for name, joints in joints_of(body).items():
+        if f"{prefix}{name}" not in arrays or arrays[f"{prefix}{name}"].size != 3 * len(joints):
+            raise ValueError(f"{prefix}{name}: expected {3 * len(joints)} numbers for the body {body.name}")
+        pose[joints] = arrays[f"{prefix}{name}"].reshape(-1, 3)
+    return pose
 
 
 def _stored(first: Callable[..., Array | None], base: str) -> tuple[str, Array] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-MIDPOINTS = {"mid_hip": ("left_hip", "right_hip"), "mid_shoulder": ("left_shoulder", "right_shoulder")}
+FEWEST_POINTS = 6  # seen in an image or marked on the skin, without which a body is a guess
 
 
 @dataclasses.dataclass(frozen=True)

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..files.errors import FileError
+from .figure_inputs import models_in, one_body, one_line_errors, opened_data_sets, told_apart
 from .options import GROUND, PRESETS, UP, Setting, of_files
 
 if TYPE_CHECKING:
-    from ..data import DataSet
-    from ..evaluation.tables.models import Models
     from ..paper_figures import PaperFigure
 
 PEOPLE = 210  # built ones: seven families in turn
@@ -95,13 +89,13 @@ def stability(
     """
     from . import console
 
-    with _one_line_errors(output):
+    with one_line_errors(output):
         from ..paper_figures import stability_distribution as made
 
         losses = []
-        for name, data in _opened(names, paths, split, options, _models_in(models)):
+        for name, data in opened_data_sets(names, paths, split, options, models_in(models)):
             with console.progress(f"measuring {name}", len(range(0, len(data), every))) as step:
-                losses.append(made.of_data_set(name, data, _models_in(models), every, preset, step.to))
+                losses.append(made.of_data_set(name, data, models_in(models), every, preset, step.to))
         if not names:
             with console.progress("building people", people) as step:
                 losses.append(made.of_built_people(people, preset, step.to))
@@ -134,7 +128,7 @@ def pull(output: Path, width: float, push_width: float, body: str) -> None:
     """
     from . import console
 
-    with _one_line_errors(output):
+    with one_line_errors(output):
         from ..body import embedded
         from ..paper_figures import pull_gradient as made
 
@@ -181,10 +175,10 @@ def com(body: str, output: Path, frame: int | None, preset: str, **request: Any)
     """
     from . import console
 
-    with _one_line_errors(output):
+    with one_line_errors(output):
         from ..paper_figures import center_of_mass as made
 
-        vertices, template, floor, name = _one_body(body, frame, request)
+        vertices, template, floor, name = one_body(body, frame, request)
         with console.busy("drawing"):
             found = made.center_of_mass(vertices, template, floor, name, preset)
             _write(found, output)
@@ -199,36 +193,6 @@ def com(body: str, output: Path, frame: int | None, preset: str, **request: Any)
 def _millimetres(about: dict[str, Any]) -> list[str]:
     distances = (about[f"to_{kind}center_of_pressure_on_ground_m"] for kind in ("", "binary_"))
     return ["–" if value != value else f"{1e3 * value:.0f}" for value in distances]
-
-
-def _one_body(body: str, frame: int | None, request: dict[str, Any]) -> tuple[Any, Any, Any, str]:
-    """Vertices, template, ground and name; `request`: the fields of `study.from_file.Request`."""
-    import ipman_rs as ip
-
-    from ..study.from_file import Request, odd_sizes, on_ground, with_sizes
-    from . import console
-
-    if body in ip.body.poses.NAMES and not Path(body).exists():
-        for option, value in (("--frame", frame), ("--up", request["up"]), ("--parts", request["parts"])):
-            if value is not None:
-                raise click.UsageError(f"{option}: is for files; {body} is a named pose, one body with y up")
-        posed = ip.load_body(request["model"] or "anny")
-        return ip.body.posed(posed, body), posed.template, ip.Ground.y_up(request["ground"] or 0.0), body
-    if not Path(body).suffix and not Path(body).exists():
-        raise click.UsageError(
-            f"BODY: expected a file, or a pose such as {', '.join(ip.body.poses.NAMES)}; got {body!r}"
-        )
-    path = Path(body)
-    try:
-        with odd_sizes() as sizes:
-            recording, template, floor, _ = on_ground(path, Request(**request))
-        console.warn_of(path, with_sizes(recording.flags, sizes))
-    except (ValueError, TypeError) as error:
-        raise FileError(path, str(error)) from error
-    count, frame = len(recording.vertices), frame or 0
-    if frame >= count:
-        raise click.UsageError(f"--frame: {body} has {count} frames, from 0; there is no frame {frame}")
-    return recording.vertices[frame], template, floor, path.stem if count == 1 else f"{path.stem}, frame {frame}"
 
 
 @figure.command()
@@ -255,13 +219,13 @@ def pressure(
     """
     from . import console
 
-    with _one_line_errors(output):
+    with one_line_errors(output):
         from ..paper_figures import pressure as made
 
-        ((_, data),) = _opened((name,), (path,), split, options, _models_in(models))
+        ((_, data),) = opened_data_sets((name,), (path,), split, options, models_in(models))
         with console.busy("measuring and drawing"):
             asked = int(frame) if frame is not None and frame.isdecimal() else frame
-            found = made.pressure(made.of_data_set(name, data, asked, _models_in(models)), preset)
+            found = made.pressure(made.of_data_set(name, data, asked, models_in(models)), preset)
             _write(found, output)
     numbers, best = found.numbers, found.numbers["best_of_the_grid"]
     console.say(
@@ -295,11 +259,11 @@ def poses(
     """
     from . import console
 
-    with _one_line_errors(output):
+    with one_line_errors(output):
         from ..paper_figures import poses as made
 
         groups = []
-        for name, data in _opened(names, paths, split, options, _models_in(None)):
+        for name, data in opened_data_sets(names, paths, split, options, models_in(None)):
             with console.progress(f"reading {name}", min(most, len(data))) as step:
                 groups.append(made.of_data_set(name, data, most, step.to))
         if not names:
@@ -364,10 +328,10 @@ def compare(
         raise click.UsageError(f"--title: expected {len(methods)}, one a method, or none; got {len(titles)}")
     if (name is None) != (path is None):
         raise click.UsageError("expected --data together with --path")
-    names = titles or _told_apart([method.resolve().stem for method in methods])
+    names = titles or told_apart([method.resolve().stem for method in methods])
     if len(set(names)) < len(names):
         raise click.UsageError("--title: expected a title for each method that no other has")
-    with _one_line_errors(output):
+    with one_line_errors(output):
         from ..paper_figures import comparison as made
         from ..paper_figures.estimated_people import PREDICTIONS, FittedFolder, Predicted
 
@@ -375,7 +339,7 @@ def compare(
         opened = (
             None
             if name is None or path is None
-            else next(_opened((name,), (path,), split, options, _models_in(models)))[1]
+            else next(opened_data_sets((name,), (path,), split, options, models_in(models)))[1]
         )
         for title, method in zip(names, methods, strict=True):
             if opened is None and method.is_file():
@@ -386,7 +350,7 @@ def compare(
                 found_by.append((title, FittedFolder(method, photos, body)))
             else:
                 file = method / PREDICTIONS if method.is_dir() else method
-                found_by.append((title, Predicted(file, opened, _models_in(models), images)))
+                found_by.append((title, Predicted(file, opened, models_in(models), images)))
         with console.progress("drawing people", len(people) or most) as step:
             found = made.comparison(found_by, people, most, preset, step.to)
         _write(found, output)
@@ -397,73 +361,6 @@ def compare(
     ]
     console.print_rows(["person", "method", "stands"], rows)
     _say(found, output)
-
-
-def _told_apart(names: list[str]) -> list[str]:
-    """Names with a number behind those that came before."""
-    return [name if name not in names[:k] else f"{name}-{names[:k].count(name) + 1}" for k, name in enumerate(names)]
-
-
-def _opened(
-    names: tuple[str, ...],
-    paths: tuple[Path, ...],
-    split: str | None,
-    options: tuple[tuple[str, Any], ...],
-    models: Models,
-) -> Iterator[tuple[str, DataSet]]:
-    """Each data set with its name, opened when its turn comes."""
-    import tempfile
-
-    from ..evaluation.tables.job import Source
-
-    unpacked = click.get_current_context().with_resource(tempfile.TemporaryDirectory())  # until the command ends
-
-    if len(names) != len(paths):
-        raise click.UsageError(f"expected a --path for each --data, got {len(names)} and {len(paths)}")
-    for title, name, path in zip(_told_apart(list(names)), names, paths, strict=True):
-        try:
-            data = Source(name, str(path), split, options).open(Path(unpacked), models)
-        except TypeError as error:  # an option that its reader does not have
-            raise ValueError(f"{name}: {error}") from error
-        yield title, data
-
-
-def _models_in(folder: Path | None) -> Models:
-    from ..evaluation.tables.models import Models
-
-    if folder is not None and not folder.is_dir():
-        raise ValueError(f"{folder}: expected the folder of body models; there is none")
-    return Models(folder)
-
-
-@contextmanager
-def _one_line_errors(output: Path) -> Iterator[None]:
-    """Ends the command with one line and exit code 1 where something could not be read or written; a warning about
-    units is one line, too, and one about an image is one for each."""
-    import ipman_rs as ip
-
-    from ..paper_figures.estimated_people import ImageWarning
-    from . import console
-
-    try:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("ignore")
-            for kind in (ip.UnitsWarning, ImageWarning):
-                warnings.simplefilter("always", kind)
-            yield
-        units = [str(each.message) for each in caught if issubclass(each.category, ip.UnitsWarning)]
-        images = [str(each.message) for each in caught if issubclass(each.category, ImageWarning)]
-        for said in (*units[:1], *dict.fromkeys(images)):
-            console.warn(said)
-    except (FileError, ValueError, ImportError) as error:
-        console.error(str(error))
-        sys.exit(1)
-    except MemoryError:
-        console.error("there is not enough memory; take fewer frames")
-        sys.exit(1)
-    except OSError as error:
-        console.error(f"{error.filename or output}: {error.strerror or error}")
-        sys.exit(1)
 
 
 def _write(found: PaperFigure, output: Path) -> None:

@@ -170,6 +170,7 @@ def _predicted(
     import ipman_rs as ip
 
     from .. import view
+    from ..body import pose_arrays
     from ..fitting import photo
     from ..fitting.jobs import outputs
     from ..io import write_mesh
@@ -189,13 +190,13 @@ def _predicted(
         "focal": np.full(2, found.focal), "center": found.center,
     }  # fmt: skip
     arrays: dict[str, Any] = {
-        "global_orient": found.pose[:1], "body_pose": found.pose[None, 1:].reshape(1, -1), "betas": found.betas[None],
-        "transl": found.transl[None], "image_size": np.array([[width, height]], float), "model": np.array(body.name),
+        **pose_arrays.split(found.pose[None], body), "betas": found.betas[None], "transl": found.transl[None],
+        "image_size": np.array([[width, height]], float), "model": np.array(body.name),
         **{name: value[None] for name, value in camera.items()},
     }  # fmt: skip
     files = {f"{path.stem}.npz": arrays, f"{path.stem}.glb": write_mesh.glb(vertices, body.faces)}
     outputs.write_files(output / path.stem, files, {"name": path.stem, "source": str(path)})
-    ground = ip.Ground.y_up(vertices[:, 1].min())
+    ground = ip.Ground.under(vertices)
     note = "predicted in one look; the floor lies under the lowest vertex"
     flags = _flags(path, vertices, body.template, ground.normal)
     study = view.study(path.stem, vertices, body.template, ground, source=str(path), notes=[note], flags=flags)

@@ -33,16 +33,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.body import pose_arrays
 from ipman_rs.body.hands import Hands
 from ipman_rs.body.joints import SMPLX
-from ipman_rs.files import read_json, safe_pickle
-from ipman_rs.files.mesh.read_mesh import read_points
-from ipman_rs.ground import Ground
+from ipman_rs.files import safe_pickle
 
-from ..files import safe_xml
 from . import naming, sequences
 from .check import Finding
 from .frames import Cameras, DataSet, Frames
+from .rich_scene import (
+    Scene,
+    calibration_folder,
+    ground_mesh_file,
+    read_scene,
+    scene_files,
+    to_world_file,
+)
 
 NAME = "rich"
 
@@ -60,16 +66,9 @@ IPMAN = {
 RATE = 30.0  # Hz
 FEMALE = (9, 10, 12, 13, 16, 17, 18, 19, 21)  # of the subjects 0 to 21
 SUBJECTS = 22
-PARTS = {  # array -> the joints that it turns, in SMPL-X's order
-    "global_orient": slice(0, 1),
-    "body_pose": slice(1, 22),
-    "jaw_pose": slice(22, 23),
-    "leye_pose": slice(23, 24),
-    "reye_pose": slice(24, 25),
-}
+PIECES = ("global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose")  # arrays of rotation vectors
 HANDS = ("left_hand_pose", "right_hand_pose")
 REQUIRED = ("transl", "global_orient", "body_pose", "betas")
-TILT = 30.0  # degrees: more than that from the scan's z is no ground
 IMAGES = (".jpeg", ".jpg", ".png", ".bmp")
 
 
@@ -91,14 +90,6 @@ class View:
         return self.sequence.partition("_")[0]
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What belongs to a place: its ground in camera 0's axes, and its cameras' rotation, translation, intrinsics."""
-
-    ground: Ground | None
-    cameras: dict[int, tuple[Array, Array, Array]]
-
-
 def open(
     path: str | os.PathLike[str],
     split: str | None = None,
@@ -114,8 +105,8 @@ def open(
     root = Path(path)
     folders = _folders(root, split)
     views = [view for folder in folders for view in _views(root, folder, _cameras(root, folder, split, cameras))]
-    read = lru_cache(maxsize=None)(_scene)  # of a place, whose files are those of all its sequences
-    scenes = {folder: read(*_scene_files(root, folder)) for folder in folders}
+    read = lru_cache(maxsize=None)(read_scene)  # of a place, whose files are those of all its sequences
+    scenes = {folder: read(*scene_files(root, folder)) for folder in folders}
     _alike(root, scenes)
     rate = _rate(views)
     pictured = any(_image_folder(root, view).is_dir() for view in views)
@@ -160,7 +151,7 @@ def _cameras(root: Path, folder: Path, split: str | None, wanted: Sequence[int] 
     if wanted is not None:
         return (wanted,) if isinstance(wanted, int) else wanted
     if split in ("ipman-train", "ipman-test"):
-        calibrated = sorted(_calibration(root, folder).glob("*.xml"))
+        calibrated = sorted(calibration_folder(root, folder).glob("*.xml"))
         numbers = [int(file.stem) for file in calibrated if file.stem.isdigit()]
         return numbers if split == "ipman-test" else [number for number in numbers if number != 0]
     return (0,)
@@ -196,7 +187,7 @@ def _frames(root: Path, view: View, scene: Scene, hands: Hands | None, rate: flo
     person = np.full(count, view.person)
     camera = scene.cameras.get(view.camera)
     if camera is None and scene.cameras:
-        calibration = _calibration(root, view.folder) / f"{view.camera:03d}.xml"
+        calibration = calibration_folder(root, view.folder) / f"{view.camera:03d}.xml"
         raise ValueError(f"{calibration}: expected the calibration of camera {view.camera}, no such file")
     spread = None if camera is None else Cameras(*(np.broadcast_to(part, (count, *part.shape)) for part in camera))
     frames = Frames(
@@ -223,9 +214,10 @@ def _body(file: Path, hands: Hands | None) -> tuple[Array, Array, Array]:
     if lacking:
         raise ValueError(f"{file}: no {', '.join(lacking)} in it (it has {', '.join(sorted(map(str, content)))})")
     pose = np.zeros((len(SMPLX), 3))
-    for name, joints in PARTS.items():
+    for name in PIECES:
         if name in content:
-            pose[joints] = _array(file, name, content[name], 3 * (joints.stop - joints.start)).reshape(-1, 3)
+            joints = [SMPLX.index(joint) for joint in pose_arrays.PIECES[name][0]]
+            pose[joints] = _array(file, name, content[name], 3 * len(joints)).reshape(-1, 3)
     if hands is not None and all(name in content for name in HANDS):
         weights = [_array(file, name, content[name], None) for name in HANDS]
         pose[25:] = hands.mean + hands.from_components(*weights)
@@ -261,106 +253,6 @@ def _images(root: Path, view: View) -> NDArray[np.str_]:
     return np.array(["" if first is None else str(folder / name) + first.suffix for name in names])
 
 
-def _calibration(root: Path, folder: Path) -> Path:
-    return root / "scan_calibration" / folder.name.partition("_")[0] / "calibration"
-
-
-def _to_world(root: Path, folder: Path) -> Path:
-    """The file that leads to the scan's world; the lecture hall was scanned twice."""
-    scene = folder.name.partition("_")[0]
-    if scene == "LectureHall":
-        scene += "_chair" if "chair" in folder.name else "_yoga"
-    return root / "multicam2world" / f"{scene}_multicam2world.json"
-
-
-def _ground_mesh(root: Path, folder: Path) -> Path | None:
-    scene = folder.name.partition("_")[0]
-    places = (folder / "ground_mesh.ply", root / "scan_calibration" / scene / "ground_mesh.ply")
-    return next((place for place in places if place.is_file()), None)
-
-
-def _scene_files(root: Path, folder: Path) -> tuple[Path | None, Path, Path]:
-    """Ground, way to the scan's world, and folder of the cameras' calibrations."""
-    return _ground_mesh(root, folder), _to_world(root, folder), _calibration(root, folder)
-
-
-def _scene(mesh: Path | None, to_world: Path, calibration: Path) -> Scene:
-    files = sorted(file for file in calibration.glob("*.xml") if file.stem.isdigit())
-    return Scene(
-        ground=None if mesh is None else ground(mesh, to_world),
-        cameras={int(file.stem): camera(file) for file in files},
-    )
-
-
-def camera(file: Path) -> tuple[Array, Array, Array]:
-    """Rotation (3, 3), translation (3,) m and intrinsics (3, 3) pixels of a calibration's XML.
-
-    ValueError, naming the file, for a document type and for what is damaged or cannot be.
-    """
-    root = safe_xml.read(file)
-    extrinsics, intrinsics = (
-        _matrix(root, name, size, file) for name, size in (("CameraMatrix", 12), ("Intrinsics", 9))
-    )
-    rotation, translation = extrinsics.reshape(3, 4)[:, :3], extrinsics.reshape(3, 4)[:, 3]
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
-        raise ValueError(f"{file}: CameraMatrix: expected a rotation, got {rotation.round(3).tolist()}")
-    if np.linalg.norm(translation) > 100:
-        raise ValueError(f"{file}: CameraMatrix: looks like millimetres: {translation.tolist()}, expected metres")
-    return rotation, translation, intrinsics.reshape(3, 3)
-
-
-def _matrix(root: Any, name: str, size: int, file: Path) -> Array:
-    said = safe_xml.text(root, f"{name}/data", file).split()
-    try:
-        numbers = np.array(said, np.float64)
-    except ValueError as error:
-        raise ValueError(f"{file}: {name}: expected numbers: {error}") from None
-    if numbers.size != size or not np.isfinite(numbers).all():
-        raise ValueError(f"{file}: {name}: expected {size} finite numbers, got {numbers.size}")
-    return numbers
-
-
-def ground(mesh: Path, to_world: Path) -> Ground:
-    """The plane through the scan's ground, in camera 0's axes.
-
-    ValueError, naming the file, for what is missing or damaged, or a ground that is not level in a world that is z up.
-    """
-    try:
-        points = read_points(mesh)
-    except ValueError as error:
-        raise ValueError(f"{mesh}: expected a mesh: {str(error).removeprefix(f'{mesh}: ')}") from error
-    if len(points) < 3:
-        raise ValueError(f"{mesh}: expected three vertices or more, got {len(points)}")
-    if np.abs(points).max() > 1000:
-        raise ValueError(f"{mesh}: looks like millimetres: vertices up to {np.abs(points).max():.4g} from the origin")
-    middle = points.mean(axis=0)
-    normal = np.linalg.svd(points - middle, full_matrices=False)[2][2]
-    normal = normal if normal[2] > 0 else -normal
-    tilt = np.degrees(np.arccos(min(abs(normal[2]), 1.0)))
-    if tilt > TILT:
-        axis = "xyz"[int(np.abs(normal).argmax())]
-        raise ValueError(f"{mesh}: looks like {axis} up: the ground leans {tilt:.0f}° from the scan's z, its up axis")
-    rotation, translation, scale = _transform(to_world)
-    # normal · (c X R + t) = normal · middle, for a row X
-    return Ground(rotation @ normal, float(normal @ (middle - translation)) / scale)
-
-
-def _transform(file: Path) -> tuple[Array, Array, float]:
-    """R, t and c of world = c · X R + t."""
-    said = read_json(file)
-    try:
-        rotation, translation = np.array(said["R"], float), np.array(said["t"], float).reshape(3)
-        scale = float(np.array(said["c"], float).reshape(()))
-    except (ValueError, LookupError, TypeError, OverflowError) as error:
-        raise ValueError(f"{file}: expected R, t and c of the way to the scan's world: {error!r}") from None
-    if rotation.shape != (3, 3) or np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3:
-        raise ValueError(f"{file}: R: expected a rotation (3, 3), got {rotation.tolist()}")
-    if not 0.5 < scale < 2:
-        hint = ": looks like millimetres" if scale > 100 or 0 < scale < 0.01 else ""
-        raise ValueError(f"{file}: c{hint}: expected a scale about 1, metres to metres, got {scale:g}")
-    return rotation, translation, scale
-
-
 def check(path: str | os.PathLike[str]) -> list[Finding]:
     """Which sequences there are, what belongs to each, which files cannot be read, and whether units and axes fit."""
     root = Path(path)
@@ -376,11 +268,11 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
             found.append(Finding("missing", f"{split}: {', '.join(lacking)}"))
         else:
             found.append(Finding("ok", f"{split}: all {len(names)} sequences"))
-    read, read_scene = [], lru_cache(maxsize=None)(_scene)
+    read, cached_scene = [], lru_cache(maxsize=None)(read_scene)
     for folder in folders:
         found += _around(root, folder)
         try:
-            scene = read_scene(*_scene_files(root, folder))
+            scene = cached_scene(*scene_files(root, folder))
             for view in _views(root, folder, (0,)):
                 read.append((view.sequence, lambda v=view, s=scene: _frames(root, v, s, None, None)))
         except ValueError as error:
@@ -391,9 +283,9 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
 def _around(root: Path, folder: Path) -> list[Finding]:
     """What is missing beside the bodies of a sequence."""
     needed = (
-        ("ground", _ground_mesh(root, folder), "scan_calibration/SCENE/ground_mesh.ply"),
-        ("way to the scan's world", _to_world(root, folder), "multicam2world"),
-        ("cameras", _calibration(root, folder), "scan_calibration"),
+        ("ground", ground_mesh_file(root, folder), "scan_calibration/SCENE/ground_mesh.ply"),
+        ("way to the scan's world", to_world_file(root, folder), "multicam2world"),
+        ("cameras", calibration_folder(root, folder), "scan_calibration"),
         ("images", root / "images" / folder.parent.name / folder.name, "images"),
     )
     return [

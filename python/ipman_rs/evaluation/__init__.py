@@ -4,13 +4,14 @@ Metrics take numpy arrays or torch tensors and give one number a body, (...), in
 there is none (`alike`). `Accumulator` adds them up over shards, exactly.
 """
 
+from .body_errors import BodyErrors, body_errors
 from .bose import BoseMode, bose
 from .com_error import com_error
 from .cop_error import cop_error
 from .foot_skating import foot_skating
 from .moyo_protocol import MoyoFigures, PressureFigures, moyo
 from .mpjpe import mpjpe, pa_mpjpe
-from .penetration import hover, penetration
+from .penetration import hover, lowest, penetration
 from .pressure_iou import PressureMode, frame_difference, pressure_iou
 from .pressure_map import Mat, pressure_map
 from .procrustes import aligned, similarity
@@ -25,6 +26,7 @@ from .tilt import root_tilt, tilt
 
 __all__ = [
     "Accumulator",
+    "BodyErrors",
     "BoseMode",
     "Comparison",
     "Interval",
@@ -34,6 +36,7 @@ __all__ = [
     "PressureMode",
     "Summary",
     "aligned",
+    "body_errors",
     "bootstrap",
     "bose",
     "com_error",
@@ -42,6 +45,7 @@ __all__ = [
     "foot_skating",
     "frame_difference",
     "hover",
+    "lowest",
     "moyo",
     "mpjpe",
     "pa_mpjpe",

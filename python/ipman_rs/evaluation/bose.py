@@ -18,7 +18,6 @@ from ipman_rs.support import support_margin
 from ipman_rs.template import BodyTemplate
 
 from .numpy_or_torch import AnyGround, alike
-from .penetration import lowest
 
 BoseMode = Literal["paper", "released", "strict"]
 
@@ -61,7 +60,7 @@ def bose(
     if truth is not None and truth.shape != shape:
         raise ValueError(f"labels: expected one a body, {shape}, got {truth.shape}")
     tau = THRESHOLDS[bose_mode] if threshold is None else threshold
-    floor = _snapped(vertices, ground) if bose_mode == "strict" else ground
+    floor = Ground.under(vertices, ground.normal) if bose_mode == "strict" else ground
     contact = "released" if bose_mode == "released" else "paper"
     margin = np.asarray(support_margin(vertices, template, floor, tau, method, contact), float)
     verdict = np.where(margin >= 0, 1.0, 0.0)
@@ -70,9 +69,3 @@ def bose(
     if truth is not None:
         verdict = np.where(np.isnan(truth), np.nan, verdict == truth)
     return np.where(np.isnan(margin), np.nan, verdict)
-
-
-def _snapped(vertices: ArrayLike, ground: Ground) -> Ground:
-    """The ground at each body's lowest vertex: the same heights as those of the body snapped to the ground."""
-    height = ground.height + np.nan_to_num(lowest(vertices, ground))
-    return Ground(np.broadcast_to(ground.normal, (*height.shape, 3)), height)

@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ipman_rs.ground import Ground
-
 from .numpy_or_torch import AnyGround, alike
-from .points import Array, points
+from .points import points
 
 
 @alike
@@ -27,7 +25,8 @@ def hover(vertices: ArrayLike, ground: AnyGround) -> Any:
     return lowest(vertices, ground).clip(min=0)
 
 
-def lowest(vertices: ArrayLike, ground: Ground) -> Array:
-    """Signed height of the lowest vertex, (...) m; NaN for a body that is not finite."""
+@alike
+def lowest(vertices: ArrayLike, ground: AnyGround) -> Any:
+    """Signed height of the lowest vertex above the ground, (..., V, 3) -> (...) m. NaN if the body is not finite."""
     heights = ground.signed_height(points("vertices", vertices))
     return np.where(np.isfinite(heights.max(axis=-1)), heights.min(axis=-1), np.nan)

@@ -8,6 +8,7 @@ import struct
 import sys
 import zipfile
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
 
@@ -83,19 +84,40 @@ def mapped(path: Path, name: str) -> NDArray[Any]:
             packed = archive.getinfo(f"{name}.npy")
         if packed.compress_type != zipfile.ZIP_STORED:
             return read(path, name)
-        with path.open("rb") as stream:
-            end = _data_offset(stream, packed.header_offset) + packed.file_size
-            shape, order, dtype = _header(stream)
-            start = stream.tell()
-            _fits(shape, dtype, min(end, path.stat().st_size) - start)
-        if 0 in shape:
-            return np.empty(shape, dtype)
-        return np.memmap(path, dtype, "r", start, shape, order)  # type: ignore[call-overload]
+        place = place_in(path, packed)
+        if 0 in place.shape:
+            return np.empty(place.shape, place.dtype)
+        return np.memmap(path, place.dtype, "r", place.offset, place.shape, place.order)  # type: ignore[call-overload]
     except Exception as error:
         text = str(error)
         raise ValueError(
             text if text.startswith(f"{path}: ") else f"{path}: array {name!r} cannot be read: {text}"
         ) from error
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an array lies in a file: from the byte `offset` on, "C" row after row or "F" column after column."""
+
+    offset: int
+    shape: tuple[int, ...]
+    order: Literal["C", "F"]
+    dtype: np.dtype[Any]
+
+
+def place_in(path: Path, member: zipfile.ZipInfo | None = None) -> Place:
+    """Where the array of an `.npy` file lies, or that of a member of an archive that is stored as it is.
+
+    Raises:
+        ValueError: it is damaged, holds Python objects, or the file lacks some of the bytes that it claims.
+    """
+    length = path.stat().st_size
+    with path.open("rb") as stream:
+        end = length if member is None else _data_offset(stream, member.header_offset) + member.file_size
+        shape, order, dtype = _header(stream)
+        offset = stream.tell()
+    _fits(shape, dtype, min(end, length) - offset)
+    return Place(offset, tuple(int(size) for size in shape), order, dtype)
 
 
 def read_npy(path: str | os.PathLike[str]) -> NDArray[Any]:
@@ -133,18 +155,10 @@ def _data_offset(stream: IO[bytes], start: int) -> int:
 
 
 def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], Literal["C", "F"], np.dtype[Any]]:
-    """Shape, order and type of a `.npy` array of numbers or text, from its first bytes."""
-    shape, fortran, dtype = header(stream)
-    if dtype.hasobject:
-        raise ValueError("holds Python objects, which are not loaded; save it again as plain numbers")
-    return shape, "F" if fortran else "C", dtype
-
-
-def header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    """Shape, whether it lies column by column, and type of a `.npy` array, from its first bytes.
+    """Shape, order and type of a `.npy` array of numbers or text, from its first bytes.
 
     Raises:
-        ValueError: the header is damaged, or claims a shape that no array can have.
+        ValueError: the header is damaged, or claims Python objects or a shape that no array can have.
     """
     reader = npy.read_array_header_1_0 if npy.read_magic(stream)[0] == 1 else npy.read_array_header_2_0
     try:
@@ -155,7 +169,11 @@ def header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
         raise ValueError("its header is damaged; is the download complete?") from error
     if not all(0 <= size < 1 << 63 for size in shape):
         raise ValueError("its header claims a shape that no array can have")
-    return shape, fortran, dtype
+    if dtype.hasobject:
+        raise ValueError(
+            "holds Python objects, which are not loaded; save plain numbers, and names by np.array(x, str)"
+        )
+    return shape, "F" if fortran else "C", dtype
 
 
 def _fits(shape: tuple[int, ...], dtype: np.dtype[Any], size: int) -> None:

@@ -3,8 +3,8 @@
 Keypoints are the data set's, or those of files, or MediaPipe's in its images; cameras and ground are the data set's. A
 preset that imitates a pose is presented the frame's recorded pose (as in the paper), or one pose for all.
 
-A piece is a file of some frames. It is named by its number, appears when it is whole, and says what it was made of: a
-fit that was killed goes on where it was, to the same bits.
+A piece holds the fits of some frames (`evaluation.tables.resumable`): a run that was killed goes on where it was, to
+the same bits.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from ipman_rs.data.frames import DataSet, Frames
 from ipman_rs.evaluation.tables.job import Source
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.evaluation.tables.predictions import fingerprint
-from ipman_rs.files import being_written, read_json, regular, safe_npz, write_whole
+from ipman_rs.evaluation.tables.resumable import Resumable
+from ipman_rs.files import being_written, regular, write_whole
 
 from ..data import keypoints
 from ..data.keypoints.detections import Detections, join
@@ -84,7 +85,7 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class DataFit:
+class DataFit(Resumable):
     """The fits of one data set by one preset.
 
     folder: of the results. models: folder of model files. body: an embedded body or a model file; None: the data set's
@@ -144,17 +145,8 @@ class DataFit:
         if weighs(self.config, "measured_shape") and self.height is None and self.mass is None:
             self.size(first)
         self.folder.mkdir(parents=True, exist_ok=True)
-        file = self.folder / "made_of.json"
-        if file.exists():
-            found = read_json(file)
-            stored = found if isinstance(found, dict) else {}
-            other = [name for name, value in self.made_of.items() if stored.get(name) != value]
-            if other:
-                raise ValueError(
-                    f"{self.folder}: holds fits of other options ({', '.join(other)} differ); choose another folder "
-                    "with -o, or delete this one"
-                )
-        write_whole(file, json.dumps(self.made_of, indent=1) + "\n")
+        self.check_folder(self.folder, "fits of other options")
+        self.mark_folder(self.folder)
 
     @cached_property
     def made_of(self) -> dict[str, Any]:
@@ -185,10 +177,6 @@ class DataFit:
             "version": ip.__version__,
         }
 
-    @cached_property
-    def key(self) -> str:
-        return hashlib.sha256(json.dumps(self.made_of, sort_keys=True).encode()).hexdigest()
-
     def model(self, gender: str) -> BodyModel:
         """The body that is fitted to people of a gender; its hands are relative to its mean hand."""
         if gender not in self._models:
@@ -204,27 +192,19 @@ class DataFit:
     def _gender(self, frame: Frames) -> str:
         return "neutral" if frame.genders is None or self.body is not None else str(frame.genders[0])
 
-    def file(self, number: int) -> Path:
-        return self.folder / "pieces" / f"{number:06d}.npz"
-
-    def done(self, number: int) -> bool:
-        """Whether a piece is there, whole, and of these fits."""
-        try:
-            return self.file(number).exists() and str(safe_npz.read(self.file(number), "key")) == self.key
-        except ValueError:
-            return False
+    @property
+    def pieces_folder(self) -> Path:
+        return self.folder / "pieces"
 
     def run(self, progress: Progress = lambda done: None) -> dict[str, Any]:
         """Does the pieces that are not there yet and writes the predictions; gives the record of all fits.
 
         `progress` is told how many frames are done. ValueError where no frame has a body.
         """
-        (self.folder / "pieces").mkdir(exist_ok=True)
+        self.pieces_folder.mkdir(exist_ok=True)
         for number in range(self.pieces):
             if not self.done(number):
-                found = self._piece(number)
-                with being_written(self.file(number)) as out:
-                    np.savez(out, allow_pickle=False, key=np.str_(self.key), **found)
+                self.save(number, self._piece(number))
             progress(min((number + 1) * self.piece, len(self.rows)))
         return self._finish()
 
@@ -362,7 +342,7 @@ class DataFit:
 
     def _finish(self) -> dict[str, Any]:
         """Writes predictions and record, made of all pieces."""
-        pieces = [self._read(number) for number in range(self.pieces)]
+        pieces = [self.result(number) for number in range(self.pieces)]
         filled = [piece for piece in pieces if "names" in piece]
         left_out = [
             {"frame": str(name), "why": str(why)}
@@ -375,7 +355,7 @@ class DataFit:
         arrays = {
             name: np.concatenate([piece[name] for piece in filled])
             for name in filled[0]
-            if name not in ("key", "left_out", "why")
+            if name not in ("left_out", "why")
         }
         kind = embedded.kind_of(self.model(str(arrays["genders"][0])))
         columns = {name: arrays[name] for name in _COLUMNS if name in arrays}
@@ -398,9 +378,6 @@ class DataFit:
         }
         write_whole(self.folder / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
         return record
-
-    def _read(self, number: int) -> dict[str, NDArray[Any]]:
-        return {name: safe_npz.read(self.file(number), name) for name in sorted(safe_npz.names(self.file(number)))}
 
 
 def _on_floor(world: World, frame: Frames, floor: float, stays: bool) -> World:

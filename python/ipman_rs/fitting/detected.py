@@ -11,6 +11,7 @@ from torch import Tensor
 
 import ipman_rs.torch as ipt
 
+from ..body.sites import FEWEST_POINTS
 from ..data.keypoints.detections import Detections
 from .camera import Camera
 from .camera_file import KnownCamera
@@ -19,7 +20,6 @@ from .problem import Problem
 from .start import SEEN, level_camera
 
 NOTHING_KNOWN = KnownCamera()
-FEWEST = 6  # points seen, below which a body is a guess
 FACE_SEEN = 0.8  # confidence of nose and eyes that the face of a person is turned to the camera
 CENTER = 0.2  # of the image's size: how far a camera's center is from its middle at most
 MIRRORED = (
@@ -124,10 +124,10 @@ def _floor(people: int, height: float) -> ipt.Ground:
 def too_little(names: Sequence[str], confidence: np.ndarray) -> str | None:
     """Why a person with these confidences (K,) cannot be fitted, or None."""
     count = int((confidence > SEEN).sum())
-    if count >= FEWEST:
+    if count >= FEWEST_POINTS:
         return None
     return (
-        f"only {count} of {len(names)} points were seen (confidence above {SEEN:g}); {FEWEST} are needed: "
+        f"only {count} of {len(names)} points were seen (confidence above {SEEN:g}); {FEWEST_POINTS} are needed: "
         "use an image that shows more of the person"
     )
 

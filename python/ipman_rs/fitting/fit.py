@@ -86,9 +86,7 @@ def fit(
 def on_the_ground(problem: Problem, variables: Variables) -> Problem:
     """The problem with a level ground under the lowest vertex of each body."""
     with torch.no_grad():
-        lowest = Candidate(problem, variables).vertices[..., 1].amin(dim=1)
-    up = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(len(lowest), 3)
-    return replace(problem, ground=ipt.Ground(up, lowest.double()))
+        return replace(problem, ground=ipt.Ground.under(Candidate(problem, variables).vertices))
 
 
 def judged(problem: Problem, variables: Variables) -> Problem:

@@ -19,8 +19,8 @@ from torch import Tensor
 import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel
 
-from ..body.landmarks import FINGERTIPS, SIDES, skin_points
-from ..body.sites import MIDPOINTS, Inner, Point, Site
+from ..body.landmarks import FINGERTIPS, MIDPOINTS, SIDES, ends, skin_points
+from ..body.sites import Inner, Point, Site
 
 # Joints of fingers, their tips, and the knuckles of `surface`.
 HAND_POINTS = frozenset(
@@ -46,18 +46,15 @@ class Landmarks:
             name: Site(vertex) for name, vertex in skin_points(full).items() if name not in full.joint_names
         }
         skin |= {name: site for name, site in sites.items() if not isinstance(site, str)}
-        ends = [_ends(name, sites) for name in self.names]
-        used = list(dict.fromkeys(name for pair in ends for name in pair if name in skin))
+        meant = [site if isinstance(site := sites.get(name), str) else name for name in self.names]
+        pairs = ends(meant, dict.fromkeys([*full.joint_names, *skin]), full.name)
+        used = list(dict.fromkeys(name for pair in pairs for name in pair if name in skin))
         rows = {name: row for row, name in enumerate(used)}
         rows |= {name: max(len(used), 1) + j for j, name in enumerate(full.joint_names) if name not in rows}
-        unknown = [name for pair in ends for name in pair if name not in rows]
-        if unknown:
-            listed = ", ".join(known(full, sites))
-            raise ValueError(f"names: the body {full.name!r} has no landmark {unknown[0]!r}; it has {listed}")
         device = body.v_template.device
         self.num_betas = full.num_betas
         self.points = ipt.BodyModel(_cut(full, [skin[name] for name in used] or [Site(0)]), body.dtype).to(device)
-        self.ends = [torch.tensor([rows[pair[end]] for pair in ends], device=device) for end in (0, 1)]
+        self.ends = [torch.tensor([rows[pair[end]] for pair in pairs], device=device) for end in (0, 1)]
 
     def __call__(
         self,
@@ -98,13 +95,6 @@ class Landmarks:
 def known(body: BodyModel, sites: Iterable[str] = ()) -> tuple[str, ...]:
     """All names that a body has."""
     return tuple(dict.fromkeys([*body.joint_names, *MIDPOINTS, *skin_points(body), *sites]))
-
-
-def _ends(name: str, sites: Mapping[str, Point]) -> tuple[str, str]:
-    """The two points whose midpoint a landmark is, twice the same for most."""
-    site = sites.get(name)
-    name = site if isinstance(site, str) else name
-    return (name, name) if isinstance(site, Site | Inner) else MIDPOINTS.get(name, (name, name))
 
 
 def _cut(body: BodyModel, points: list[Site | Inner]) -> BodyModel:

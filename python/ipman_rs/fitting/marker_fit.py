@@ -19,6 +19,7 @@ import ipman_rs.torch as ipt
 from ipman_rs.data import judge
 from ipman_rs.data.check import Finding
 
+from ..body.sites import FEWEST_POINTS
 from ..data import markers
 from ..data.markers import judged
 from ..data.markers.sets import Meaning
@@ -108,9 +109,9 @@ def fit_tracks(
     config = load("markers") if config is None else config
     seen, unseen = judged.seen_names(tracks)
     sites = markers.sites(body.body, seen, own=own)
-    if len(sites) < judged.FEWEST:
+    if len(sites) < FEWEST_POINTS:
         raise ValueError(
-            f"{tracks.source}: expected at least {judged.FEWEST} markers with known places, got {len(sites)} of "
+            f"{tracks.source}: expected at least {FEWEST_POINTS} markers with known places, got {len(sites)} of "
             f"{', '.join(seen)}"
         )
     unknown = tuple(name for name in seen if name not in sites)

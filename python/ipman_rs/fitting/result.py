@@ -10,8 +10,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from ipman_rs.body import pose_arrays
 from ipman_rs.body.model import BodyModel
-from ipman_rs.body.pose_arrays import joints_of
 from ipman_rs.jsonable import jsonable
 
 from .candidate import Candidate
@@ -136,7 +136,7 @@ def results(fit: Fit, config: Config, start: Variables) -> list[Result]:
 def parameters(body: BodyModel, variables: Variables) -> Arrays:
     """SMPL's names for the pose, shape and place of bodies, and the expression where they have one, a row each."""
     pose = _array(full_pose(variables, body))
-    found: Arrays = {name: pose[:, columns].reshape(len(pose), -1) for name, columns in joints_of(body).items()}
+    found: Arrays = pose_arrays.split(pose, body)
     if body.num_expressions:
         found["expression"] = _array(variables["expression"])
     return {**found, "betas": _array(variables["betas"]), "transl": _array(variables["transl"])}

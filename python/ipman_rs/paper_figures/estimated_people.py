@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 import ipman_rs as ip
 from ipman_rs import view
-from ipman_rs.body import BodyModel, embedded
-from ipman_rs.body.pose_arrays import joints_of
+from ipman_rs.body import BodyModel, embedded, pose_arrays
 from ipman_rs.data.frames import DataSet, Frames
 from ipman_rs.evaluation.tables import predictions
 from ipman_rs.evaluation.tables.models import Models
@@ -117,11 +116,10 @@ def _pixels(name: str, place: Path) -> NDArray[np.uint8] | None:
 
 
 def _posed(body: BodyModel, arrays: Mapping[str, NDArray[Any]], path: Path) -> NDArray[np.float64]:
-    pose = np.zeros((body.num_joints, 3))
-    for piece, columns in joints_of(body).items():
-        if piece not in arrays or arrays[piece].size != 3 * len(columns):
-            raise ValueError(f"{path}: {piece}: expected {3 * len(columns)} numbers for the body {body.name}")
-        pose[columns] = arrays[piece].reshape(-1, 3)
+    try:
+        pose = pose_arrays.joined(arrays, body)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
     face = arrays["expression"][0] if "expression" in arrays and body.num_expressions else None
     return np.asarray(body(pose, arrays["betas"][0], arrays["transl"][0], face).vertices, np.float64)
 
@@ -129,7 +127,7 @@ def _posed(body: BodyModel, arrays: Mapping[str, NDArray[Any]], path: Path) -> N
 def _ground(arrays: Mapping[str, NDArray[Any]], vertices: NDArray[np.float64]) -> tuple[ip.Ground, str]:
     if "ground_normal" in arrays and "ground_height" in arrays:
         return ip.Ground(arrays["ground_normal"][0], arrays["ground_height"][0]), "ground: of the fit"
-    return ip.Ground.y_up(vertices[:, 1].min()), "ground: under the lowest vertex"
+    return ip.Ground.under(vertices), "ground: under the lowest vertex"
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pybullet
 
+from ..gravity import GRAVITY
 from .drop import Array, UprightDrop
-from .solids import GRAVITY
 
 RADIUS = 1e-4  # m
 

@@ -8,8 +8,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from ..gravity import GRAVITY
 from .drop import Array, UprightDrop
-from .solids import GRAVITY
 
 mj: Any = mujoco  # compiled, without types
 SUBSTEPS = 4  # of a step: with whole ones of 1/240 s its soft contacts tip one in ten bodies near their limit

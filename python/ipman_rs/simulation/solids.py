@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ipman_rs.status import Status
 
-GRAVITY = 9.81  # m/s², as the core has it
 CONTACT = 0.1  # m
 
 

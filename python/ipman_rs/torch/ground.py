@@ -59,6 +59,27 @@ class Ground:
         return cls((0.0, 0.0, 1.0), height)
 
     @classmethod
+    def under(cls, vertices: Tensor, normal: Numbers = (0.0, 1.0, 0.0)) -> Ground:
+        """The ground under the lowest vertex of each body: vertices (..., V, 3) m -> a ground for each of the batch.
+
+        A body that is not finite has no lowest vertex, and a ground is finite: that body's lies at height 0. No
+        gradient flows from the ground to the vertices.
+
+        Args:
+            normal: (3,) for all bodies or (..., 3) for each.
+
+        Raises:
+            ValueError: the normal is zero or not finite, or there are no vertices.
+        """
+        level = cls(normal)
+        if vertices.ndim < 2 or vertices.shape[-1] != 3 or not vertices.shape[-2]:
+            raise ValueError(f"vertices: expected (..., V, 3) with V > 0, got {tuple(vertices.shape)}")
+        points = vertices.detach()
+        heights = level.signed_height(points.double() if points.device.type == "cpu" else points)
+        lowest = torch.where(heights.isfinite().all(dim=-1), heights.amin(dim=-1), 0.0)
+        return cls.of_unit(level.normal.to(lowest).expand(*lowest.shape, 3), lowest)
+
+    @classmethod
     def of_unit(cls, normal: Tensor, height: Tensor) -> Ground:
         """A ground from a unit normal and tensors known to be sound: nothing is checked or copied."""
         ground = object.__new__(cls)

@@ -11,8 +11,7 @@ from torch import Tensor, nn
 import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel
 from ipman_rs.body.joint_regressors import EXTRA, JointRegressor
-from ipman_rs.body.landmarks import skin_points
-from ipman_rs.body.sites import MIDPOINTS
+from ipman_rs.body.landmarks import ends, point_rows
 from ipman_rs.torch.body import BodyOutput
 
 from .model import Estimate
@@ -62,17 +61,13 @@ class Posing(nn.Module):
         full = body.body
         if regressor is not None:
             check_regressor(regressor, full)
-        rows = skin_points(full) | {name: full.num_vertices + j for j, name in enumerate(full.joint_names)}
+        rows = point_rows(full)
         if regressor is not None:
             first = full.num_vertices + full.num_joints
             rows |= {name: first + k for k, name in enumerate(REGRESSED)}
-        pairs = [MIDPOINTS.get(name, (name, name)) for name in self.keypoints]
-        unknown = [name for pair in pairs for name in pair if name not in rows]
-        if unknown:
-            listed = ", ".join([*rows, *MIDPOINTS])
-            raise ValueError(f"keypoints: the body {full.name!r} has no {unknown[0]!r}; it has {listed}")
-        ends = torch.tensor([[rows[name] for name in pair] for pair in pairs], dtype=torch.int64).reshape(-1, 2)
-        self.register_buffer("ends", ends, persistent=False)
+        pairs = ends(self.keypoints, rows, full.name, "keypoints")
+        both = torch.tensor([[rows[name] for name in pair] for pair in pairs], dtype=torch.int64).reshape(-1, 2)
+        self.register_buffer("ends", both, persistent=False)
         weights = None if regressor is None else torch.from_numpy(regressor.weights).float()
         self.register_buffer("weights", weights, persistent=False)
 

@@ -9,13 +9,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.gravity import GRAVITY
 from ipman_rs.ground import Ground
 
 from ..data.force_plates import ForcePlates
 from .acceleration import CUTOFF, accelerations
 from .computed import Computed, carried
 from .movement import LOW, SLOW, Movement, smoothed
-from .zero_moment_point import GRAVITY, along_force, zero_moment_point, zero_moment_point_of_parts
+from .zero_moment_point import along_force, zero_moment_point, zero_moment_point_of_parts
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -12,14 +12,16 @@ import ipman_rs as ip
 
 from ..analysis import PIECE
 from ..body.sequence import PosedSequence, pieces
-from ..data.force_plates import LOADED, ForcePlates
+from ..body.soles import sole_vertices
+from ..data.c3d_plates import LOADED
+from ..data.force_plates import ForcePlates
 
 Array = NDArray[np.float64]
 
 METHODS = ("exact", "pcom", "sample_mean", "face_area", "vertex_mean")
 GAMMAS = (5, 10, 20, 50, 100, 200)  # 1/m; the paper's is 10
 ALPHA, GAMMA = 100.0, 10.0
-SOLE = 0.03  # m
+SOLE = 0.03  # m: so thick are the soles of people who may wear shoes
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +80,7 @@ def computed(
 
 
 def _piece(vertices: NDArray[np.floating], template: ip.BodyTemplate, plates: tuple[Array, Array] | None) -> Computed:
-    ground = under(vertices)
+    ground = ip.Ground.under(vertices)
     com = {method: np.asarray(ip.center_of_mass(vertices, template, method), float) for method in METHODS}
     cop = {
         gamma: np.asarray(ip.center_of_pressure(vertices, template, ground, ALPHA, gamma), float) for gamma in GAMMAS
@@ -90,7 +92,7 @@ def _piece(vertices: NDArray[np.floating], template: ip.BodyTemplate, plates: tu
     if plates is not None:
         rho = np.asarray(ip.pressure(vertices, template, ground, ALPHA, GAMMA), float)
         shares = first_shares(np.asarray(ip.sample_surface(vertices, template), float), rho, *plates)
-    sole = sole_vertices(template)
+    sole = sole_vertices(template, SOLE)
     left = np.isin(sole, _of_part(template, "left_lower_leg"))
     soles, forward = np.asarray(vertices[:, sole], float), facing(vertices, template)
     return Computed(mass, masses, centers, ground.height, com, cop, soles, left, forward, shares)
@@ -122,23 +124,9 @@ def _of_part(template: ip.BodyTemplate, name: str) -> NDArray[np.int64]:
     return np.unique(template.faces[template.face_parts == template.part_names.index(name)])
 
 
-def sole_vertices(template: ip.BodyTemplate) -> NDArray[np.int64]:
-    """The vertices of both lower legs that are less than 3 cm above the lowest in the resting pose."""
-    parts = [template.part_names.index(f"{side}_lower_leg") for side in ("left", "right")]
-    rows = np.unique(template.faces[np.isin(template.face_parts, parts)])
-    height = template.vertices[rows, 1]
-    return rows[height < height.min() + SOLE]
-
-
 def carried(plates: ForcePlates) -> Array:
     """(T, P) N upwards; 0 for plates that carry no more than `LOADED`, of whose centres nothing is known."""
     return np.where(plates.loads > LOADED, plates.loads, 0.0)
-
-
-def under(vertices: NDArray[np.floating]) -> ip.Ground:
-    """The level ground under the lowest vertex of each body (..., V, 3)."""
-    lowest = np.nan_to_num(np.asarray(vertices[..., 1].min(axis=-1), float))  # a ground is finite
-    return ip.Ground(np.broadcast_to([0.0, 1.0, 0.0], (*lowest.shape, 3)), lowest)
 
 
 def first_shares(points: Array, pressure: Array, loads: Array, centers: Array) -> Array:

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.gravity import GRAVITY
 from ipman_rs.jsonable import jsonable
 
 from .acceleration import CUTOFF
 from .comparison import Comparison, distances
 from .computed import METHODS, carried
-from .zero_moment_point import GRAVITY, along_force
+from .zero_moment_point import along_force
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

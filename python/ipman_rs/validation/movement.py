@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .zero_moment_point import GRAVITY
+from ..gravity import GRAVITY
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 import ipman_rs as ip
 
 from ..body.sequence import PosedSequence
+from ..body.soles import sole_vertices
+from ..gravity import GRAVITY
 from ..view import colors
 from .comparison import Comparison
-from .computed import ALPHA, GAMMA, carried, sole_vertices, under
-from .zero_moment_point import GRAVITY
+from .computed import ALPHA, GAMMA, SOLE, carried
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,7 +74,7 @@ class Floor:
 
     @classmethod
     def under(cls, one: Comparison, vertices: Array, template: ip.BodyTemplate, frame: int) -> Floor:
-        return cls(vertices[sole_vertices(template)].mean(axis=0), one.forward[frame])
+        return cls(vertices[sole_vertices(template, SOLE)].mean(axis=0), one.forward[frame])
 
     def __call__(self, points: Array) -> Array:
         away = points - self.middle
@@ -85,7 +86,7 @@ def _limits(
 ) -> tuple[Array, Array]:
     """Corners of the map: around the soles and all centres."""
     centers = floor(np.array([place[frame] for _, place, _ in _places(one)]))
-    around = np.concatenate([floor(vertices[sole_vertices(template)]), centers[np.isfinite(centers).all(axis=1)]])
+    around = np.concatenate([floor(vertices[sole_vertices(template, SOLE)]), centers[np.isfinite(centers).all(axis=1)]])
     return around.min(axis=0) - MARGIN, around.max(axis=0) + MARGIN
 
 
@@ -101,7 +102,7 @@ def _draw_map(
     from scipy.ndimage import gaussian_filter
 
     low, high = limits
-    rho = np.asarray(ip.pressure(vertices, template, under(vertices), ALPHA, GAMMA), float)
+    rho = np.asarray(ip.pressure(vertices, template, ip.Ground.under(vertices), ALPHA, GAMMA), float)
     points = floor(np.asarray(ip.sample_surface(vertices, template), float))
     edges = [np.arange(low[k], high[k] + CELL, CELL) for k in range(2)]
     density, *_ = np.histogram2d(*points.T, bins=edges, weights=rho)

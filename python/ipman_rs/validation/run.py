@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..body.sites import FEWEST_POINTS
 from ..data import check, judge, markers, opensim
 from ..data.force_plates import ForcePlates
 from ..data.markers import own
-from ..data.markers.judged import FEWEST, of_tracks
+from ..data.markers.judged import of_tracks
 from ..data.tracks import Tracks
 from ..files import safe_npz, write_whole
 from ..files.errors import FileError
@@ -73,7 +74,7 @@ class Measured:
         seen = self.tracks.confidence > 0
         paths = np.where(seen[..., None], self.tracks.points, np.nan)[:, seen.all(axis=0)]
         least, lasted = STILL[0], float(self.tracks.times[-1] - self.tracks.times[0])
-        return paths.shape[1] >= FEWEST and lasted >= STILL[1] and float(paths.std(axis=0).max()) < least
+        return paths.shape[1] >= FEWEST_POINTS and lasted >= STILL[1] and float(paths.std(axis=0).max()) < least
 
 
 @dataclass
@@ -288,7 +289,7 @@ def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told,
             found,
             plates,
             None if one.reference is None else one.reference[rows],
-            confidence.sum(axis=1) >= FEWEST,
+            confidence.sum(axis=1) >= FEWEST_POINTS,
             "reference" if trial.com is None else measured.judge(trial.com),
             weight,
         )

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ipman_rs.gravity import GRAVITY
 from ipman_rs.ground import Ground
 
 Array = NDArray[np.float64]
-
-GRAVITY = 9.80665  # m/s²
 
 
 def zero_moment_point(com: ArrayLike, acceleration: ArrayLike, ground: Ground) -> Array:

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 import ipman_rs.torch as ipt
-from ipman_rs.evaluation import mpjpe, pa_mpjpe, pve
+from ipman_rs.evaluation import body_errors, lowest, pve
 
 from ...fitting.candidate import Candidate
 from ...fitting.fit import Fit
@@ -59,11 +59,8 @@ def figures(fit: Fit, task: Task, truth: Truth) -> Figures:
         world = along_floor(on_floor, truth.surface)
     else:
         world = surface.numpy()
-    vertices, skeleton, true_vertices, true_skeleton = seen
     return Figures(
-        mpjpe(skeleton, true_skeleton),
-        pa_mpjpe(skeleton, true_skeleton),
-        pve(vertices, true_vertices, skeleton[:, 0], true_skeleton[:, 0]),
+        *body_errors(*seen),
         pve(world, truth.surface),
         margins[0],
         margins[1],
@@ -97,8 +94,8 @@ def snapped(fit: Fit) -> Fit:
     with torch.no_grad():
         candidate = Candidate(fit.problem, fit.variables)
         assert fit.problem.ground is not None
-        lowest = fit.problem.ground.signed_height(candidate.vertices.double()).amin(dim=1)
-    transl = fit.variables["transl"] - lowest[:, None] * torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)
+        height = lowest(candidate.vertices.double(), fit.problem.ground)
+    transl = fit.variables["transl"] - height[:, None] * torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)
     return dataclasses.replace(fit, variables={**fit.variables, "transl": transl})
 
 

@@ -28,7 +28,7 @@ Found = Mapping[float, Sequence[Result]]
 PAGES = {"keypoints": "training_benchmark", "images": "training_benchmark_images"}
 TEMPLATE = "training_benchmark.md.j2"
 # Of these, intervals are given: digits.
-DIFFERENCES = {"PVE": 1, "BoSE": 1, "strict BoSE": 1, "tilt": 2, "penetration": 1, "hover": 1}
+DIFFERENCES = {"PVE": 1, "BoSE": 1, "strict BoSE (exact CoM)": 1, "tilt": 2, "penetration": 1, "hover": 1}
 ASKED = 8.0  # degrees: the tilt at which something was to be shown
 
 
@@ -153,7 +153,7 @@ def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:
     from matplotlib.figure import Figure
 
     shown = [row["name"] for row in blocks[0]["rows"] if row["name"] != BASELINE]
-    keys = ("PVE", "BoSE", "strict BoSE")
+    keys = ("PVE", "BoSE", "strict BoSE (exact CoM)")
     figure = Figure(figsize=(12, 5), layout="constrained")
     axes = figure.subplots(1, len(keys), sharex=True)
     for key, axis in zip(keys, axes, strict=True):

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ipman_rs.body import BodyModel
 
-from ...body.landmarks import SIDES, Skin
-from ...body.sites import MIDPOINTS, Inner, Site
+from ...body.landmarks import MIDPOINTS, SIDES, Skin
+from ...body.sites import Inner, Site
 
 Array = NDArray[np.float64]
 Place = tuple[Mapping[str, float], tuple[float, float, float]]  # where to look from, and where to

@@ -13,6 +13,7 @@ from ipman_rs.data.check import Finding
 from ipman_rs.data.tracks import TO_Y_UP, Tracks
 from ipman_rs.ground import Ground
 
+from ...body.sites import FEWEST_POINTS
 from .anatomy import ANYWHERE, MIDDLE, SIDED, SPREAD
 from .names import meanings as meanings_of
 from .sets import Meaning
@@ -30,7 +31,6 @@ ARMS = ("upper_arm", "biceps", "elbow", "elbow_lateral", "elbow_medial", "forear
 FEET = re.compile(r"heel|toe|malleolus|metatarsal|midfoot|ankle|foot")
 
 BELOW = 0.15  # m: farther below the floor is no marker of a foot
-FEWEST = 6  # known markers, without which a body is a guess
 # Which sites are in front, behind, and on the sides of a part of the body.
 FACING = {
     "pelvis": ("asis", "psis|sacrum", "asis|psis|iliac_crest|hip_centre|hip|trochanter"),
@@ -82,7 +82,7 @@ def of_tracks(
     seen, _ = seen_names(tracks)
     meant = meanings_of(seen, own)
     unknown = [name for name in seen if name not in meant]
-    found = judge.known_markers([*meant], unknown, FEWEST) + of_rate(tracks)
+    found = judge.known_markers([*meant], unknown, FEWEST_POINTS) + of_rate(tracks)
     if not meant:
         return found
     placed = of_points(tracks, meant, up_is_said)

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from ipman_rs.data.tracks import letters
 
+from ...body.sites import FEWEST_POINTS
 from .aliases import KEYPOINTS
 from .sets import MARKERS, Meaning
 
@@ -61,12 +62,9 @@ def meanings(names: Sequence[str], own: Mapping[str, Meaning | None] | None = No
     ways = [_variants(name, ends) for name in names]
     points = {"lhip", "rhip"} <= {plain(name) for name in names}
     found = _found(names, ways, given, _KNOWN, skipped=_KEYPOINTS if points else {})
-    if points and len(found) < FEWEST_MARKERS:
+    if points and len(found) < FEWEST_POINTS:  # with as many markers, keypoints in the file are not needed
         return _found(names, ways, given, _KEYPOINTS, skipped={})
     return found
-
-
-FEWEST_MARKERS = 6  # of a file that has keypoints, too: then these are not needed
 
 
 def _found(

@@ -6,7 +6,6 @@ frame of the data set can have is not there at all.
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 import ipman_rs as ip
 from ipman_rs.body import BodyModel
+from ipman_rs.body.soles import sole_vertices
 from ipman_rs.data.frames import Frames
 from ipman_rs.ground import Ground
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Columns = dict[str, NDArray[Any]]
 
 AT_ONCE = 256  # frames whose vertices lie in memory together
-SOLE = 0.02  # m: vertices of the feet that lie as near to the lowest in the rest pose
+SOLE = 0.02  # m: so thick is the skin under a foot that may skate
 _PELVIS = ("pelvis", "left_hip", "right_hip", "spine1")  # one rigid piece
 _METHODS = ("exact", "vertex_mean", "sample_mean", "face_area")  # beside pCoM
 
@@ -67,7 +67,8 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
             found |= _balance(guess.vertices, guess.model, ground, true)
             found |= _mass(guess.vertices, guess.model, true)
             found |= _pressure(guess.vertices, guess.model, ground, true, job.preset)
-            found["skating"] = foot_skating(guess.vertices[:, soles(guess.model)], ground, true.sequences)
+            soles = guess.vertices[:, sole_vertices(guess.model.template, SOLE)]
+            found["skating"] = foot_skating(soles, ground, true.sequences)
     return found
 
 
@@ -152,12 +153,3 @@ def _pressure(vertices: NDArray[Any], model: BodyModel, ground: Ground, true: Fr
         "pressure_iou_chosen": found.best_iou.iou,
         "cop_error_chosen": found.best_cop_error.cop_error,
     }
-
-
-@lru_cache(maxsize=4)
-def soles(model: BodyModel) -> NDArray[np.intp]:
-    """The vertices of a model's soles: those of the feet that are lowest in the zero pose."""
-    rest = model().vertices
-    feet = [k for k, name in enumerate(model.joint_names) if name.endswith(("_foot", "_ankle"))]
-    of_feet = np.isin(model.weights.argmax(axis=1), feet)
-    return np.flatnonzero(of_feet & (rest[:, 1] < rest[of_feet, 1].min() + SOLE))

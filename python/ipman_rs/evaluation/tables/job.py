@@ -1,15 +1,14 @@
 """One evaluation: predictions against a data set, in pieces that are done once and kept.
 
-A piece is a file of the figures of some thousand frames. It is named by its number, appears when it is whole, and says
-what it was made of. So an evaluation that is killed goes on where it was, any part of the pieces can be done elsewhere,
-and what comes out is the same: the final figures are made of all pieces, however they came about.
+A piece holds the figures of some thousand frames (see `resumable`). So an evaluation that is killed goes on where it
+was, any part of the pieces can be done elsewhere, and what comes out is the same: the final figures are made of all
+pieces, however they came about.
 """
 
 from __future__ import annotations
 
 import hashlib
 import inspect
-import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -22,7 +21,6 @@ from numpy.typing import NDArray
 from ipman_rs import __version__, data
 from ipman_rs.data import check, judge
 from ipman_rs.data.frames import DataSet, Frames, Rows
-from ipman_rs.files import being_written, read_json, safe_npz, write_whole
 from ipman_rs.ground import Ground
 from ipman_rs.volume import mass_properties
 
@@ -31,6 +29,7 @@ from . import predictions as predicted
 from .frame_metrics import Columns, columns
 from .joints import Definition, Regressors, compared, define
 from .models import Models
+from .resumable import Resumable
 
 PIECE = 4096  # frames: some seconds of work, and small in memory
 WEIGHED = 16  # bodies
@@ -84,7 +83,7 @@ class Shard:
 
 
 @dataclass(frozen=True)
-class Job:
+class Job(Resumable):
     """The figures of one file of predictions, or of the data set's own bodies (`TRUTH`).
 
     All words are plain: it travels to other processes.
@@ -110,6 +109,10 @@ class Job:
     @cached_property
     def place(self) -> Path:
         return Path(self.folder) / "methods" / self.name
+
+    @property
+    def pieces_folder(self) -> Path:
+        return self.place
 
     @cached_property
     def unpacked(self) -> Path:
@@ -167,9 +170,7 @@ class Job:
         """Makes the folder; ValueError where it holds the figures of something else, or lengths cannot fit."""
         _ = self.joint_regressors  # fails early
         self.place.mkdir(parents=True, exist_ok=True)
-        file = self.place / "made_of.json"
-        if file.exists():
-            self._compare(read_json(file))
+        self.check_folder(self.place, "figures of another evaluation")
         if self.predictions != TRUTH and len(self.estimates) < len(self.data) and not self.partial:
             raise ValueError(
                 f"{self.predictions}: has {len(self.estimates):,} frames, but the data set {self.source.name} has "
@@ -177,7 +178,7 @@ class Job:
             )
         _ = self.flags
         _ = self.definition
-        write_whole(file, json.dumps(self.made_of, indent=1) + "\n")
+        self.mark_folder(self.place)
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
@@ -291,20 +292,6 @@ class Job:
             **({"degrees": True} if self.degrees else {}),
         }
 
-    @cached_property
-    def key(self) -> str:
-        return hashlib.sha256(json.dumps(self.made_of, sort_keys=True).encode()).hexdigest()
-
-    def _compare(self, stored: Any) -> None:
-        stored = stored if isinstance(stored, dict) else {}
-        names = {**stored, **self.made_of}
-        other = [name for name in names if stored.get(name) != self.made_of.get(name)]
-        if other:
-            raise ValueError(
-                f"{self.place}: holds figures of another evaluation ({', '.join(other)} differ); choose another folder "
-                "with -o, or delete this one"
-            )
-
     def run(self, shard: Shard, progress: Callable[[int], None] = lambda frames: None) -> None:
         """Does the pieces of a shard that are not there yet; `progress` is told how many frames were done more."""
         for number in shard.of(self.pieces):
@@ -315,19 +302,7 @@ class Job:
     def measure(self, number: int) -> None:
         """Does a piece. ValueError where frames have no prediction or something does not fit."""
         start = number * self.piece
-        found: dict[str, Any] = columns(self, start, start + self.frames(number))
-        with being_written(self.file(number)) as file:
-            np.savez(file, key=np.str_(self.key), **found)
-
-    def file(self, number: int) -> Path:
-        return self.place / f"{number:06d}.npz"
-
-    def done(self, number: int) -> bool:
-        """Whether a piece is there, whole, and of this evaluation."""
-        try:
-            return self.file(number).exists() and str(safe_npz.read(self.file(number), "key")) == self.key
-        except ValueError:
-            return False
+        self.save(number, columns(self, start, start + self.frames(number)))
 
     def damaged(self) -> list[int]:
         """Pieces that are there, but not whole or not of this evaluation: `run` does them again."""
@@ -340,10 +315,6 @@ class Job:
         """The figures of all pieces, in the order of the frames. ValueError where one is missing."""
         for number in range(self.pieces):
             yield self.result(number)
-
-    def result(self, number: int) -> Columns:
-        names = safe_npz.names(self.file(number)) - {"key"}
-        return {name: safe_npz.read(self.file(number), name) for name in sorted(names)}
 
     def pair(self, rows: slice) -> tuple[Frames, Frames, NDArray[np.int64]]:
         """True and estimated frames of the same names, and their numbers. ValueError where some have no estimate."""

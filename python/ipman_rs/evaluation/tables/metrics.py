@@ -51,7 +51,7 @@ FIGURES = {
     "pve_world": _mm("PVE world", "mean distance of the vertices, not aligned", _MESH),
     "bose": _percent("BoSE", "share with the centre of mass over the base of support, contacts within 10 cm"),
     "bose_3cm": _percent("BoSE 3 cm", "contacts within 3 cm"),
-    "bose_strict": _percent("BoSE strict", "placed on the floor, contacts within 2.5 cm"),
+    "bose_strict": _percent("BoSE strict", "of the paper's centre of mass, put on the floor, contacts within 2.5 cm"),
     "bose_released": _percent("BoSE released", "what the authors' code prints: agreement with the label", "labels"),
     "tilt": Figure(
         "tilt", "°", 57.29577951308232, 2, -1, "of the pelvis, relative to gravity", f"{_JOINTS}, and a ground"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ipman_rs.files import being_written
 
-from .rows import RowsOnDisk
+from .rows import RowsOnDisk, of_npy
 
 _BATCH = 4096  # rows
 
@@ -69,10 +69,7 @@ def _unpacked(path: Path, file: Any, name: str, folder: Path) -> RowsOnDisk:
                 if rows.shape[1:] != shape[1:]:
                     raise ValueError(f"{path}: {name}: rows of {rows.shape[1:]} and of {shape[1:]} numbers")
                 out.write(np.ascontiguousarray(rows, dtype).tobytes())
-    with place.open("rb") as stored:
-        npy.read_magic(stored)
-        shape, _, dtype = npy.read_array_header_1_0(stored)
-        return RowsOnDisk(place, stored.tell(), dtype, tuple(shape))
+    return of_npy(place)
 
 
 def _shape(path: Path, file: Any, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:

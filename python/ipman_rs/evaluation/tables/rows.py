@@ -73,45 +73,28 @@ def of_npz(path: Path, name: str, unpacked: Path) -> RowsOnDisk:
         with zipfile.ZipFile(path) as archive:
             member = archive.getinfo(f"{name}.npy")
             if member.compress_type == zipfile.ZIP_STORED:
-                return _header(path, _start(path, member), member.file_size)
+                return _rows(path, safe_npz.place_in(path, member))
             place = unpacked / f"{name}.npy"
             if not place.exists():
                 unpacked.mkdir(parents=True, exist_ok=True)
                 with archive.open(member) as stream:
                     _copy(stream, place, member.file_size)
-        return replace(_header(place, 0, member.file_size), source=path)
+        return replace(of_npy(place), source=path)
     except Exception as error:  # damaged bytes can fail in any way (zlib, struct, header syntax)
         if isinstance(error, OSError) and error.errno not in (None, errno.EINVAL):
             raise  # the disk is full, say, which is no fault of the file
         raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
 
 
-def _start(path: Path, member: zipfile.ZipInfo) -> int:
-    """The first byte of a member's content, behind the header that stands before it."""
-    with path.open("rb") as file:
-        file.seek(member.header_offset)
-        header = file.read(30)
-    if header[:4] != b"PK\x03\x04":
-        raise ValueError("its place in the archive is wrong")
-    return member.header_offset + 30 + int.from_bytes(header[26:28], "little") + int.from_bytes(header[28:30], "little")
+def of_npy(path: Path) -> RowsOnDisk:
+    """The array of an `.npy` file. Raises ValueError, without the file's name, where it cannot be read row by row."""
+    return _rows(path, safe_npz.place_in(path))
 
 
-def _header(path: Path, start: int, size: int) -> RowsOnDisk:
-    """What the header of an array says that starts at a byte and has `size` bytes with it."""
-    with path.open("rb") as file:
-        file.seek(start)
-        shape, fortran, dtype = safe_npz.header(file)
-        offset = file.tell()
-    if dtype.hasobject:
-        raise ValueError(
-            "holds Python objects, which are not loaded; save plain numbers, and names by np.array(x, str)"
-        )
-    if fortran and len(shape) > 1:
+def _rows(path: Path, place: safe_npz.Place) -> RowsOnDisk:
+    if place.order == "F" and len(place.shape) > 1:
         raise ValueError("is stored column by column; save np.ascontiguousarray of it")
-    count = int(np.prod([int(number) for number in shape], dtype=object))
-    if count * dtype.itemsize != size - (offset - start) or start + size > path.stat().st_size:
-        raise ValueError(f"claims shape {shape} of {dtype}, but carries {size - (offset - start)} bytes")
-    return RowsOnDisk(path, offset, dtype, tuple(shape))
+    return RowsOnDisk(path, place.offset, place.dtype, place.shape)
 
 
 def _copy(stream: Any, place: Path, size: int) -> None:

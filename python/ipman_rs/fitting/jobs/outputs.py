@@ -16,8 +16,7 @@ import numpy as np
 
 import ipman_rs as ip
 
-from ...body import BodyModel
-from ...body.pose_arrays import joints_of
+from ...body import BodyModel, pose_arrays
 from ...files import read_json, safe_npz, write_whole
 from ...io import write_mesh
 from ...study import Fitted, Study, camera_of, study
@@ -67,9 +66,7 @@ def complete(folder: Path, identity: str) -> dict[str, Any] | None:
 
 def posed(body: BodyModel, arrays: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
     """The vertices (V, 3) of stored parameters."""
-    pose = np.zeros((body.num_joints, 3))
-    for name, columns in joints_of(body).items():
-        pose[columns] = arrays[prefix + name].reshape(-1, 3)
+    pose = pose_arrays.joined(arrays, body, prefix)
     betas, transl, expression = (arrays.get(prefix + name) for name in ("betas", "transl", "expression"))
     rows = (None if each is None else each[0] for each in (betas, transl, expression))
     return np.asarray(body(pose, *rows).vertices)
@@ -87,9 +84,8 @@ def study_of(
     path = folder / f"{item.name}.npz"
     arrays = {name: safe_npz.read(path, name) for name in safe_npz.names(path)}
     vertices = posed(body, arrays)
-    normal = arrays.get("ground_normal", np.array([[0.0, 1.0, 0.0]]))[0]
-    height = arrays["ground_height"][0] if "ground_height" in arrays else (vertices @ normal).min()
-    ground = ip.Ground(normal, height)
+    known = "ground_height" in arrays
+    ground = ip.Ground(arrays["ground_normal"][0], arrays["ground_height"][0]) if known else ip.Ground.under(vertices)
     before = None
     if pictured and f"{_BEFORE}betas" in arrays:
         before = study("Before the physics terms", posed(body, arrays, _BEFORE), body.template, ground)

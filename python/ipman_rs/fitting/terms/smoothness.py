@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import ipman_rs.torch as ipt
 from ipman_rs.checks import positive
 
-from ...body.sites import MIDPOINTS
+from ...body.landmarks import MIDPOINTS
 from ..candidate import Candidate
 from ..landmarks import Landmarks, known
 from ..problem import Problem

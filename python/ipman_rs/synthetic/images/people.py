@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ipman_rs.body import BodyModel, load_body, poses
-from ipman_rs.body.landmarks import skin_points
+from ipman_rs.body.landmarks import point_rows, skin_points
 from ipman_rs.synthetic.at_rest import FAMILIES, TRIES, Scene, disturbed, perturbed, settle
 
 Array = NDArray[np.floating]
@@ -88,15 +88,11 @@ def shaped(model: BodyModel, betas: Array) -> BodyModel:
 @cache
 def keypoint_names(body: str) -> tuple[str, ...]:
     """The 24 joints, then the named points of the skin (`ipman_rs.body.landmarks`)."""
-    return (*load_body(body).joint_names, *skin_vertices(body))
-
-
-@cache
-def skin_vertices(body: str) -> dict[str, int]:
     model = load_body(body)
-    return {name: vertex for name, vertex in skin_points(model).items() if name not in model.joint_names}
+    return tuple(dict.fromkeys([*model.joint_names, *skin_points(model)]))
 
 
 def keypoints(body: str, vertices: Array, joints: Array) -> Array:
     """The points (K, 3) m in the order of `keypoint_names`."""
-    return np.concatenate([joints, vertices[list(skin_vertices(body).values())]])
+    rows = point_rows(load_body(body))
+    return np.concatenate([vertices, joints])[[rows[name] for name in keypoint_names(body)]]
