@@ -19,6 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from ipman_rs.files import write_whole
+
 from .layouts import MEDIAPIPE_33
 from .people import Array, Image, Person, numbers, plain, scored, size_of, width_height
 
@@ -194,4 +196,4 @@ def write(path: str | Path, image: str, size: tuple[int, int], landmarks: Array,
         "landmarks": landmarks.round(6).tolist(),
         "world_landmarks": world.round(6).tolist(),
     }
-    Path(path).write_text(json.dumps(content, indent=1) + "\n")
+    write_whole(path, json.dumps(content, indent=1) + "\n")
