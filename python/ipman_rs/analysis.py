@@ -15,10 +15,10 @@ from ipman_rs.arrays import Bodies, of_each
 from ipman_rs.ground import Ground
 from ipman_rs.plain import plain
 from ipman_rs.pressure import pressure
+from ipman_rs.quantities import densities
 from ipman_rs.status import Status, status_names, warn_odd_size
 from ipman_rs.support import BaseOfSupport, nest
 from ipman_rs.template import BodyTemplate
-from ipman_rs.volume import densities
 
 if TYPE_CHECKING:
     from ipman_rs.body.model import BodyModel

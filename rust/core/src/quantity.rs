@@ -16,7 +16,7 @@ use crate::support::{Contact, ContactRule, SupportMargin};
 use crate::template::Template;
 use crate::volume::{MassProperties, PartVolumes};
 
-pub trait Quantity: Send + Sync {
+pub trait Quantity: Send + Sync + 'static {
     /// What the forward keeps for the backward.
     type Saved<R: Real>;
 

@@ -15,6 +15,7 @@ from torch._C._functorch import is_functorch_wrapped_tensor
 from torch.autograd import Function, forward_ad
 
 from ipman_rs import BodyTemplate, _core
+from ipman_rs.quantities import Quantity
 
 from .arrays import memory
 from .autograd import Vjp
@@ -26,8 +27,7 @@ class Call(NamedTuple):
     """What is asked of the core besides the bodies."""
 
     template: BodyTemplate
-    quantity: str
-    options: tuple[float, ...]
+    quantity: Quantity
     weights: tuple[float, ...]
     reduction: str
 
@@ -59,8 +59,8 @@ def _arrays(vertices: Tensor, ground: Ground) -> tuple[Any, Any, Any]:
 class WeightedTotal(Function):
     """vertices (B, V, 3) -> Σ λ·term, reduced, or (B,); and the unweighted terms (K,) or (B, K), not differentiable.
 
-    Value and gradient come from one pass. The gradient waits for the backward, which scales it by its upstream in place
-    and hands it over; a second backward, or one that is itself differentiated, computes it again.
+    Value and gradient come from one pass. The gradient is cached; the backward multiplies it in place by the
+    upstream gradient and returns it. A second backward, or one that is itself differentiated, computes it again.
     """
 
     @staticmethod
@@ -68,10 +68,8 @@ class WeightedTotal(Function):
         arrays = _arrays(vertices, ground)
         mask = memory(valid)
         follow_torch()
-        template, quantity, options, weights, reduction = call
-        total, terms, shares, gradient = _core.weighted(
-            template._core, quantity, options, *arrays, weights, mask, reduction
-        )
+        handle = call.quantity.of(call.template)
+        total, terms, shares, gradient = handle.weighted(*arrays, call.weights, mask, call.reduction)
         ctx.save_for_backward(vertices)
         ctx.call, ctx.ground, ctx.shares, ctx.gradient = call, arrays[1:], shares, gradient
         outputs = torch.from_numpy(total), torch.from_numpy(terms)
@@ -106,8 +104,7 @@ class Terms(Function):
         arrays = _arrays(vertices, ground)
         mask = memory(valid)
         follow_torch()
-        template, quantity, options = call[:3]
-        terms, shares, jacobian = _core.terms(template._core, quantity, options, *arrays, mask, call.reduction)
+        terms, shares, jacobian = call.quantity.of(call.template).terms(*arrays, mask, call.reduction)
         ctx.save_for_backward(vertices)
         ctx.call, ctx.ground, ctx.shares, ctx.jacobian = call, arrays[1:], shares, jacobian
         return torch.from_numpy(terms)
@@ -130,5 +127,4 @@ def _is_differentiated(upstream: Tensor) -> bool:
 def _vjp(ctx: Any, vertices: Tensor, d_out: Tensor) -> Tensor:
     """The gradient by operations that can be differentiated once more."""
     normal, height = (torch.from_numpy(given).expand(len(vertices), *given.shape[1:]) for given in ctx.ground)
-    template, quantity, options = ctx.call[:3]
-    return Vjp.apply(vertices, normal, height, d_out, template, quantity, list(options))
+    return Vjp.apply(vertices, normal, height, d_out, ctx.call.template, ctx.call.quantity)
