@@ -19,8 +19,6 @@ from ipman_rs.status import warn_odd_size
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from ipman_rs.quantities import Quantity
-
 _KEYS = itertools.count()
 _BY_KEY: weakref.WeakValueDictionary[int, BodyTemplate] = weakref.WeakValueDictionary()
 
@@ -66,7 +64,7 @@ class BodyTemplate:
         self._seed = whole("seed", seed, 0, 2**64 - 1)
         self._core = _core.Template(self.vertices, self.faces, self.face_parts, samples, self._seed)
         self._collisions: dict[float, _core.Collision] = {}
-        self._quantities: dict[Quantity, _core.Quantity] = {}  # the latest: see `Quantity.of`
+        self._quantities: dict[tuple[Any, ...], _core.Quantity] = {}  # the latest: see `Quantity.of`
         self.part_names = _names(part_names, self.num_parts)
         for array in (self.vertices, self.faces, self.face_parts):
             array.setflags(write=False)

@@ -1,7 +1,6 @@
-"""The loss terms of a training step on the CPU, eager and in reverse mode, with one call of the core each way.
+"""`IntuitivePhysicsLoss` as a trainer calls it: on the CPU, eager, in reverse mode. One call of the core each way.
 
-This is `IntuitivePhysicsLoss` as a trainer calls it. Anything else (torch.compile, torch.func, forward mode, other
-devices) takes the general path in `dispatch.py`.
+All else (torch.compile, torch.func, forward mode, other devices) takes the general path of `dispatch.py`.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from .threads import follow_torch
 
 
 class Call(NamedTuple):
-    """What is asked of the core besides the bodies."""
+    """The arguments of the core besides the bodies."""
 
     template: BodyTemplate
     quantity: Quantity
@@ -33,7 +32,7 @@ class Call(NamedTuple):
 
 
 def serves(vertices: Any) -> bool:
-    """Whether these vertices ask for a gradient in the way that is meant here."""
+    """Whether these are CPU tensors that need a gradient, outside of compiled code, transforms and forward mode."""
     return (
         isinstance(vertices, Tensor)
         and vertices.requires_grad
@@ -96,7 +95,7 @@ class WeightedTotal(Function):
 class Terms(Function):
     """vertices (B, V, 3) -> terms (K,), reduced, or (B, K).
 
-    The forward keeps the Jacobian, five numbers a vertex: what a backward with any upstream is made of.
+    The forward keeps the Jacobian, five numbers per vertex, from which a backward with any upstream gradient follows.
     """
 
     @staticmethod
@@ -111,7 +110,7 @@ class Terms(Function):
 
     @staticmethod
     def backward(ctx: Any, d_terms: Tensor) -> tuple[Tensor, None, None, None]:
-        (vertices,) = ctx.saved_tensors  # complains about vertices that were changed in place
+        (vertices,) = ctx.saved_tensors  # raises if vertices were changed in place
         if _is_differentiated(d_terms):
             return _vjp(ctx, vertices, torch.from_numpy(ctx.shares)[:, None] * d_terms), None, None, None
         follow_torch()

@@ -42,6 +42,7 @@ def arguments(template: BodyTemplate, quantity: Quantity) -> tuple[int, str, lis
 
 
 def _handle(template_key: int, full_name: str, options: Sequence[float]) -> _core.Quantity:
+    """The quantity of an op's arguments."""
     return _core.Quantity(by_key(template_key)._core, full_name, options)
 
 
@@ -50,10 +51,9 @@ def _compiled(verb: Callable[..., Any]) -> Callable[..., Any]:
 
     def implementation(*args: Any) -> Any:
         *tensors, template_key, full_name, options = args
-        arrays = [memory(tensor) for tensor in tensors]
         handle = _handle(template_key, full_name, options)
         follow_torch()
-        result = verb(handle, *arrays)
+        result = verb(handle, *map(memory, tensors))
         if isinstance(result, tuple):
             return tuple(torch.from_numpy(array) for array in result)
         return torch.from_numpy(result)
