@@ -66,20 +66,20 @@ def calls() -> dict[str, Callable[[], Callable[[], Any]]]:
 
         body = ip.BodyTemplate(*capsule(40, 40, 4), num_samples=20_000)
         vertices = np.repeat(body.vertices[None].astype(np.float32), count, 0)
-        size = _core.output_size(body._core, quantity, [])
-        d_out = np.ones((count, size), np.float32)
+        asked = _core.Quantity(body._core, quantity, [])
+        d_out = np.ones((count, asked.num_outputs), np.float32)
         over = np.array([[0, 1.0, 0]]), np.zeros(1)
-        return lambda: _core.value_and_vjp(body._core, quantity, [], vertices, *over, d_out)
+        return lambda: asked.value_and_vjp(vertices, *over, d_out)
 
     def terms(count: int) -> Any:
-        from ipman_rs import _core
+        from ipman_rs import quantities
 
         body = ip.BodyTemplate(*capsule(40, 40, 4), num_samples=20_000)
         vertices = np.repeat(body.vertices[None].astype(np.float32), count, 0)
         over = np.array([[0, 1.0, 0]]), np.zeros(1)
-        options = [100.0, 10.0, 0.0, 1.0, 0.15, 10.0, 0.15]
-        name = "terms.stability.pcom.samples.tanh_squared"
-        return lambda: _core.weighted(body._core, name, options, vertices, *over, [1.0, 1.0, 1.0], None, "mean")
+        preset = ip.presets.get("paper-r")
+        asked = quantities.physics_terms(preset, "pcom", "samples", "tanh_squared", "log").of(body)
+        return lambda: asked.weighted(vertices, *over, [1.0, 1.0, 1.0], None, "mean")
 
     def skinning(count: int) -> Any:
         model = ip.load_body("anny-lite")

@@ -54,6 +54,84 @@ class Template:
         """The weights of each sample on its face's vertices, (S, 3)."""
 
 @final
+class Quantity:
+    """A quantity of one template. Its name and its options are read and checked here, once."""
+
+    def __new__(cls, template: Template, name: str, options: Sequence[float]) -> Quantity:
+        """A quantity by its name and its options in their order; `ipman_rs.quantities` makes both."""
+
+    @property
+    def num_outputs(self) -> int:
+        """K: how many numbers the quantity has for one body."""
+
+    def value(
+        self, vertices: NDArray[_Float], normal: NDArray[np.float64], height: NDArray[np.float64]
+    ) -> NDArray[_Float]:
+        """The quantity of each body: vertices (B, V, 3) -> (B, K)."""
+
+    def vjp(
+        self,
+        vertices: NDArray[_Float],
+        normal: NDArray[np.float64],
+        height: NDArray[np.float64],
+        d_out: NDArray[_Float],
+    ) -> NDArray[_Float]:
+        """The gradient of Σ d_out · value by the vertices: d_out (B, K) -> (B, V, 3)."""
+
+    def jvp(
+        self,
+        vertices: NDArray[_Float],
+        normal: NDArray[np.float64],
+        height: NDArray[np.float64],
+        d_vertices: NDArray[_Float],
+    ) -> NDArray[_Float]:
+        """The derivative of the value along d_vertices: (B, V, 3) -> (B, K)."""
+
+    def hvp(
+        self,
+        vertices: NDArray[_Float],
+        normal: NDArray[np.float64],
+        height: NDArray[np.float64],
+        d_out: NDArray[_Float],
+        d_vertices: NDArray[_Float],
+    ) -> NDArray[_Float]:
+        """The derivative of vjp(d_out) along d_vertices, a Hessian-vector product: (B, V, 3)."""
+
+    def value_and_vjp(
+        self,
+        vertices: NDArray[_Float],
+        normal: NDArray[np.float64],
+        height: NDArray[np.float64],
+        d_out: NDArray[_Float],
+    ) -> tuple[NDArray[_Float], NDArray[_Float]]:
+        """The value (B, K) and the gradient of Σ d_out · value (B, V, 3), in one pass."""
+
+    def weighted(
+        self,
+        vertices: NDArray[_Float],
+        normal: NDArray[np.float64],
+        height: NDArray[np.float64],
+        weights: Sequence[float],
+        valid: NDArray[np.bool_] | None,
+        reduction: str,
+    ) -> tuple[NDArray[_Float], NDArray[_Float], NDArray[_Float], NDArray[_Float]]:
+        """(totals, terms, shares, gradient): Σ weight · value, one number or (B,) where the reduction is "none"; the
+        unweighted values (K,) or (B, K); what each body counts for (B,); the gradient of the totals' sum (B, V, 3).
+        """
+
+    def terms(
+        self,
+        vertices: NDArray[_Float],
+        normal: NDArray[np.float64],
+        height: NDArray[np.float64],
+        valid: NDArray[np.bool_] | None,
+        reduction: str,
+    ) -> tuple[NDArray[_Float], NDArray[_Float], NDArray[_Float]]:
+        """(terms, shares, jacobian) of loss terms: the first two as in `weighted`; for each body the gradient of the
+        first term by the vertices, V·3 numbers, then those of pull and of push by the vertices' heights: (B, 5·V).
+        """
+
+@final
 class Collision:
     """All that is known of a template's collisions before a pose."""
 
@@ -137,66 +215,6 @@ class Skin:
     ) -> None:
         """Fills the gradients' derivatives along a direction of the parameters."""
 
-# A quantity is a name and its options; the list is `named` in rust/core/src/registry.rs.
-
-def output_size(template: Template, quantity: str, options: Sequence[float]) -> int:
-    """K: how many numbers the quantity has for one body."""
-
-def value(
-    template: Template,
-    quantity: str,
-    options: Sequence[float],
-    vertices: NDArray[_Float],
-    normal: NDArray[np.float64],
-    height: NDArray[np.float64],
-) -> NDArray[_Float]:
-    """The quantity of each body: vertices (B, V, 3) -> (B, K)."""
-
-def vjp(
-    template: Template,
-    quantity: str,
-    options: Sequence[float],
-    vertices: NDArray[_Float],
-    normal: NDArray[np.float64],
-    height: NDArray[np.float64],
-    d_out: NDArray[_Float],
-) -> NDArray[_Float]:
-    """The gradient of Σ d_out · value by the vertices: d_out (B, K) -> (B, V, 3)."""
-
-def jvp(
-    template: Template,
-    quantity: str,
-    options: Sequence[float],
-    vertices: NDArray[_Float],
-    normal: NDArray[np.float64],
-    height: NDArray[np.float64],
-    d_vertices: NDArray[_Float],
-) -> NDArray[_Float]:
-    """The derivative of the value along d_vertices: (B, V, 3) -> (B, K)."""
-
-def vjp_jvp(
-    template: Template,
-    quantity: str,
-    options: Sequence[float],
-    vertices: NDArray[_Float],
-    normal: NDArray[np.float64],
-    height: NDArray[np.float64],
-    d_out: NDArray[_Float],
-    d_vertices: NDArray[_Float],
-) -> NDArray[_Float]:
-    """The derivative of vjp(d_out) along d_vertices, a Hessian-vector product: (B, V, 3)."""
-
-def value_and_vjp(
-    template: Template,
-    quantity: str,
-    options: Sequence[float],
-    vertices: NDArray[_Float],
-    normal: NDArray[np.float64],
-    height: NDArray[np.float64],
-    d_out: NDArray[_Float],
-) -> tuple[NDArray[_Float], NDArray[_Float]]:
-    """The value (B, K) and the gradient of Σ d_out · value (B, V, 3), in one pass."""
-
 def analysis(
     template: Template,
     method: str,
@@ -253,39 +271,10 @@ def set_num_threads(threads: int | None) -> None:
 def follow_threads(threads: int) -> None:
     """Uses as many threads as torch, unless `set_num_threads` or RAYON_NUM_THREADS say otherwise."""
 
-def weighted(
-    template: Template,
-    quantity: str,
-    options: Sequence[float],
-    vertices: NDArray[_Float],
-    normal: NDArray[np.float64],
-    height: NDArray[np.float64],
-    weights: Sequence[float],
-    valid: NDArray[np.bool_] | None,
-    reduction: str,
-) -> tuple[NDArray[_Float], NDArray[_Float], NDArray[_Float], NDArray[_Float]]:
-    """(totals, terms, shares, gradient): Σ weight · term, one number or (B,) where the reduction is "none"; the
-    unweighted terms (K,) or (B, K); what each body counts for (B,); the gradient of the totals' sum (B, V, 3).
-    """
-
-def terms(
-    template: Template,
-    quantity: str,
-    options: Sequence[float],
-    vertices: NDArray[_Float],
-    normal: NDArray[np.float64],
-    height: NDArray[np.float64],
-    valid: NDArray[np.bool_] | None,
-    reduction: str,
-) -> tuple[NDArray[_Float], NDArray[_Float], NDArray[_Float]]:
-    """(terms, shares, jacobian): the first two as in `weighted`; for each body the gradient of the first term by the
-    vertices, V·3 numbers, then those of pull and of push by the vertices' heights: (B, 5·V).
-    """
-
 def terms_backward(
     jacobian: NDArray[_Float], shares: NDArray[_Float], d_terms: NDArray[_Float], normal: NDArray[np.float64]
 ) -> NDArray[_Float]:
-    """A backward of `terms`: the gradient (B, V, 3) of terms put together by their upstream d_terms, (K,) or (B, K)."""
+    """The gradient (B, V, 3) of what `Quantity.terms` gave, for its terms' upstream d_terms, (K,) or (B, K)."""
 
 def simd_levels() -> list[str]:
     """The CPU levels that this machine has, best first."""

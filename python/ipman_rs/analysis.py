@@ -15,11 +15,11 @@ from ipman_rs.arrays import Bodies, of_each
 from ipman_rs.ground import Ground
 from ipman_rs.jsonable import jsonable
 from ipman_rs.pressure import pressure
+from ipman_rs.quantities import densities
 from ipman_rs.status import Status, status_names
 from ipman_rs.support import BaseOfSupport, nest
 from ipman_rs.template import BodyTemplate
 from ipman_rs.units import warn_odd_size
-from ipman_rs.volume import densities
 
 if TYPE_CHECKING:
     from ipman_rs.body.model import BodyModel

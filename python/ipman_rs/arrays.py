@@ -11,6 +11,7 @@ from ipman_rs.checks import body_template, real_array, single_or_double
 
 if TYPE_CHECKING:
     from ipman_rs.ground import Ground
+    from ipman_rs.quantities import Quantity
     from ipman_rs.template import BodyTemplate
 
 
@@ -48,12 +49,10 @@ class Bodies:
         batch = len(self.vertices)
         return self.vertices, normal.reshape(batch, 3).copy(), height.reshape(batch).copy()
 
-    def evaluate(self, quantity: str, options: list[float], ground: Ground, *shape: int) -> NDArray[Any]:
-        """The quantity of each body, (..., *shape)."""
-        from ipman_rs import _core
-
-        rows = _core.value(self.template._core, quantity, options, *self.over(ground))
-        return self.unfold(rows, *shape)
+    def evaluate(self, quantity: Quantity, ground: Ground) -> NDArray[Any]:
+        """The quantity of each body, (..., *quantity.shape)."""
+        rows = quantity.of(self.template).value(*self.over(ground))
+        return rows.reshape((*self.shape, *quantity.shape))[()]
 
     def unfold(self, rows: NDArray[Any], *shape: int) -> Any:
         """Rows (B, …) as (..., *shape); a plain number where that is no dimension at all."""

@@ -96,3 +96,7 @@ class Ground:
         normal = self.normal if self.normal.ndim == 1 else self.normal[..., None, :]
         height = self.height if self.height.ndim == 0 else self.height[..., None]
         return normal, height
+
+
+ANYWHERE = Ground()
+"""For quantities that do not depend on the ground."""

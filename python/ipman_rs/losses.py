@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 from numpy.typing import ArrayLike, NDArray
 
+from ipman_rs import quantities
 from ipman_rs.arrays import Bodies
-from ipman_rs.checks import choice, not_negative, positive
 from ipman_rs.ground import Ground
-from ipman_rs.mass import Method
+from ipman_rs.quantities import Curve, Method, Points, Wrap
 from ipman_rs.template import BodyTemplate
-
-Points = Literal["samples", "vertices"]
-Curve = Literal["tanh_squared", "tanh_of_square"]
-Wrap = Literal["log", "saturate", "none"]
 
 
 def stability_loss(
@@ -29,10 +25,12 @@ def stability_loss(
     """L_stability = ‖g(m̄) − g(s̄)‖₂ (Eq. 4), (...,) m: centre of mass to centre of pressure, on the ground.
 
     vertices (..., V, 3) m; alpha, gamma, epsilon as in `center_of_pressure`; method as in `center_of_mass`.
+
+    Raises:
+        ValueError: wrong shapes, a ground that does not fit the batch, an option out of its range, or unknown method.
+        TypeError: an argument of the wrong kind, or masked vertices.
     """
-    options = [not_negative("alpha", alpha), not_negative("gamma", gamma), not_negative("epsilon", epsilon)]
-    quantity = f"stability_loss.{choice('method', method, Method)}"
-    return Bodies(vertices, template).evaluate(quantity, options, ground)
+    return Bodies(vertices, template).evaluate(quantities.stability_loss(alpha, gamma, epsilon, method), ground)
 
 
 def ground_loss(
@@ -54,11 +52,13 @@ def ground_loss(
         alpha1, beta1: weights; alpha2, beta2: widths, m.
         points: the surface samples or the mesh's vertices.
         curve: (tanh x)², the paper's, or tanh(x²).
+
+    Raises:
+        ValueError: wrong shapes, a ground that does not fit the batch, an option out of its range, or an unknown word.
+        TypeError: an argument of the wrong kind, or masked vertices.
     """
-    pull = [not_negative("alpha1", alpha1), positive("alpha2", alpha2)]
-    push = [not_negative("beta1", beta1), positive("beta2", beta2)]
-    quantity = f"ground_loss.{choice('points', points, Points)}.{choice('curve', curve, Curve)}"
-    both = Bodies(vertices, template).evaluate(quantity, pull + push, ground, 2)
+    quantity = quantities.ground_loss(alpha1, alpha2, beta1, beta2, points, curve)
+    both = Bodies(vertices, template).evaluate(quantity, ground)
     return both[..., 0][()], both[..., 1][()]
 
 
@@ -77,7 +77,9 @@ def balance_cost(
     A term of our own beside the paper's stability loss: J = min_w KL(w‖p) over weights w whose centre lies under the
     centre of mass, p the pressure distribution, supports blurred by sigma metres. Unlike the paper's norm it does not
     assume how separate supports share the load. `wrap`: log(1 + J), J/(1 + J) where bodies may be falling, or J.
+
+    Raises:
+        ValueError: wrong shapes, a ground that does not fit the batch, an option out of its range, or an unknown word.
+        TypeError: an argument of the wrong kind, or masked vertices.
     """
-    options = [not_negative("alpha", alpha), not_negative("gamma", gamma), positive("sigma", sigma)]
-    quantity = f"balance_cost.{choice('wrap', wrap, Wrap)}.{choice('method', method, Method)}"
-    return Bodies(vertices, template).evaluate(quantity, options, ground)
+    return Bodies(vertices, template).evaluate(quantities.balance_cost(alpha, gamma, sigma, wrap, method), ground)

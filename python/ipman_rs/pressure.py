@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ipman_rs import quantities
 from ipman_rs.arrays import Bodies
-from ipman_rs.checks import not_negative, positive
+from ipman_rs.checks import positive
 from ipman_rs.ground import Ground
 from ipman_rs.sampling import sample_surface
 from ipman_rs.template import BodyTemplate
@@ -20,9 +21,12 @@ def pressure(
     """ρ = 1 − αh below the ground, e^(−γh) from the ground up (Eq. 2), of each sample: (..., S), no unit.
 
     vertices (..., V, 3) m; alpha, gamma in 1/m.
+
+    Raises:
+        ValueError: wrong shapes, a ground that does not fit the batch, or a negative or infinite alpha or gamma.
+        TypeError: an argument of the wrong kind, or masked vertices.
     """
-    options = [not_negative("alpha", alpha), not_negative("gamma", gamma)]
-    return Bodies(vertices, template).evaluate("pressure", options, ground, template.num_samples)
+    return Bodies(vertices, template).evaluate(quantities.pressure(alpha, gamma, template), ground)
 
 
 def center_of_pressure(
@@ -36,9 +40,12 @@ def center_of_pressure(
     """s̄ = Σ ρ v / (Σ ρ + epsilon) (Eq. 3), (..., 3) m; finite for hovering bodies.
 
     epsilon: 0 in the paper, 1e-6 in the released code.
+
+    Raises:
+        ValueError: wrong shapes, a ground that does not fit the batch, or a negative or infinite option.
+        TypeError: an argument of the wrong kind, or masked vertices.
     """
-    options = [not_negative("alpha", alpha), not_negative("gamma", gamma), not_negative("epsilon", epsilon)]
-    return Bodies(vertices, template).evaluate("center_of_pressure", options, ground, 3)
+    return Bodies(vertices, template).evaluate(quantities.center_of_pressure(alpha, gamma, epsilon), ground)
 
 
 def binary_center_of_pressure(
@@ -49,6 +56,10 @@ def binary_center_of_pressure(
 
     The naive alternative that the paper's supplement draws beside its own (Fig. S.3). vertices (..., V, 3) m; threshold
     τ, m.
+
+    Raises:
+        ValueError: wrong shapes, a ground that does not fit the batch, or a threshold that is not positive.
+        TypeError: an argument of the wrong kind, or masked vertices.
     """
     metres = positive("threshold", threshold)
     Bodies(vertices, template).over(ground)  # that they fit together

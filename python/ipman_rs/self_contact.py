@@ -42,6 +42,10 @@ def self_penetration(vertices: ArrayLike, template: BodyTemplate, geodesic: floa
 
     Args:
         geodesic: surface nearer than this to a vertex, in metres along the template, is not another part.
+
+    Raises:
+        ValueError: wrong shapes, or a negative or infinite geodesic.
+        TypeError: an argument of the wrong kind, or masked vertices.
     """
     bodies = Bodies(vertices, template)
     rows = collision(bodies.template, not_negative("geodesic", geodesic)).depths(bodies.vertices)
@@ -64,6 +68,7 @@ def self_contact_distance(
 
     Raises:
         ValueError: wrong shapes, or a negative or infinite distance.
+        TypeError: an argument of the wrong kind, or masked vertices.
     """
     bodies = Bodies(vertices, template)
     tables = collision(bodies.template, not_negative("geodesic", geodesic))
@@ -88,6 +93,10 @@ def self_contact_loss(
         vertices: (..., V, 3) m.
         push_width, pull_width, near: m.
         geodesic: as in `self_penetration`.
+
+    Raises:
+        ValueError: wrong shapes, or an option out of its range.
+        TypeError: an argument of the wrong kind, or masked vertices.
     """
     bodies = Bodies(vertices, template)
     options = checked(push_width, pull_width, pull_weight, near)

@@ -8,14 +8,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs import _core
+from ipman_rs import _core, quantities
 from ipman_rs.arrays import Bodies, of_each
-from ipman_rs.checks import choice, positive
+from ipman_rs.checks import choice
 from ipman_rs.ground import Ground
-from ipman_rs.mass import Method
+from ipman_rs.quantities import Contact, Method
 from ipman_rs.template import BodyTemplate
 
-Contact = Literal["paper", "released"]
 Solver = Literal["hull", "lp"]
 
 
@@ -54,11 +53,15 @@ def base_of_support(
         threshold: τ, m. A sample touches the ground when |h| < τ (`contact="paper"`); with `contact="released"`, as the
             authors' code has it, when h < τ, and ten contacts or fewer count as none.
         method: the centre of mass whose margin is taken.
+
+    Raises:
+        ValueError: wrong shapes, a ground that does not fit the batch, a threshold that is not positive, or an unknown
+            method or contact.
+        TypeError: an argument of the wrong kind, or masked vertices.
     """
     bodies = Bodies(vertices, template)
-    question = _question(contact, method, "method", threshold)
-    found = _core.base_of_support(template._core, *question, *bodies.over(ground))
-    corners, counts, area, margin, num_contacts = found
+    options = quantities.support(threshold, method, contact)
+    corners, counts, area, margin, num_contacts = _core.base_of_support(template._core, *options, *bodies.over(ground))
     dtype = bodies.vertices.dtype
     return BaseOfSupport(
         polygon=nest(of_each(corners.astype(dtype, copy=False), counts), bodies.shape),
@@ -79,10 +82,12 @@ def support_margin(
     contact: Contact = "paper",
 ) -> NDArray[Any]:
     """Metres from the centre of mass to the boundary of the base of support, (...,): positive inside, −inf without
-    contact. A hull of zero area (one or two points, a line) has no inside: minus the distance to it."""
-    rule, method_name, metres = _question(contact, method, "method", threshold)
-    quantity = f"support_margin.{rule}.{method_name}"
-    return Bodies(vertices, template).evaluate(quantity, [metres], ground)
+    contact. A hull of zero area (one or two points, a line) has no inside: minus the distance to it.
+
+    Raises:
+        As `base_of_support`.
+    """
+    return Bodies(vertices, template).evaluate(quantities.support_margin(threshold, method, contact), ground)
 
 
 def bose(
@@ -97,21 +102,15 @@ def bose(
     """The paper's BoSE (Eq. 10) for each body, (...,) bool: does the centre of mass lie over the base of support?
 
     `hull` tests the convex hull; `lp` solves the paper's linear programme. They agree wherever |margin| > 1e-9 m.
+
+    Raises:
+        As `base_of_support`; ValueError also for an unknown method.
     """
     if choice("method", method, Solver) == "hull":
         return base_of_support(vertices, template, ground, threshold, com_method, contact).inside
     bodies = Bodies(vertices, template)
-    question = _question(contact, com_method, "com_method", threshold)
-    return bodies.unfold(_core.bose_lp(template._core, *question, *bodies.over(ground)))
-
-
-def _question(contact: Contact, method: Method, name: str, threshold: float) -> tuple[str, str, float]:
-    """The checked options of every question about the support."""
-    return (
-        choice("contact", contact, Contact),
-        choice(name, method, Method),
-        positive("threshold", threshold),
-    )
+    options = quantities.support(threshold, com_method, contact, name="com_method")
+    return bodies.unfold(_core.bose_lp(template._core, *options, *bodies.over(ground)))
 
 
 def nest(items: list[Any], shape: tuple[int, ...]) -> Any:

@@ -63,6 +63,7 @@ class BodyTemplate:
         self._seed = whole("seed", seed, 0, 2**64 - 1)
         self._core = _core.Template(self.vertices, self.faces, self.face_parts, samples, self._seed)
         self._collisions: dict[float, _core.Collision] = {}
+        self._quantities: dict[tuple[Any, ...], _core.Quantity] = {}  # the latest: see `Quantity.of`
         self.part_names = _names(part_names, self.num_parts)
         for array in (self.vertices, self.faces, self.face_parts):
             array.setflags(write=False)

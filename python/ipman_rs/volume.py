@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ipman_rs import quantities
 from ipman_rs.arrays import Bodies
-from ipman_rs.checks import LARGEST, SMALLEST, body_template, real_array
-from ipman_rs.ground import Ground
+from ipman_rs.ground import ANYWHERE
 from ipman_rs.template import BodyTemplate
-
-_ANYWHERE = Ground()
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +27,13 @@ class MassProperties:
 
 
 def part_volumes(vertices: ArrayLike, template: BodyTemplate) -> NDArray[Any]:
-    """vol^P, the volume of each closed part (paper, section 3.2), (..., P) m³. vertices (..., V, 3) m."""
-    return Bodies(vertices, template).evaluate("part_volumes", [], _ANYWHERE, template.num_parts)
+    """vol^P, the volume of each closed part (paper, section 3.2), (..., P) m³. vertices (..., V, 3) m.
+
+    Raises:
+        ValueError: wrong shape.
+        TypeError: an argument of the wrong kind, or masked vertices.
+    """
+    return Bodies(vertices, template).evaluate(quantities.part_volumes(template), ANYWHERE)
 
 
 def mass_properties(vertices: ArrayLike, template: BodyTemplate, density: ArrayLike = 985.0) -> MassProperties:
@@ -40,23 +42,13 @@ def mass_properties(vertices: ArrayLike, template: BodyTemplate, density: ArrayL
     Args:
         vertices: (..., V, 3) m.
         density: kg/m³, one for all parts or (P,).
+
+    Raises:
+        ValueError: wrong shapes, or a density that is not positive.
+        TypeError: an argument of the wrong kind, or masked arrays.
     """
-    rows = Bodies(vertices, template).evaluate(
-        "mass_properties", densities(density, template), _ANYWHERE, 1 + template.num_parts, 14
-    )
+    rows = Bodies(vertices, template).evaluate(quantities.mass_properties(density, template), ANYWHERE)
     return unpack_mass_properties(rows)
-
-
-def densities(density: ArrayLike, template: BodyTemplate) -> list[float]:
-    """One density or one a part, checked."""
-    body_template(template)
-    with np.errstate(over="ignore"):
-        values = real_array("density", density).astype(np.float64)
-    if values.shape not in {(), (1,), (template.num_parts,)}:
-        raise ValueError(f"density: expected one number or ({template.num_parts},), got {values.shape}")
-    if not ((values >= SMALLEST).all() and (values <= LARGEST).all()):
-        raise ValueError("density: expected positive kg/m³")
-    return [float(value) for value in values.reshape(-1)]
 
 
 def unpack_mass_properties(rows: Any) -> MassProperties:

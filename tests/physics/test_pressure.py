@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import ipman_rs as ip
-from ipman_rs import _core
+from ipman_rs import quantities
 from tests.helpers import oracles, solids
 
 SLOPE = np.array([0.2, 1.0, -0.1]) / np.linalg.norm([0.2, 1.0, -0.1])
@@ -112,15 +112,8 @@ def test_the_branch_at_the_kink_is_the_upper_one():
     assert (ip.pressure(template.vertices, template, ip.Ground())[below] == 1.0).all()
     up = np.zeros_like(template.vertices)
     up[:, 1] = 1.0
-    slope = _core.jvp(
-        template._core,
-        "pressure",
-        [100.0, 10.0],
-        template.vertices[None],
-        np.array([[0.0, 1, 0]]),
-        np.zeros(1),
-        up[None],
-    )
+    quantity = quantities.pressure(100.0, 10.0, template).of(template)
+    slope = quantity.jvp(template.vertices[None], np.array([[0.0, 1, 0]]), np.zeros(1), up[None])
     np.testing.assert_allclose(slope[0, below], -10.0, rtol=1e-12)
 
 

@@ -176,7 +176,7 @@ def test_threads_follow_torch():
         "ip.balance_cost(huge, template, ground)",
         "ip.bose(huge, template, ground, method='lp')",
         "ip.base_of_support(huge, template, ground)",
-        "ip._core.value_and_vjp(template._core, 'balance_cost.log.pcom', [100.0, 50.0, 0.02], *grounded, d_out)",
+        "ip.quantities.balance_cost(100.0, 50.0, 0.02, 'log', 'pcom').of(template).value_and_vjp(*grounded, d_out)",
     ],
 )
 @pytest.mark.parametrize("threads", [1, 2])

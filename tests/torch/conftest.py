@@ -14,6 +14,8 @@ import trimesh
 
 import ipman_rs as ip
 import ipman_rs.torch as ipt
+from ipman_rs import _core
+from ipman_rs.quantities import Quantity
 from ipman_rs.torch.dispatch import evaluate
 from tests.helpers import model_arrays
 
@@ -23,7 +25,7 @@ GROUND_TERMS = tuple(itertools.product(("samples", "vertices"), ("tanh_squared",
 
 @dataclass(frozen=True)
 class Case:
-    """A quantity by name with its options: K numbers a body."""
+    """A quantity by its full name with its options: K numbers a body."""
 
     quantity: str
     options: tuple[float, ...] = ()
@@ -33,11 +35,16 @@ class Case:
 
     def __call__(self, vertices: torch.Tensor, body: Body) -> torch.Tensor:
         """(..., V, 3) -> (..., K), along whichever path is in force."""
-        return evaluate(vertices, body.template, body.ground, self.quantity, self.options, (self.size(body),))
+        return evaluate(vertices, body.template, body.ground, self.on(body))
+
+    def on(self, body: Body) -> Quantity:
+        """The quantity, its K numbers in a row."""
+        name, *modes = self.quantity.split(".")
+        return Quantity(name, tuple(modes), self.options, (self.size(body),))
 
     def size(self, body: Body) -> int:
         """K."""
-        return ipt.ops.output_size(body.template._key, self.quantity, self.options)
+        return _core.Quantity(body.template._core, self.quantity, self.options).num_outputs
 
     def reference(self, vertices: torch.Tensor, body: Body) -> torch.Tensor:
         with ipt.dispatch._reference_path():

@@ -29,10 +29,10 @@ def test_compile_fullgraph(room, tiny, path):
     """One graph, forward and backward, on both paths. The backend is the tracer alone: no C++ compiler is needed."""
     forced = ipt.dispatch._reference_path
 
-    size = room.size(tiny)
+    quantity = room.on(tiny)
 
     def f(v):
-        return evaluate(v, tiny.template, tiny.ground, room.quantity, room.options, (size,))
+        return evaluate(v, tiny.template, tiny.ground, quantity)
 
     with forced() if path == "reference" else pytest.MonkeyPatch.context():
         expected, slope = f(tiny.vertices), gradient_of(f, tiny.vertices)
@@ -80,12 +80,12 @@ def test_compile_inductor(tiny):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("verb", ["value", "vjp", "jvp", "vjp_jvp", "value_and_vjp"])
+@pytest.mark.parametrize("verb", ["value", "vjp", "jvp", "hvp", "value_and_vjp"])
 def test_opcheck(room, tiny, verb):
     vertices, batch = tiny.vertices, len(tiny.vertices)
     normal, height = tiny.ground.normal.expand(batch, 3), tiny.ground.height.expand(batch)
     d_out = torch.randn(batch, room.size(tiny), dtype=torch.float64)
-    more = {"vjp": [d_out], "jvp": [vertices], "vjp_jvp": [d_out, vertices], "value_and_vjp": [d_out]}.get(verb, [])
+    more = {"vjp": [d_out], "jvp": [vertices], "hvp": [d_out, vertices], "value_and_vjp": [d_out]}.get(verb, [])
     arguments = (vertices, normal, height, *more, tiny.template._key, room.quantity, list(room.options))
     torch.library.opcheck(getattr(torch.ops.ipman_rs, verb).default, arguments)
 

@@ -8,6 +8,7 @@ import torch
 import trimesh
 
 import ipman_rs as ip
+from ipman_rs.quantities import Quantity
 from ipman_rs.torch import reference
 from ipman_rs.torch.reference.topology import boundary_half_edges, topology
 
@@ -63,4 +64,4 @@ def test_index_tensors_are_built_once_and_outside_of_transforms(tiny):
 
 def test_wrong_quantity_is_no_silent_default(tiny):
     with pytest.raises(KeyError):
-        reference.evaluate(tiny.template, "weight", (), tiny.vertices, *[None, None])
+        reference.evaluate(tiny.template, Quantity("weight"), tiny.vertices, *[None, None])

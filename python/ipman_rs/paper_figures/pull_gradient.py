@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ipman_rs as ip
-from ipman_rs import _core, view
+from ipman_rs import quantities, view
 from ipman_rs.arrays import Bodies
 from ipman_rs.checks import positive
 from ipman_rs.view import cells, colors
@@ -94,12 +94,12 @@ def engine_curve(
     sheet = ip.BodyTemplate(corners, faces)
     sheets = np.repeat(corners[None], len(heights), axis=0)
     sheets[..., 1] = np.asarray(heights, float)[:, None]
+    quantity = quantities.ground_loss(alpha1, alpha2, beta1, beta2, "samples", "tanh_squared").of(sheet)
     found = []
     for term in np.eye(2):
         arguments = Bodies(sheets, sheet).over(ip.Ground.y_up())
         asked = np.tile(term, (len(heights), 1))
-        quantity, options = "ground_loss.samples.tanh_squared", [alpha1, alpha2, beta1, beta2]
-        values, gradients = _core.value_and_vjp(sheet._core, quantity, options, *arguments, asked)
+        values, gradients = quantity.value_and_vjp(*arguments, asked)
         found.append((values @ term, gradients[..., 1].sum(axis=1)))
     return found[0], found[1]
 

@@ -18,9 +18,9 @@ from ipman_rs import _core
 from ipman_rs.arrays import Bodies, of_each
 from ipman_rs.checks import choice, not_negative, number, positive, whole
 from ipman_rs.ground import Ground
+from ipman_rs.quantities import densities
 from ipman_rs.status import Status
 from ipman_rs.template import BodyTemplate
-from ipman_rs.volume import densities
 
 from .cross_check import each_drop
 from .drop import Drop

@@ -22,8 +22,8 @@ from ipman_rs import _core
 from ipman_rs.arrays import Bodies
 from ipman_rs.checks import not_negative, positive
 from ipman_rs.ground import Ground
+from ipman_rs.quantities import densities
 from ipman_rs.template import BodyTemplate
-from ipman_rs.volume import densities
 
 from .solids import CONTACT, Solids
 

@@ -1,10 +1,10 @@
-"""Derivatives of the ops: who calls which verb in reverse, forward and second order, eager and compiled.
+"""Derivatives of the ops: which op implements which derivative, eager and compiled.
 
     out = f(V)          reverse: vjp(V, d_out)                forward: jvp(V, d_vertices)
-    g = vjp(V, d_out)   reverse: jvp and vjp_jvp              forward: vjp_jvp + vjp
-    t = jvp(V, d_V)     reverse: vjp_jvp and vjp
+    g = vjp(V, d_out)   reverse: jvp and hvp                  forward: hvp + vjp
+    t = jvp(V, d_V)     reverse: hvp and vjp
 
-The Hessian of Σ d_out · out is symmetric, so vjp_jvp serves both modes. Third derivatives are refused. Dynamo takes no
+The Hessian of Σ d_out · out is symmetric, so hvp serves both modes. Third derivatives are refused. Dynamo takes no
 Function that defines `jvp`, so compiled code gets classes of its own, differentiable once.
 """
 
@@ -23,17 +23,17 @@ THIRD = "third derivatives (and forward over forward) are not implemented; use j
 
 
 class _Op(Function):
-    """What the eager Functions share. Inputs: tensors, then (template, quantity, options).
+    """What the eager Functions share. Inputs: tensors, then (template, quantity).
 
     The template itself travels, not its key, so that it lives until the backward.
     """
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
-        *tensors, template, quantity, options = inputs
+        *tensors, template, quantity = inputs
         ctx.save_for_backward(*tensors)
         ctx.save_for_forward(*tensors)
-        ctx.quantity = (template, quantity, options)
+        ctx.quantity = (template, quantity)
 
     @classmethod
     def vmap(cls, info: Any, in_dims: Sequence[int | None], *args: Any) -> tuple[Tensor, int]:
@@ -45,12 +45,12 @@ class Value(_Op):
 
     @staticmethod
     def forward(*args: Any) -> Tensor:
-        *tensors, template, quantity, options = args
-        return ops.value(*tensors, template._key, quantity, options)
+        *tensors, template, quantity = args
+        return ops.value(*tensors, *ops.arguments(template, quantity))
 
     @staticmethod
     def backward(ctx: Any, d_out: Tensor) -> tuple[Tensor | None, ...]:
-        return Vjp.apply(*ctx.saved_tensors, d_out, *ctx.quantity), None, None, None, None, None
+        return Vjp.apply(*ctx.saved_tensors, d_out, *ctx.quantity), None, None, None, None
 
     @staticmethod
     def jvp(ctx: Any, d_vertices: Tensor, *_: Any) -> Tensor:
@@ -62,20 +62,20 @@ class Vjp(_Op):
 
     @staticmethod
     def forward(*args: Any) -> Tensor:
-        *tensors, template, quantity, options = args
-        return ops.vjp(*tensors, template._key, quantity, options)
+        *tensors, template, quantity = args
+        return ops.vjp(*tensors, *ops.arguments(template, quantity))
 
     @staticmethod
     def backward(ctx: Any, d_gradient: Tensor) -> tuple[Tensor | None, ...]:
         vertices, normal, height, d_out = ctx.saved_tensors
-        hessian_product = VjpJvp.apply(vertices, normal, height, d_out, d_gradient, *ctx.quantity)
+        hessian_product = Hvp.apply(vertices, normal, height, d_out, d_gradient, *ctx.quantity)
         d_d_out = Jvp.apply(vertices, normal, height, d_gradient, *ctx.quantity)
-        return hessian_product, None, None, d_d_out, None, None, None
+        return hessian_product, None, None, d_d_out, None, None
 
     @staticmethod
     def jvp(ctx: Any, d_vertices: Tensor, _normal: Any, _height: Any, d_d_out: Tensor, *_: Any) -> Tensor:
         vertices, normal, height, d_out = ctx.saved_tensors
-        along_vertices = VjpJvp.apply(vertices, normal, height, d_out, d_vertices, *ctx.quantity)
+        along_vertices = Hvp.apply(vertices, normal, height, d_out, d_vertices, *ctx.quantity)
         return along_vertices + Vjp.apply(vertices, normal, height, d_d_out, *ctx.quantity)
 
 
@@ -84,27 +84,27 @@ class Jvp(_Op):
 
     @staticmethod
     def forward(*args: Any) -> Tensor:
-        *tensors, template, quantity, options = args
-        return ops.jvp(*tensors, template._key, quantity, options)
+        *tensors, template, quantity = args
+        return ops.jvp(*tensors, *ops.arguments(template, quantity))
 
     @staticmethod
     def backward(ctx: Any, d_out: Tensor) -> tuple[Tensor | None, ...]:
         vertices, normal, height, d_vertices = ctx.saved_tensors
-        hessian_product = VjpJvp.apply(vertices, normal, height, d_out, d_vertices, *ctx.quantity)
-        return hessian_product, None, None, Vjp.apply(vertices, normal, height, d_out, *ctx.quantity), None, None, None
+        hessian_product = Hvp.apply(vertices, normal, height, d_out, d_vertices, *ctx.quantity)
+        return hessian_product, None, None, Vjp.apply(vertices, normal, height, d_out, *ctx.quantity), None, None
 
     @staticmethod
     def jvp(ctx: Any, *_: Any) -> Tensor:
         raise NotImplementedError(THIRD)
 
 
-class VjpJvp(_Op):
+class Hvp(_Op):
     """vertices, normal, height, d_out, d_vertices -> Hessian of d_out · f times d_vertices (B, V, 3)."""
 
     @staticmethod
     def forward(*args: Any) -> Tensor:
-        *tensors, template, quantity, options = args
-        return ops.vjp_jvp(*tensors, template._key, quantity, options)
+        *tensors, template, quantity = args
+        return ops.hvp(*tensors, *ops.arguments(template, quantity))
 
     @staticmethod
     def backward(ctx: Any, *_: Any) -> Any:
@@ -120,11 +120,11 @@ class CompiledValue(Function):
 
     @staticmethod
     def forward(
-        ctx: Any, vertices: Tensor, normal: Tensor, height: Tensor, key: int, quantity: str, options: list[float]
+        ctx: Any, vertices: Tensor, normal: Tensor, height: Tensor, key: int, name: str, options: list[float]
     ) -> Tensor:
         ctx.save_for_backward(vertices, normal, height)
-        ctx.quantity = (key, quantity, options)
-        return ops.value(vertices, normal, height, key, quantity, options)
+        ctx.quantity = (key, name, options)
+        return ops.value(vertices, normal, height, key, name, options)
 
     @staticmethod
     def backward(ctx: Any, d_out: Tensor) -> tuple[Tensor | None, ...]:
@@ -145,10 +145,10 @@ class CompiledWeighted(Function):
         height: Tensor,
         weights: Tensor,
         key: int,
-        quantity: str,
+        name: str,
         options: list[float],
     ) -> tuple[Tensor, Tensor]:
-        values, gradient = ops.value_and_vjp(vertices, normal, height, weights, key, quantity, options)
+        values, gradient = ops.value_and_vjp(vertices, normal, height, weights, key, name, options)
         ctx.save_for_backward(gradient)
         ctx.mark_non_differentiable(values)
         return (values * weights).sum(dim=-1), values

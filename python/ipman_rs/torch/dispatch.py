@@ -7,7 +7,7 @@ plain-torch reference.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -17,13 +17,14 @@ from torch import Tensor
 from ipman_rs import Ground as NumpyGround
 from ipman_rs.checks import body_template
 
-from . import device, reference
+from . import device, ops, reference
 from .arrays import dense, single_or_double
 from .autograd import CompiledValue, CompiledWeighted, Value
 from .ground import Ground, as_ground
 
 if TYPE_CHECKING:
     from ipman_rs import BodyTemplate
+    from ipman_rs.quantities import Quantity
 
 _forced: Literal["reference", "device"] | None = None
 
@@ -111,49 +112,45 @@ def bodies(vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGroun
 
 
 def evaluate(
-    vertices: Tensor,
-    template: BodyTemplate,
-    ground: Ground | NumpyGround | None,
-    quantity: str,
-    options: Sequence[float],
-    shape: tuple[int, ...],
+    vertices: Tensor, template: BodyTemplate, ground: Ground | NumpyGround | None, quantity: Quantity
 ) -> Tensor:
-    """`quantity` of vertices (..., V, 3) as (..., *shape), in the dtype of vertices, differentiable in vertices."""
+    """`quantity` of vertices (..., V, 3): (..., *quantity.shape) in their dtype, differentiable in vertices.
+
+    Raises as `check`.
+    """
     batch = bodies(vertices, template, ground)
-    values = values_of(batch, template, quantity, options).reshape((*batch.batch_shape, *shape))
+    values = values_of(batch, template, quantity).reshape((*batch.batch_shape, *quantity.shape))
     return values if values.dtype == vertices.dtype else values.to(vertices.dtype)
 
 
-def values_of(batch: Bodies, template: BodyTemplate, quantity: str, options: Sequence[float]) -> Tensor:
+def values_of(batch: Bodies, template: BodyTemplate, quantity: Quantity) -> Tensor:
     """`quantity` of a checked batch: (B, K)."""
-    numbers = [float(option) for option in options]
     vertices = batch.vertices
     if _on_device(quantity, vertices):
-        return device.values(template, quantity, numbers, vertices, batch.normal, batch.height)
+        return device.values(template, quantity, vertices, batch.normal, batch.height)
     if _on_reference(vertices):
-        normal, height = batch.normal.to(vertices), batch.height.to(vertices)
-        return reference.evaluate(template, quantity, numbers, vertices, normal, height)
+        return reference.evaluate(template, quantity, vertices, batch.normal.to(vertices), batch.height.to(vertices))
     normal, height = _for_core(batch)
     if torch.compiler.is_compiling():
-        return CompiledValue.apply(vertices, normal, height, template._key, quantity, numbers)
-    return Value.apply(vertices, normal, height, template, quantity, numbers)
+        return CompiledValue.apply(vertices, normal, height, *ops.arguments(template, quantity))
+    return Value.apply(vertices, normal, height, template, quantity)
 
 
 def weighted_values_of(
-    batch: Bodies, template: BodyTemplate, quantity: str, options: Sequence[float], weights: Tensor
+    batch: Bodies, template: BodyTemplate, quantity: Quantity, weights: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Σ_k weights (B, K) · values (B,), differentiable, and the values (B, K), detached.
 
     On devices and in compiled code a gradient that will be asked for is computed in the same pass; eager code on the
-    CPU has `one_pass.py` for that.
+    CPU has `fused_loss.py` for that.
     """
-    vertices, numbers = batch.vertices, [float(option) for option in options]
+    vertices = batch.vertices
     wants_gradient = vertices.requires_grad and torch.is_grad_enabled()
     if wants_gradient and _on_device(quantity, vertices):
-        return device.weighted(template, quantity, numbers, vertices, batch.normal, batch.height, weights)
+        return device.weighted(template, quantity, vertices, batch.normal, batch.height, weights)
     if wants_gradient and torch.compiler.is_compiling() and not _on_reference(vertices):
-        return CompiledWeighted.apply(vertices, *_for_core(batch), weights, template._key, quantity, numbers)
-    values = values_of(batch, template, quantity, numbers)
+        return CompiledWeighted.apply(vertices, *_for_core(batch), weights, *ops.arguments(template, quantity))
+    values = values_of(batch, template, quantity)
     return (values * weights).sum(dim=-1), values.detach()
 
 
@@ -161,7 +158,7 @@ def _on_reference(vertices: Tensor) -> bool:
     return _forced is not None or vertices.device.type != "cpu"
 
 
-def _on_device(quantity: str, vertices: Tensor) -> bool:
+def _on_device(quantity: Quantity, vertices: Tensor) -> bool:
     return _on_reference(vertices) and _forced != "reference" and device.covers(quantity, vertices)
 
 

@@ -1,14 +1,12 @@
-"""The terms a body: stability, ground, balance. Unreduced; IntuitivePhysicsLoss reduces and weighs them."""
+"""The loss terms of each body: stability, ground, balance. Unreduced; IntuitivePhysicsLoss reduces and weighs them."""
 
 from __future__ import annotations
 
 from torch import Tensor
 
-from ipman_rs import BodyTemplate
+from ipman_rs import BodyTemplate, quantities
 from ipman_rs import Ground as NumpyGround
-from ipman_rs.checks import choice, not_negative, positive
-from ipman_rs.losses import Curve, Points, Wrap
-from ipman_rs.mass import Method
+from ipman_rs.quantities import Curve, Method, Points, Wrap
 
 from .dispatch import evaluate
 from .ground import Ground
@@ -23,10 +21,13 @@ def stability_loss(
     epsilon: float = 0.0,
     method: Method = "pcom",
 ) -> Tensor:
-    """‖g(CoM) − g(CoP)‖ (Eq. 4): vertices (..., V, 3) -> (...), m; gradient 0 where they coincide."""
-    quantity = f"stability_loss.{choice('method', method, Method)}"
-    options = (not_negative("alpha", alpha), not_negative("gamma", gamma), not_negative("epsilon", epsilon))
-    return evaluate(vertices, template, ground, quantity, options, ())
+    """‖g(CoM) − g(CoP)‖ (Eq. 4): vertices (..., V, 3) -> (...), m; gradient 0 where they coincide.
+
+    Raises:
+        ValueError: wrong shapes, a ground that does not fit the batch, an option out of its range, or an unknown word.
+        TypeError: vertices is no ordinary floating-point tensor, or an argument is of the wrong kind.
+    """
+    return evaluate(vertices, template, ground, quantities.stability_loss(alpha, gamma, epsilon, method))
 
 
 def ground_loss(
@@ -44,12 +45,13 @@ def ground_loss(
     β1 T(h/β2) where h < 0 (Eq. 7).
 
     points: "samples" or "vertices"; curve: "tanh_squared" (tanh x)² or "tanh_of_square" tanh(x²).
+
+    Raises:
+        ValueError: wrong shapes, a ground that does not fit the batch, an option out of its range, or an unknown word.
+        TypeError: vertices is no ordinary floating-point tensor, or an argument is of the wrong kind.
     """
-    quantity = f"ground_loss.{choice('points', points, Points)}.{choice('curve', curve, Curve)}"
-    pull_options = (not_negative("alpha1", alpha1), positive("alpha2", alpha2))
-    push_options = (not_negative("beta1", beta1), positive("beta2", beta2))
-    options = (*pull_options, *push_options)
-    pull, push = evaluate(vertices, template, ground, quantity, options, (2,)).unbind(dim=-1)
+    quantity = quantities.ground_loss(alpha1, alpha2, beta1, beta2, points, curve)
+    pull, push = evaluate(vertices, template, ground, quantity).unbind(dim=-1)
     return pull, push
 
 
@@ -66,7 +68,9 @@ def balance_cost(
     """How implausible a redistribution of load over the supports balance needs: vertices (..., V, 3) -> (...), nats.
 
     wrap: "log" log(1 + J), "saturate" J/(1 + J), or "none". A term of this project, not the paper's.
+
+    Raises:
+        ValueError: wrong shapes, a ground that does not fit the batch, an option out of its range, or an unknown word.
+        TypeError: vertices is no ordinary floating-point tensor, or an argument is of the wrong kind.
     """
-    quantity = f"balance_cost.{choice('wrap', wrap, Wrap)}.{choice('method', method, Method)}"
-    options = (not_negative("alpha", alpha), not_negative("gamma", gamma), positive("sigma", sigma))
-    return evaluate(vertices, template, ground, quantity, options, ())
+    return evaluate(vertices, template, ground, quantities.balance_cost(alpha, gamma, sigma, wrap, method))

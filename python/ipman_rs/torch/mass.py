@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from ipman_rs import BodyTemplate
-from ipman_rs.checks import choice
-from ipman_rs.mass import Method
+from ipman_rs import BodyTemplate, quantities
+from ipman_rs.quantities import Method
 
 from .dispatch import evaluate
 
@@ -17,6 +16,7 @@ def center_of_mass(vertices: Tensor, template: BodyTemplate, method: Method = "p
     method: "pcom" (the paper's Eq. 1, parts weighted by volume), "vertex_mean", "sample_mean", "face_area", or "exact".
 
     Raises:
-        ValueError: unknown method.
+        ValueError: wrong shape, or unknown method.
+        TypeError: vertices is no ordinary floating-point tensor, or the template is none.
     """
-    return evaluate(vertices, template, None, f"center_of_mass.{choice('method', method, Method)}", (), (3,))
+    return evaluate(vertices, template, None, quantities.center_of_mass(method))

@@ -46,6 +46,8 @@ def self_contact_loss(
         geodesic: m; surface nearer than this to a vertex along the template is not opposite to it.
 
     Raises:
+        ValueError: wrong shape, or an option out of its range.
+        TypeError: vertices is no ordinary floating-point tensor, or an argument is of the wrong kind.
         NotImplementedError: a second derivative is asked for.
     """
     options = checked(push_width, pull_width, pull_weight, near)

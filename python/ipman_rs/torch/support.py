@@ -9,11 +9,11 @@ import torch
 from torch import Tensor
 
 import ipman_rs as ip
-from ipman_rs import BaseOfSupport, BodyTemplate
+from ipman_rs import BaseOfSupport, BodyTemplate, quantities
 from ipman_rs import Ground as NumpyGround
-from ipman_rs.checks import choice, positive
-from ipman_rs.mass import Method
-from ipman_rs.support import Contact, Solver
+from ipman_rs.checks import choice
+from ipman_rs.quantities import Contact, Method
+from ipman_rs.support import Solver
 
 from .arrays import as_array, dense
 from .dispatch import evaluate
@@ -32,9 +32,12 @@ def support_margin(
 
     −inf, with gradient 0, without contact. The gradient goes to the CoM and to the samples that span the nearest edge.
     contact: "paper" |h| < τ, or "released" h < τ where ten contacts or fewer count for none.
+
+    Raises:
+        ValueError: wrong shapes, a ground that does not fit the batch, an option out of its range, or an unknown word.
+        TypeError: vertices is no ordinary floating-point tensor, or an argument is of the wrong kind.
     """
-    quantity = f"support_margin.{choice('contact', contact, Contact)}.{choice('method', method, Method)}"
-    return evaluate(vertices, template, ground, quantity, (positive("threshold", threshold),), ())
+    return evaluate(vertices, template, ground, quantities.support_margin(threshold, method, contact))
 
 
 def base_of_support(
@@ -45,7 +48,11 @@ def base_of_support(
     method: Method = "pcom",
     contact: Contact = "paper",
 ) -> BaseOfSupport:
-    """`ipman_rs.base_of_support` with tensors in its fields, on the device of vertices; `margin` is differentiable."""
+    """`ipman_rs.base_of_support` with tensors in its fields, on the device of vertices; `margin` is differentiable.
+
+    Raises:
+        As `support_margin`.
+    """
     found = ip.base_of_support(as_array(vertices), template, as_numpy_ground(ground), threshold, method, contact)
 
     def tensors(value: Any) -> Any:
@@ -70,6 +77,9 @@ def bose(
     """Whether the CoM lies over the base of support (Eq. 10): vertices (..., V, 3) -> bool (...); not differentiable.
 
     "hull" is margin >= 0, on any device; "lp" is the paper's linear programme, solved on the CPU.
+
+    Raises:
+        As `support_margin`; ValueError also for an unknown method.
     """
     if choice("method", method, Solver) == "hull":
         still = dense("vertices", vertices).detach()

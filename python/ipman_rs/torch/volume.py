@@ -6,16 +6,20 @@ from collections.abc import Sequence
 
 from torch import Tensor
 
-from ipman_rs import BodyTemplate, MassProperties
-from ipman_rs.checks import body_template
-from ipman_rs.volume import densities, unpack_mass_properties
+from ipman_rs import BodyTemplate, MassProperties, quantities
+from ipman_rs.volume import unpack_mass_properties
 
 from .dispatch import evaluate
 
 
 def part_volumes(vertices: Tensor, template: BodyTemplate) -> Tensor:
-    """Volume of each closed part: vertices (..., V, 3) -> (..., P), m³."""
-    return evaluate(vertices, template, None, "part_volumes", (), (body_template(template).num_parts,))
+    """Volume of each closed part: vertices (..., V, 3) -> (..., P), m³.
+
+    Raises:
+        ValueError: wrong shape.
+        TypeError: vertices is no ordinary floating-point tensor, or the template is none.
+    """
+    return evaluate(vertices, template, None, quantities.part_volumes(template))
 
 
 def mass_properties(
@@ -26,9 +30,7 @@ def mass_properties(
     The fields of the result are tensors. density: kg/m³, one for all parts or one a part.
 
     Raises:
-        ValueError: as many densities as neither one nor the parts, or one that is not positive.
+        ValueError: wrong shapes, or a density that is not positive.
+        TypeError: vertices is no ordinary floating-point tensor, or an argument is of the wrong kind.
     """
-    rows = evaluate(
-        vertices, template, None, "mass_properties", densities(density, template), (1 + template.num_parts, 14)
-    )
-    return unpack_mass_properties(rows)
+    return unpack_mass_properties(evaluate(vertices, template, None, quantities.mass_properties(density, template)))

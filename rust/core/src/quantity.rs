@@ -7,7 +7,7 @@ use crate::number::vector::Vec3;
 use crate::posed::PosedBody;
 use crate::template::Template;
 
-pub trait Quantity: Send + Sync {
+pub trait Quantity: Send + Sync + 'static {
     /// What the forward keeps for the backward.
     type Saved<R: Real>;
 

@@ -5,7 +5,7 @@ mod array;
 mod bodies;
 mod collision;
 mod error;
-mod evaluate;
+mod quantity;
 mod simulation;
 mod skinning;
 mod support;
@@ -22,7 +22,7 @@ mod _core {
     #[pymodule_export]
     use crate::collision::Collision;
     #[pymodule_export]
-    use crate::evaluate::{jvp, output_size, value, value_and_vjp, vjp, vjp_jvp};
+    use crate::quantity::Quantity;
     #[pymodule_export]
     use crate::simulation::{simulate, solids, tip_test, touching};
     #[pymodule_export]
@@ -34,7 +34,7 @@ mod _core {
     #[pymodule_export]
     use crate::threads::{follow_threads, get_num_threads, set_num_threads, simd_level, simd_levels};
     #[pymodule_export]
-    use crate::weighted::{terms, terms_backward, weighted};
+    use crate::weighted::terms_backward;
 
     use pyo3::prelude::*;
     use pyo3::types::IntoPyDict;

@@ -7,42 +7,39 @@ other quantity takes the formulas in `reference`, as do forward mode, torch.func
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
 from torch._C._functorch import is_functorch_wrapped_tensor
 
+from ipman_rs.quantities import is_paper_terms
+
 from .derivatives import Terms, WeightedTerms
 
 if TYPE_CHECKING:
     from ipman_rs import BodyTemplate
+    from ipman_rs.quantities import Quantity
 
-PREFIX = "terms.stability.pcom.samples."
 
-
-def covers(quantity: str, vertices: Tensor) -> bool:
+def covers(quantity: Quantity, vertices: Tensor) -> bool:
     """Whether the tuned path computes this quantity of these vertices."""
-    if not quantity.startswith(PREFIX):
+    if not is_paper_terms(quantity):
         return False
     if torch.compiler.is_compiling():
         return True
     return not is_functorch_wrapped_tensor(vertices) and torch.autograd.forward_ad._current_level < 0
 
 
-def values(
-    template: BodyTemplate, quantity: str, options: Sequence[float], vertices: Tensor, normal: Tensor, height: Tensor
-) -> Tensor:
+def values(template: BodyTemplate, quantity: Quantity, vertices: Tensor, normal: Tensor, height: Tensor) -> Tensor:
     """The terms (B, 3), each differentiable in vertices (B, V, 3); normal (B, 3) and height (B,) anywhere."""
     plane = normal.to(vertices.device), height.to(vertices.device)
-    return Terms.apply(vertices, *plane, template, quantity.removeprefix(PREFIX), tuple(options))
+    return Terms.apply(vertices, *plane, template, quantity)
 
 
 def weighted(
     template: BodyTemplate,
-    quantity: str,
-    options: Sequence[float],
+    quantity: Quantity,
     vertices: Tensor,
     normal: Tensor,
     height: Tensor,
@@ -50,7 +47,5 @@ def weighted(
 ) -> tuple[Tensor, Tensor]:
     """Σ_k weights (B, 3) · terms (B,), differentiable, and the terms (B, 3), detached."""
     plane = normal.to(vertices.device), height.to(vertices.device)
-    totals, terms = WeightedTerms.apply(
-        vertices, *plane, weights, template, quantity.removeprefix(PREFIX), tuple(options)
-    )
+    totals, terms = WeightedTerms.apply(vertices, *plane, weights, template, quantity)
     return totals, terms

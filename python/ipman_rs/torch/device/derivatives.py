@@ -17,9 +17,9 @@ from .tables import tables
 
 if TYPE_CHECKING:
     from ipman_rs import BodyTemplate
+    from ipman_rs.quantities import Quantity
 
-Problem = tuple["BodyTemplate", str, tuple[float, ...]]
-"""Template, curve, options."""
+Problem = tuple["BodyTemplate", "Quantity"]
 
 
 class Terms(Function):
@@ -32,11 +32,10 @@ class Terms(Function):
         normal: Tensor,
         height: Tensor,
         template: BodyTemplate,
-        curve: str,
-        options: tuple[float, ...],
+        quantity: Quantity,
     ) -> Tensor:
         ctx.save_for_backward(vertices, normal, height)
-        ctx.problem = (template, curve, options)
+        ctx.problem = (template, quantity)
         return _values(ctx.problem, vertices, normal, height)
 
     @staticmethod
@@ -46,7 +45,7 @@ class Terms(Function):
             gradient = _reference_gradient(ctx.problem, vertices, normal, height, d_out)
         else:
             gradient = _values_and_gradient(ctx.problem, vertices, normal, height, d_out)[1]
-        return gradient, None, None, None, None, None
+        return gradient, None, None, None, None
 
 
 class WeightedTerms(Function):
@@ -63,10 +62,9 @@ class WeightedTerms(Function):
         height: Tensor,
         weights: Tensor,
         template: BodyTemplate,
-        curve: str,
-        options: tuple[float, ...],
+        quantity: Quantity,
     ) -> tuple[Tensor, Tensor]:
-        ctx.problem = (template, curve, options)
+        ctx.problem = (template, quantity)
         values, gradient = _values_and_gradient(ctx.problem, vertices, normal, height, weights)
         ctx.save_for_backward(vertices, normal, height, weights, gradient)
         ctx.mark_non_differentiable(values)
@@ -79,11 +77,12 @@ class WeightedTerms(Function):
             scaled = _reference_gradient(ctx.problem, vertices, normal, height, weights * d_totals[:, None])
         else:
             scaled = gradient * d_totals[:, None, None]
-        return scaled, None, None, None, None, None, None
+        return scaled, None, None, None, None, None
 
 
 def _values(problem: Problem, vertices: Tensor, normal: Tensor, height: Tensor) -> Tensor:
-    template, curve, options = problem
+    template, quantity = problem
+    curve, options = quantity.modes[-1], quantity.options
     if triton_terms.serves(vertices):
         return triton_terms.values(vertices, normal, height, template._key, curve, options)
     known = tables(template, vertices.device, vertices.dtype)
@@ -93,7 +92,8 @@ def _values(problem: Problem, vertices: Tensor, normal: Tensor, height: Tensor) 
 def _values_and_gradient(
     problem: Problem, vertices: Tensor, normal: Tensor, height: Tensor, weights: Tensor
 ) -> tuple[Tensor, Tensor]:
-    template, curve, options = problem
+    template, quantity = problem
+    curve, options = quantity.modes[-1], quantity.options
     if triton_terms.serves(vertices):
         return triton_terms.values_and_gradient(vertices, normal, height, weights, template._key, curve, options)
     known = tables(template, vertices.device, vertices.dtype)
@@ -107,8 +107,6 @@ def _needs_graph() -> bool:
 
 def _reference_gradient(problem: Problem, vertices: Tensor, normal: Tensor, height: Tensor, d_out: Tensor) -> Tensor:
     """The same gradient with a graph of its own, through the reference formula."""
-    template, curve, options = problem
-    quantity = f"terms.stability.pcom.samples.{curve}"
-    values = reference.evaluate(template, quantity, options, vertices, normal.to(vertices), height.to(vertices))
+    values = reference.evaluate(*problem, vertices, normal.to(vertices), height.to(vertices))
     (gradient,) = torch.autograd.grad(values, vertices, d_out, create_graph=True)
     return gradient

@@ -1,8 +1,8 @@
-"""From a quantity's name and options to its formula: the one list that a new quantity joins."""
+"""From a quantity's name to its formula: the one list that a new quantity joins."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -22,26 +22,23 @@ from .topology import topology
 
 if TYPE_CHECKING:
     from ipman_rs import BodyTemplate
+    from ipman_rs.quantities import Quantity
 
 Formula = Callable[..., Tensor]
 
 
-def evaluate(
-    template: BodyTemplate, quantity: str, options: Sequence[float], vertices: Tensor, normal: Tensor, height: Tensor
-) -> Tensor:
+def evaluate(template: BodyTemplate, quantity: Quantity, vertices: Tensor, normal: Tensor, height: Tensor) -> Tensor:
     """`quantity` of each body by plain torch: vertices (B, V, 3), normal (B, 3), height (B,) -> (B, K).
 
-    `quantity` is a room's name and its modes joined by dots ("ground_loss.samples.tanh_squared"), `options` numbers.
     A body with a non-finite vertex gives NaN with gradient 0 and leaves the others alone.
     """
-    name, *modes = quantity.split(".")
-    formula = FORMULAS[name]
+    formula = FORMULAS[quantity.name]
     finite = vertices.isfinite().all(dim=-1).all(dim=-1)
     rest = topology(template, vertices.device).rest_vertices.to(vertices.dtype)
     body = Posed(torch.where(finite[:, None, None], vertices, rest), template)
     # Autocast would turn the sums of products below into half precision.
     with torch.autocast(vertices.device.type, enabled=False):
-        values = formula(body, Ground.of_unit(normal, height), tuple(options), *modes)
+        values = formula(body, Ground.of_unit(normal, height), quantity.options, *quantity.modes)
     return torch.where(finite[:, None], values, torch.nan)
 
 

@@ -1,7 +1,6 @@
-"""The loss terms of a training step on the CPU, eager and in reverse mode, with one call of the core each way.
+"""`IntuitivePhysicsLoss` as a trainer calls it: on the CPU, eager, in reverse mode. One call of the core each way.
 
-This is `IntuitivePhysicsLoss` as a trainer calls it. Anything else (torch.compile, torch.func, forward mode, other
-devices) takes the general path in `dispatch.py`.
+All else (torch.compile, torch.func, forward mode, other devices) takes the general path of `dispatch.py`.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from torch._C._functorch import is_functorch_wrapped_tensor
 from torch.autograd import Function, forward_ad
 
 from ipman_rs import BodyTemplate, _core
+from ipman_rs.quantities import Quantity
 
 from .arrays import memory
 from .autograd import Vjp
@@ -23,17 +23,16 @@ from .threads import follow_torch
 
 
 class Call(NamedTuple):
-    """What is asked of the core besides the bodies."""
+    """The arguments of the core besides the bodies."""
 
     template: BodyTemplate
-    quantity: str
-    options: tuple[float, ...]
+    quantity: Quantity
     weights: tuple[float, ...]
     reduction: str
 
 
 def serves(vertices: Any) -> bool:
-    """Whether these vertices ask for a gradient in the way that is meant here."""
+    """Whether these are CPU tensors that need a gradient, outside of compiled code, transforms and forward mode."""
     return (
         isinstance(vertices, Tensor)
         and vertices.requires_grad
@@ -59,8 +58,8 @@ def _arrays(vertices: Tensor, ground: Ground) -> tuple[Any, Any, Any]:
 class WeightedTotal(Function):
     """vertices (B, V, 3) -> Σ λ·term, reduced, or (B,); and the unweighted terms (K,) or (B, K), not differentiable.
 
-    Value and gradient come from one pass. The gradient waits for the backward, which scales it by its upstream in place
-    and hands it over; a second backward, or one that is itself differentiated, computes it again.
+    Value and gradient come from one pass. The gradient is cached; the backward multiplies it in place by the
+    upstream gradient and returns it. A second backward, or one that is itself differentiated, computes it again.
     """
 
     @staticmethod
@@ -68,10 +67,8 @@ class WeightedTotal(Function):
         arrays = _arrays(vertices, ground)
         mask = memory(valid)
         follow_torch()
-        template, quantity, options, weights, reduction = call
-        total, terms, shares, gradient = _core.weighted(
-            template._core, quantity, options, *arrays, weights, mask, reduction
-        )
+        handle = call.quantity.of(call.template)
+        total, terms, shares, gradient = handle.weighted(*arrays, call.weights, mask, call.reduction)
         ctx.save_for_backward(vertices)
         ctx.call, ctx.ground, ctx.shares, ctx.gradient = call, arrays[1:], shares, gradient
         outputs = torch.from_numpy(total), torch.from_numpy(terms)
@@ -98,7 +95,7 @@ class WeightedTotal(Function):
 class Terms(Function):
     """vertices (B, V, 3) -> terms (K,), reduced, or (B, K).
 
-    The forward keeps the Jacobian, five numbers a vertex: what a backward with any upstream is made of.
+    The forward keeps the Jacobian, five numbers per vertex, from which a backward with any upstream gradient follows.
     """
 
     @staticmethod
@@ -106,15 +103,14 @@ class Terms(Function):
         arrays = _arrays(vertices, ground)
         mask = memory(valid)
         follow_torch()
-        template, quantity, options = call[:3]
-        terms, shares, jacobian = _core.terms(template._core, quantity, options, *arrays, mask, call.reduction)
+        terms, shares, jacobian = call.quantity.of(call.template).terms(*arrays, mask, call.reduction)
         ctx.save_for_backward(vertices)
         ctx.call, ctx.ground, ctx.shares, ctx.jacobian = call, arrays[1:], shares, jacobian
         return torch.from_numpy(terms)
 
     @staticmethod
     def backward(ctx: Any, d_terms: Tensor) -> tuple[Tensor, None, None, None]:
-        (vertices,) = ctx.saved_tensors  # complains about vertices that were changed in place
+        (vertices,) = ctx.saved_tensors  # raises if vertices were changed in place
         if _is_differentiated(d_terms):
             return _vjp(ctx, vertices, torch.from_numpy(ctx.shares)[:, None] * d_terms), None, None, None
         follow_torch()
@@ -130,5 +126,4 @@ def _is_differentiated(upstream: Tensor) -> bool:
 def _vjp(ctx: Any, vertices: Tensor, d_out: Tensor) -> Tensor:
     """The gradient by operations that can be differentiated once more."""
     normal, height = (torch.from_numpy(given).expand(len(vertices), *given.shape[1:]) for given in ctx.ground)
-    template, quantity, options = ctx.call[:3]
-    return Vjp.apply(vertices, normal, height, d_out, template, quantity, list(options))
+    return Vjp.apply(vertices, normal, height, d_out, ctx.call.template, ctx.call.quantity)
