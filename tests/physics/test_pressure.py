@@ -186,3 +186,14 @@ def test_heights_and_feet(rng):
     frame = np.stack([first, second, ground.normal], axis=-2)
     np.testing.assert_allclose(frame @ frame.swapaxes(-1, -2), np.broadcast_to(np.eye(3), (7, 3, 3)), atol=1e-14)
     np.testing.assert_allclose(np.linalg.det(frame), 1.0, atol=1e-14)
+
+
+def test_a_sweep_over_an_option_keeps_few_quantities():
+    """A template keeps the core's objects of its latest quantities, but not without end; the values do not depend on
+    what is kept."""
+    template = solids.plate()
+    first = ip.pressure(template.vertices, template, ip.Ground(), alpha=0.0)
+    for alpha in range(1, 2 * quantities.MOST_HANDLES):
+        ip.pressure(template.vertices, template, ip.Ground(), alpha=alpha)
+        assert 0 < len(template._quantities) <= quantities.MOST_HANDLES
+    np.testing.assert_array_equal(ip.pressure(template.vertices, template, ip.Ground(), alpha=0.0), first)
