@@ -6,7 +6,7 @@
 //! up to the whole body's. The topology is found once; the virtual vertices move with the body.
 //!
 //! After closing, the body is a list of vertices (the mesh's, then the virtual ones) and closed faces, sorted by part;
-//! no later room needs to know which of them were added.
+//! no later step needs to know which of them were added.
 
 use crate::memory;
 use crate::mesh::Mesh;
@@ -62,7 +62,7 @@ impl Closing {
         R::dispatch::<Forward, _>((self, vertices));
     }
 
-    /// Hands the virtual vertices' gradients to the vertices they are means of.
+    /// Distributes the virtual vertices' gradients to the vertices whose means they are.
     pub fn backward<R: Real>(&self, d_points: &mut [Vec3<R>]) {
         R::dispatch::<Backward, _>((self, d_points));
     }

@@ -1,4 +1,4 @@
-//! Kernels in functions that are compiled for a CPU level's instructions.
+//! Functions compiled for a CPU level's instructions, which run a kernel.
 
 use super::Kernel;
 use super::simd_level::Level;
@@ -24,7 +24,7 @@ pub(super) fn run_neon<F: Kernel<A>, A>(arguments: A) -> F::Output {
     F::run(arguments)
 }
 
-/// [`Real::dispatch`] of a number whose level is known only when it runs.
+/// [`super::Real::dispatch`] for number types that exist on several levels: asks for the current one.
 #[inline(always)]
 pub(super) fn dispatch_at_current_level<F: Kernel<A>, A>(arguments: A) -> F::Output {
     #[cfg(target_arch = "x86_64")]
