@@ -19,7 +19,7 @@
 //!
 //! // The same body with its tip pulled 40 cm to the side.
 //! vertices[4][0] += 0.4;
-//! let never = || false; // asked now and then whether to stop
+//! let never = || false; // whether to interrupt the computation
 //! let batch = Batch::new(&template, vertices.as_flattened(), &[0.0, 1.0, 0.0], &[0.0], &never)?;
 //!
 //! let pressure = CenterOfPressure { curve: PressureCurve { alpha: 100.0, gamma: 10.0 }, epsilon: 0.0 };

@@ -1,4 +1,4 @@
-//! Pressure: from the height above the ground to pressure (Eq. 2) to the centre of pressure (Eq. 3).
+//! Pressure: from the height above the ground to pressure (Eq. 2) and to the centre of pressure (Eq. 3).
 
 use crate::error::Result;
 use crate::memory;

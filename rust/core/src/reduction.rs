@@ -58,23 +58,23 @@ impl Pool<'_> {
     ) -> Result<(Vec<f64>, Pooled)> {
         let (bodies, size) = (batch.len(), quantity.num_outputs(batch.template()));
         if size != weights.len() {
-            let expected = format!("{size} numbers, one a term");
+            let expected = format!("{size} numbers, one per term");
             return Err(Error::Argument { name: "weights", expected, got: weights.len().to_string() });
         }
         if let Some(weight) = weights.iter().find(|&&weight| !T::of(weight).value().is_finite()) {
             let expected = "finite numbers".into();
             return Err(Error::Argument { name: "weights", expected, got: weight.to_string() });
         }
-        let dealt = self.share((0..bodies).filter(|&body| self.valid(body)).count());
-        let part = |i: usize| if self.valid(i / size) { T::of(weights[i % size] * dealt) } else { T::zero() };
-        let room = || Ok((memory::collect((0..bodies * size).map(part)), memory::filled(T::zero(), bodies * size)));
-        let (d_out, mut values) = memory::guarded(room)?;
+        let provisional = self.share((0..bodies).filter(|&body| self.valid(body)).count());
+        let part = |i: usize| if self.valid(i / size) { T::of(weights[i % size] * provisional) } else { T::zero() };
+        let buffers = || Ok((memory::collect((0..bodies * size).map(part)), memory::filled(T::zero(), bodies * size)));
+        let (d_out, mut values) = memory::guarded(buffers)?;
         batch.value_and_vjp_into(quantity, &d_out, &mut values, gradient)?;
 
         // Bodies whose term is NaN are known only now. The mean was taken over them, too: rescale its gradient.
         let (pooled, share) = self.pool(&values, size)?;
-        if share != dealt {
-            let factor = T::of(share / dealt);
+        if share != provisional {
+            let factor = T::of(share / provisional);
             gradient.iter_mut().for_each(|d| *d = *d * factor);
         }
         let total = |terms: &[f64]| -> f64 { terms.iter().zip(weights).map(|(term, weight)| term * weight).sum() };
@@ -101,10 +101,10 @@ impl Pool<'_> {
 
     /// Also returns the share of each counted body.
     fn pool<T: Data>(&self, values: &[T], size: usize) -> Result<(Pooled, f64)> {
-        memory::guarded(|| Ok(self.put_together(values, size)))
+        memory::guarded(|| Ok(self.reduce(values, size)))
     }
 
-    fn put_together<T: Data>(&self, values: &[T], size: usize) -> (Pooled, f64) {
+    fn reduce<T: Data>(&self, values: &[T], size: usize) -> (Pooled, f64) {
         let rows = || values.chunks_exact(size);
         let counts =
             memory::collect(rows().enumerate().map(|(body, row)| self.valid(body) && !row[0].value().is_nan()));

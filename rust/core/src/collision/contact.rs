@@ -1,4 +1,4 @@
-//! The cost of a body's contact with itself: what is inside another part is pushed out, what is near is pulled closer
+//! The cost of a body's contact with itself: vertices inside another part are pushed out, nearby ones are pulled closer
 //! (Müller et al., *On Self-Contact and Human Pose*, CVPR 2021).
 
 use super::nearest::Nearest;

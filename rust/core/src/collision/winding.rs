@@ -18,7 +18,7 @@ pub struct AtVertices<'a, T> {
     pub tree: &'a Tree,
     pub boxes: &'a [Aabb],
     pub points: &'a [Vec3<f64>],
-    /// The same in the caller's precision.
+    /// The same, in the caller's precision.
     pub rounded: &'a [Vec3<T>],
 }
 
@@ -53,7 +53,7 @@ pub struct OfTriangles<'a> {
 }
 
 impl OfTriangles<'_> {
-    /// The same in a precision of choice.
+    /// The same, in the precision of T.
     pub fn sum<T: Data>(self, level: Level) -> f64 {
         T::run_on_lanes(level, T::widths(level)[0], self)
     }
@@ -120,7 +120,7 @@ fn gather(tree: &Tree, boxes: &[Aabb], from: &Aabb, node: usize, triangles: &mut
     }
 }
 
-/// Half the solid angles of triangles seen from the points of lanes.
+/// Half the solid angles of triangles at several points, one per lane.
 struct SumOfAngles;
 
 impl<R: Real> Kernel<(&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)> for SumOfAngles {
@@ -139,7 +139,7 @@ impl<R: Real> Kernel<(&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)> for SumOfAngles {
     }
 }
 
-/// The same of triangles on lanes, seen from the origin.
+/// The same at the origin, with one triangle per lane.
 struct SumOfLanes;
 
 impl<R: Real> Kernel<&[[Vec3<R>; 3]]> for SumOfLanes {

@@ -29,9 +29,9 @@ pub(super) fn run_neon<F: Kernel<A>, A>(arguments: A) -> F::Output {
 pub(super) fn dispatch_at_current_level<F: Kernel<A>, A>(arguments: A) -> F::Output {
     #[cfg(target_arch = "x86_64")]
     match Level::current() {
-        // SAFETY: the level has been asked of the CPU.
+        // SAFETY: `Level::current` is a level that this CPU supports.
         Ok(Level::Avx512) => return unsafe { run_avx512::<F, A>(arguments) },
-        // SAFETY: the level has been asked of the CPU.
+        // SAFETY: `Level::current` is a level that this CPU supports.
         Ok(Level::Avx2) => return unsafe { run_avx2::<F, A>(arguments) },
         _ => {}
     }

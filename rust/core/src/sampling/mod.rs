@@ -1,7 +1,7 @@
 //! Sampling: N_U points on the surface that move with it, and the passes over them.
 //!
 //! Triangle point picking, area-weighted on the template: the points are fixed barycentric weights on fixed faces, so a
-//! posed body's samples are W V with a sparse W of three weights a row, and gradients return by Wᵀ. Most quantities
+//! posed body's samples are W V with a sparse W with three weights per row, and gradients return by Wᵀ. Most quantities
 //! need only one or two numbers of a sample, such as its height. These are interpolated from the vertices' numbers
 //! ([`Walk`]), and gradients by them are added to the vertices' by the same weights.
 

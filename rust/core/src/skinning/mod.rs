@@ -93,7 +93,7 @@ pub struct Block<'a, R: Real, const N: usize> {
     features: Vec<[R; N]>,
 }
 
-/// The gradient of N bodies, accumulated tile by tile; each sum is kept as one partial sum per vertex of a tile.
+/// The gradient of N bodies, accumulated tile by tile; each sum consists of one partial sum per vertex of a tile.
 pub struct Sums<V: Real, const P: usize, const N: usize> {
     betas: Vec<[[V; P]; N]>,
     expression: Vec<[[V; P]; N]>,

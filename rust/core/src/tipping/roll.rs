@@ -17,7 +17,7 @@ use crate::support::margin::{Margin, Nearest};
 pub const BAND: f64 = 0.03;
 /// Points within this height of the lowest touch, m.
 const TOUCH: f64 = 1e-9;
-/// Band of points that is kept while a body rolls, m: enough for about ten degrees.
+/// Height above the lowest up to which points are stored while a body rolls, m: enough for about ten degrees.
 const WIDE: f64 = 0.2;
 /// Upper bound of the number of turns: a ball of a million points needs fewer.
 const MOST_TURNS: usize = 10_000;
