@@ -1,5 +1,5 @@
-//! The analysis: all figures of a body in one go. Its heights, samples, volumes, moments and centre of mass are found
-//! once and shared; each figure is that of its own room, to the bit.
+//! The analysis: all results for a body in one pass. Heights, samples, volumes, moments and centre of mass are computed
+//! once and shared; each result has the bits of its own quantity.
 
 use crate::error::{Error, Result, status};
 use crate::losses::balance::{BalanceCost, Wrap};
@@ -20,7 +20,7 @@ use crate::support::{BaseOfSupport, Contact, ContactRule};
 use crate::template::Template;
 use crate::volume::PartVolumes;
 
-/// The constants of all figures.
+/// The constants of all results.
 pub struct Analysis {
     method: Method,
     pressure: CenterOfPressure,
@@ -78,7 +78,7 @@ pub const COLUMNS: [(&str, usize); 18] = [
     ("part_volumes", at::PART_VOLUMES),
 ];
 
-/// What a look at all samples finds.
+/// Results of the pass over the samples.
 struct SampleResults<R: Real> {
     cop: Cop<R>,
     pressure_sum: R,
@@ -111,12 +111,12 @@ impl Analysis {
         })
     }
 
-    /// Numbers of one body.
+    /// Number of columns of a body's row.
     pub fn size(&self, template: &Template) -> usize {
         at::PART_VOLUMES + template.mesh.num_parts
     }
 
-    /// An error names the constant that is out of its range.
+    /// The error names the constant that is out of range.
     pub fn check(&self, template: &Template) -> Result<()> {
         self.pressure.check(template)?;
         self.ground.check(template)?;
@@ -125,7 +125,7 @@ impl Analysis {
         self.mass.check(template)
     }
 
-    /// Writes the numbers and gives the polygon of each lane.
+    /// Writes the row and returns the polygon of each lane.
     pub fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Vec<Polygon> {
         let heights = posed.heights();
         out[at::LOWEST] = posed::lowest(&heights);
@@ -179,7 +179,7 @@ impl Analysis {
         sums.finish(posed.template, ground);
         SampleResults {
             pressure_sum: R::narrow(loads.total_pressure()),
-            // ρ falls with the height.
+            // ρ decreases with height, so the lowest sample has the largest.
             pressure_max: self.pressure.curve.density(lowest, R::zero()),
             cop: loads.finish(posed),
         }

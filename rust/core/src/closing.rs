@@ -2,11 +2,11 @@
 //!
 //! Where two parts meet, or where the surface is open, there is an interface of edges. Each connected component of all
 //! interfaces gets one virtual vertex, the mean of its vertices, and every part that meets there is capped by a fan of
-//! triangles to it. Because the virtual vertex is shared, the caps of neighbouring parts cancel and the part volumes add
-//! up to the whole body's. The topology is found once; the virtual vertices move with the body.
+//! triangles to it. Because the virtual vertex is shared, the caps of neighbouring parts cancel and the part volumes
+//! add up to the whole body's. The topology is computed once; the virtual vertices move with the body.
 //!
 //! After closing, the body is a list of vertices (the mesh's, then the virtual ones) and closed faces, sorted by part;
-//! no later room needs to know which of them were added.
+//! no later step needs to know which of them were added.
 
 use crate::memory;
 use crate::mesh::Mesh;
@@ -62,7 +62,7 @@ impl Closing {
         R::dispatch::<Forward, _>((self, vertices));
     }
 
-    /// Hands the virtual vertices' gradients to the vertices they are means of.
+    /// Distributes the virtual vertices' gradients to the vertices whose means they are.
     pub fn backward<R: Real>(&self, d_points: &mut [Vec3<R>]) {
         R::dispatch::<Backward, _>((self, d_points));
     }

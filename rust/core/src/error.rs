@@ -1,6 +1,6 @@
 //! What can be wrong with a call ([`Error`]) and what can be wrong with one body of a batch ([`status`]).
 
-/// A call that cannot be answered: which argument, what was expected, what came.
+/// An invalid call: which argument, what was expected, what was given.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
     #[error("faces: expected at least one triangle, got none")]
@@ -49,12 +49,12 @@ pub enum Error {
 
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// An error that names the choices of an enumeration.
+/// The error for a name that is none of an enumeration's.
 pub(crate) fn unknown_choice(name: &'static str, choices: &str, got: &str) -> Error {
     Error::Argument { name, expected: format!("one of {choices}"), got: format!("{got:?}") }
 }
 
-/// What is unusual about one body, as bits that may be combined; 0 is a good body.
+/// Problems of one body, as bits that may be combined; 0 means none.
 pub mod status {
     /// A coordinate is NaN or infinite: values are NaN, gradients zero.
     pub const NON_FINITE: u32 = 1;
@@ -66,10 +66,10 @@ pub mod status {
     pub const NO_VOLUME: u32 = 8;
     /// The body is under 20 cm or over 10 m across: probably not in metres.
     pub const ODD_SIZE: u32 = 16;
-    /// The physics engine found no hull of it, or lost it on the way.
+    /// The physics engine found no convex hull, or its state became non-finite.
     pub const NOT_SIMULATED: u32 = 32;
 
-    /// Those of a finite body with these signed part volumes and sides of its bounding box.
+    /// The bits of a finite body, from its signed part volumes and the sides of its bounding box.
     pub fn bits(volumes: &[f64], sides: [f64; 3], has_contact: bool) -> u32 {
         let size = sides.into_iter().fold(0.0, f64::max);
         let bits = [

@@ -1,4 +1,4 @@
-//! The ground: a plane with a unit normal n at a height along it. h(u) = n·u − height, g(u) = u − h(u) n.
+//! The ground: a plane with unit normal n at a height along n. h(u) = n·u − height, g(u) = u − h(u) n.
 
 use crate::error::{Error, Result};
 use crate::number::Real;
@@ -6,16 +6,16 @@ use crate::number::vector::{Vec3, add, add_scaled, cross, dot, scale, sub};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground<R> {
-    /// Unit length, points away from the ground.
+    /// Unit length, pointing up from the ground.
     pub normal: Vec3<R>,
     /// Metres along the normal.
     pub height: R,
 }
 
 impl Ground<f64> {
-    /// A plane through `height`·n with any non-zero `normal`, which is normalised.
+    /// The plane through `height`·n. Any non-zero `normal` will do: it is normalised.
     pub fn new(normal: Vec3<f64>, height: f64) -> Result<Self> {
-        // Scaled first, so that neither tiny nor huge normals leave the range of squares.
+        // Scaled first, so that the squares of tiny or huge normals neither underflow nor overflow.
         let largest = normal.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         if !(largest > 0.0 && normal.iter().all(|x| x.is_finite())) {
             return Err(Error::GroundNormal { body: 0 });
@@ -39,7 +39,7 @@ impl Ground<f64> {
         Ground { normal: [0.0, 0.0, 1.0], height }
     }
 
-    /// The same plane seen from coordinates whose origin is `origin`.
+    /// The same plane in coordinates with origin `origin`.
     pub fn seen_from(&self, origin: Vec3<f64>) -> Self {
         Ground { normal: self.normal, height: self.height - dot(self.normal, origin) }
     }

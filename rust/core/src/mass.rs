@@ -10,7 +10,7 @@ use crate::quantity::Quantity;
 use crate::signed_volume::{SignedVolumes, absolute};
 use crate::template::Template;
 
-/// How a body's mass is spread.
+/// How the centre of mass is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
     /// Samples weighted by their part's volume (Eq. 1): m̄ = Σ_i vol(part(i)) v_i / Σ_i vol(part(i)).
@@ -126,7 +126,7 @@ impl<R: Real> Centre<R> {
         Centre::plain(whole.first, whole.volume)
     }
 
-    /// The signed volumes of the parts, where [`Method::Pcom`] has found them.
+    /// The signed volumes of the parts, if [`Method::Pcom`] has computed them.
     pub fn signed_volumes(&self) -> Option<&[R::Wide]> {
         self.parts.as_ref().map(|parts| parts.signed.of_parts.as_slice())
     }
@@ -280,6 +280,20 @@ fn exact_backward<R: Real>(
 }
 
 /// The centre of mass in the world, metres.
+///
+/// ```
+/// use ipman::Batch;
+/// use ipman::mass::{CenterOfMass, Method};
+///
+/// let (template, vertices) = ipman::example::cube();
+/// let batch = Batch::new(&template, &vertices, &[0.0, 1.0, 0.0], &[0.0], &|| false)?;
+/// let exact = batch.value(&CenterOfMass { method: Method::Exact })?;
+/// assert!(exact.iter().all(|x| (x - 0.5).abs() < 1e-12));
+/// // The paper's pCoM, from 2,000 samples: their spread of 0.4 m over √2000 is 9 mm.
+/// let pcom = batch.value(&CenterOfMass { method: Method::Pcom })?;
+/// assert!(pcom.iter().all(|x| (x - 0.5).abs() < 0.05));
+/// # Ok::<(), ipman::Error>(())
+/// ```
 pub struct CenterOfMass {
     pub method: Method,
 }

@@ -10,8 +10,21 @@ use crate::posed::PosedBody;
 use crate::quantity::Quantity;
 use crate::template::Template;
 
-/// Exact volume (m³), mass (kg), centre (m) and inertia about the centre (kg m²) of the body and of each part.
-/// Numbers a solid: volume, mass, centre, inertia row by row; row 0 is the whole body, then the parts.
+/// Exact volume (m³), mass (kg), centre (m) and inertia about the centre (kg m²) of the body and of each part. 14
+/// numbers per solid: volume, mass, centre, inertia row by row. The whole body comes first, then the parts.
+///
+/// ```
+/// use ipman::Batch;
+/// use ipman::mass_properties::MassProperties;
+///
+/// let (template, vertices) = ipman::example::cube();
+/// let batch = Batch::new(&template, &vertices, &[0.0, 1.0, 0.0], &[0.0], &|| false)?;
+/// let row = batch.value(&MassProperties { densities: vec![985.0] })?;
+/// assert!((row[MassProperties::MASS] - 985.0).abs() < 1e-9);
+/// // The inertia of a cube about its centre: m a² / 6.
+/// assert!((row[MassProperties::INERTIA] - 985.0 / 6.0).abs() < 1e-9);
+/// # Ok::<(), ipman::Error>(())
+/// ```
 pub struct MassProperties {
     /// kg/m³, one for all parts or one for each.
     pub densities: Vec<f64>,
@@ -26,7 +39,7 @@ impl MassProperties {
     pub const CENTER: usize = 2;
     pub const INERTIA: usize = 5;
 
-    /// An error unless there is one positive number, or one for each part.
+    /// Fails unless there is one positive number, or one per part.
     pub fn check_densities(&self, num_parts: usize) -> Result<()> {
         if ![1, num_parts].contains(&self.densities.len()) {
             let (expected, got) = (format!("1 or {num_parts} numbers"), self.densities.len().to_string());
@@ -41,7 +54,7 @@ impl MassProperties {
     }
 }
 
-/// mass, centre and inertia from the density-weighted moments.
+/// Volume, mass, centre and inertia from the density-weighted moments.
 #[inline(always)]
 fn row<W: Real>(volume: W, weighted: &Moments<W>, origin: Vec3<W>, out: &mut [W]) {
     let mass = weighted.volume;
@@ -120,7 +133,7 @@ impl Quantity for MassProperties {
 }
 
 impl MassProperties {
-    /// As many rows as `out` holds.
+    /// Writes as many rows as `out` holds.
     pub fn write<R: Real>(&self, posed: &PosedBody<R>, parts: &[Moments<R::Wide>], out: &mut [R]) {
         let (volumes, weighted) = self.weigh(parts);
         for (out, (volume, weighted)) in out.chunks_exact_mut(Self::ROW).zip(volumes.into_iter().zip(weighted)) {
@@ -132,7 +145,7 @@ impl MassProperties {
         }
     }
 
-    /// The whole body's row, in the posed's own coordinates.
+    /// The whole body's row, in local coordinates.
     pub fn whole<W: Real>(&self, parts: &[Moments<W>]) -> [W; Self::ROW] {
         let (volumes, weighted) = self.weigh(parts);
         let mut out = [W::zero(); Self::ROW];

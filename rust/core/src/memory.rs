@@ -1,22 +1,22 @@
 //! Memory that grows with the input: vertices, faces, samples, parts, bodies.
 //!
-//! Rust's own vectors end the process where memory lacks. These unwind to the entry of the call ([`guarded`]), which then
-//! gives [`Error::OutOfMemory`]. Unwinding and no `Result`, for the rooms' loops are full of such vectors, run over lanes
-//! and threads, and have nothing to add to the error.
+//! Rust's vectors abort the process when an allocation fails. The functions here unwind to the entry of the call
+//! ([`guarded`]), which returns [`Error::OutOfMemory`]. They unwind instead of returning a `Result` because the
+//! numerical loops allocate many such vectors, over SIMD lanes and threads, and have nothing to add to the error.
 
 use crate::error::{Error, Result};
 use std::hint::black_box;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-/// What is left after every larger array, bytes: for the small vectors, which are not asked for and cannot be refused.
+/// Bytes that must remain free after every larger array, for the small vectors, which are allocated without a check.
 const SPARE: usize = 256 << 10;
 
-/// The panic that unwinds where memory lacks.
+/// Payload of the panic that unwinds when an allocation fails.
 struct Lack {
     bytes: usize,
 }
 
-/// Runs `work`, and gives an error where memory lacks.
+/// Runs `work`; [`Error::OutOfMemory`] if an allocation in it fails.
 pub fn guarded<O>(work: impl FnOnce() -> Result<O>) -> Result<O> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| match panic.downcast::<Lack>() {
         Ok(lack) => Err(Error::OutOfMemory { bytes: lack.bytes }),
@@ -24,7 +24,7 @@ pub fn guarded<O>(work: impl FnOnce() -> Result<O>) -> Result<O> {
     })
 }
 
-/// Runs `work` of another library, and gives nothing where it panics. A lack of memory is passed on.
+/// Runs `work` of another library; None if it panics. A failed allocation keeps unwinding.
 pub fn isolated<O>(work: impl FnOnce() -> O) -> Option<O> {
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(output) => Some(output),
@@ -33,23 +33,24 @@ pub fn isolated<O>(work: impl FnOnce() -> O) -> Option<O> {
     }
 }
 
-/// Whether so many bytes can be had.
+/// Whether `bytes` bytes can be allocated.
 pub fn has(bytes: usize) -> bool {
     let mut probe: Vec<u8> = Vec::new();
     let reserved = probe.try_reserve_exact(bytes.saturating_add(SPARE));
-    // The compiler may leave out memory that nothing uses.
+    // Keeps the compiler from removing an allocation that nothing uses.
     black_box(&probe);
     reserved.is_ok()
 }
 
-/// Unwinds unless so many bytes can be had: before what allocates by itself, or in many small pieces.
+/// Unwinds unless `bytes` bytes can be allocated. To be called before code that allocates by itself, or in many small
+/// pieces.
 pub fn ask(bytes: usize) {
     if !has(bytes) {
         lack(bytes);
     }
 }
 
-/// Room for `more` numbers behind those that are there.
+/// Reserves space for `more` further elements.
 #[inline]
 pub fn reserve<T>(numbers: &mut Vec<T>, more: usize) {
     if numbers.capacity() - numbers.len() < more {
@@ -57,7 +58,7 @@ pub fn reserve<T>(numbers: &mut Vec<T>, more: usize) {
     }
 }
 
-/// [`reserve`] where there is not enough: by doubling, so that pushes stay cheap.
+/// The slow path of [`reserve`]: doubles, so that pushes stay cheap.
 #[cold]
 #[inline(never)]
 fn grow<T>(numbers: &mut Vec<T>, more: usize) {
@@ -71,7 +72,7 @@ fn grow<T>(numbers: &mut Vec<T>, more: usize) {
     }
 }
 
-/// An empty vector with room for `count`.
+/// An empty vector with space for `count` elements.
 #[inline]
 pub fn with_capacity<T>(count: usize) -> Vec<T> {
     let mut numbers = Vec::new();
@@ -79,7 +80,7 @@ pub fn with_capacity<T>(count: usize) -> Vec<T> {
     numbers
 }
 
-/// `count` times the same.
+/// A vector of `count` copies of `value`.
 #[inline]
 pub fn filled<T: Clone>(value: T, count: usize) -> Vec<T> {
     let mut numbers = with_capacity(count);
@@ -118,7 +119,7 @@ pub fn copied<T: Copy>(numbers: &[T]) -> Vec<T> {
 
 #[cold]
 fn lack(bytes: usize) -> ! {
-    // Without the panic's message: this is no bug, and printing it, or a backtrace, would ask for memory.
+    // `resume_unwind` prints no message: this is no bug, and printing would itself allocate.
     resume_unwind(Box::new(Lack { bytes }))
 }
 

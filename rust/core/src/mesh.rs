@@ -1,4 +1,4 @@
-//! The checked topology: the only way in for vertices and faces.
+//! The checked topology of a mesh. All vertices and faces come in through here.
 //!
 //! A mesh that passes is an oriented surface, possibly with open edges, whose faces are labelled with parts 0 … P−1.
 
@@ -100,8 +100,8 @@ struct Side {
     ascending: bool,
 }
 
-/// The two sides of every edge. An error names the first face, and its first edge, where there are more or the two run
-/// alike.
+/// The two sides of every edge. The error names the first face, and its first edge, with more than two sides or with
+/// two that run in the same direction.
 fn find_neighbours(faces: &[[u32; 3]]) -> Result<Vec<[Option<u32>; 3]>> {
     let mut sides = memory::with_capacity(3 * faces.len());
     for (face, corners) in faces.iter().enumerate() {

@@ -97,7 +97,7 @@ impl<W: Real> Moments<W> {
     }
 }
 
-/// The moments of each closed part, about the posed's origin.
+/// The moments of each closed part, about the local origin.
 pub fn part_moments<R: Real>(closing: &Closing, points: &[Vec3<R>]) -> Vec<Moments<R::Wide>> {
     R::dispatch::<MomentsForward, _>((closing, points))
 }
@@ -114,7 +114,7 @@ impl<R: Real> Kernel<(&Closing, &[Vec3<R>])> for MomentsForward {
         for part in &closing.parts {
             let mut sum = Moments::zero();
             for &[a, b, c] in &closing.faces[part.clone()] {
-                // In line, for widened copies of all points would leave the cache.
+                // Inlined, because widened copies of all points would not fit the cache.
                 sum.add_tetrahedron(
                     widen_in_line(points[a as usize]),
                     widen_in_line(points[b as usize]),

@@ -1,4 +1,4 @@
-//! Options: numbers that are finite and in their range. The words are those of the Python layer.
+//! Range checks of options. The messages are worded as those of the Python layer.
 
 use crate::error::{Error, Result};
 

@@ -1,4 +1,4 @@
-//! The points that a loss looks at, samples or vertices, a row of them at a time.
+//! The points that a loss is computed over, samples or vertices, a row of them at a time.
 
 use crate::error::{Result, unknown_choice};
 use crate::memory;
@@ -7,14 +7,14 @@ use crate::sampling::{CHUNK, Chunk, Row, Walk};
 use crate::template::Template;
 use std::ops::Range;
 
-/// The points that a loss looks at.
+/// The points that a loss is computed over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Points {
     Samples,
     Vertices,
 }
 
-/// Up to [`CHUNK`] points that are looked at together.
+/// Up to [`CHUNK`] points that are processed together.
 pub enum PointChunk<'a> {
     Samples(&'a Walk, &'a Chunk),
     Vertices(Range<usize>),
@@ -36,7 +36,7 @@ impl Points {
         }
     }
 
-    /// All points, in the order of the sums over them.
+    /// All points, in the order in which they are summed.
     pub fn chunks(self, template: &Template) -> Vec<PointChunk<'_>> {
         let walk = &template.samples.walk;
         let count = template.mesh.num_vertices;
@@ -63,7 +63,7 @@ impl PointChunk<'_> {
         self.len() == 0
     }
 
-    /// The vertices' numbers at these points.
+    /// Interpolates the vertices' numbers at these points.
     #[inline(always)]
     pub fn gather<R: Real>(&self, vertices: &[R], row: &mut Row<R>) {
         match self {
@@ -72,7 +72,7 @@ impl PointChunk<'_> {
         }
     }
 
-    /// Adds the points' numbers to the vertices', by the transposed weights.
+    /// Adds the points' numbers to the vertices' by the transposed weights.
     #[inline(always)]
     pub fn scatter_add<R: Real>(&self, row: &Row<R>, vertices: &mut [R]) {
         match self {

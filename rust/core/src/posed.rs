@@ -1,7 +1,7 @@
-//! A posed: one closed body a lane over its ground, in coordinates local to the body.
+//! A posed body over its ground, closed, in local coordinates; with SIMD numbers one body per lane.
 //!
-//! The origin is near the first vertex ([`origin`]). Far from the world's origin this keeps single precision; positions
-//! that leave a room get the origin back.
+//! The origin is near the first vertex ([`origin`]). This keeps single precision accurate far from the world's origin;
+//! results in world coordinates have the origin added back.
 
 use crate::ground::{Ground, Plane};
 use crate::memory;
@@ -21,7 +21,7 @@ pub struct PosedBody<'a, R: Real> {
 }
 
 impl<'a, R: Real> PosedBody<'a, R> {
-    /// `grounds` and `origins` have one entry a lane.
+    /// `grounds` and `origins` have one entry per lane.
     pub fn new(template: &'a Template, points: &'a [Vec3<R>], grounds: &[Ground<f64>], origins: &[Vec3<f64>]) -> Self {
         let number = |value: &dyn Fn(usize) -> f64| R::Wide::from_lanes(|lane| Real::of(value(lane)));
         let local: Vec<_> = grounds.iter().zip(origins).map(|(ground, &origin)| ground.seen_from(origin)).collect();
@@ -50,7 +50,7 @@ impl<'a, R: Real> PosedBody<'a, R> {
         Plane { axes: [narrow::<R>(e1), narrow::<R>(e2)] }
     }
 
-    /// h of each vertex of the mesh: that of any point of a face is interpolated from them.
+    /// h of each vertex of the mesh; h of a point on a face is interpolated from them.
     pub fn heights(&self) -> Vec<R> {
         let vertices = &self.points[..self.template.mesh.num_vertices];
         R::dispatch::<Heights, _>((self.narrow_ground(), vertices))
@@ -66,7 +66,7 @@ impl<'a, R: Real> PosedBody<'a, R> {
         R::dispatch::<HeightsBackward, _>((self.narrow_ground().normal, d_heights, d_points));
     }
 
-    /// Writes a local position as a position in the world.
+    /// Converts a local position to world coordinates and writes it.
     #[inline(always)]
     pub fn write_world(&self, point: Vec3<R::Wide>, out: &mut [R]) {
         for (out, x) in out.iter_mut().zip(add(point, self.origin)) {
@@ -159,17 +159,17 @@ impl<R: Real> Kernel<(Vec3<R>, &[R], &mut [Vec3<R>])> for HeightsBackward {
     }
 }
 
-/// The grid of local origins, metres: longer than a body.
+/// Spacing of the grid of local origins, metres: longer than a body.
 const GRID: f64 = 4.0;
 
-/// The grid point next to a body's first vertex, towards the world's origin: subtracting it from a vertex is exact, for
-/// it is 0 or within a factor of two of the vertex (Sterbenz), where subtracting a vertex would round away the small
-/// edges of hands and faces.
+/// The grid point next to a body's first vertex, towards the world's origin. Subtracting it from a vertex is exact,
+/// because each coordinate is 0 or within a factor of two of the vertex's (Sterbenz); subtracting the first vertex
+/// itself would round, and lose the small edges of hands and faces.
 pub fn origin(first_vertex: Vec3<f64>) -> Vec3<f64> {
     first_vertex.map(|x| GRID * (x / GRID).trunc())
 }
 
-/// The lane's part of a vector.
+/// One lane of a vector.
 pub fn lane<R: Real>(vector: [R; 2], lane: usize) -> [f64; 2] {
     vector.map(|x| x.lane(lane).value())
 }

@@ -1,4 +1,4 @@
-//! Pressure: from the height above the ground to pressure (Eq. 2) to the centre of pressure (Eq. 3).
+//! Pressure: from the height above the ground to pressure (Eq. 2) and to the centre of pressure (Eq. 3).
 
 use crate::error::Result;
 use crate::memory;
@@ -26,7 +26,7 @@ impl PressureCurve {
         not_negative("gamma", self.gamma)
     }
 
-    /// ρ(h) (Eq. 2), divided by e^(−γ shift) where h ≥ 0: with `shift` > 0 nothing may lie below the ground.
+    /// ρ(h) (Eq. 2), divided by e^(−γ shift) where h ≥ 0: `shift` > 0 requires that nothing lies below the ground.
     #[inline(always)]
     pub fn density<R: Real>(&self, height: R, shift: R) -> R {
         let below = R::of(-self.alpha).mul_add(height, R::of(1.0));
@@ -42,6 +42,18 @@ impl PressureCurve {
 }
 
 /// ρ of each sample.
+///
+/// ```
+/// use ipman::Batch;
+/// use ipman::pressure::{Pressure, PressureCurve};
+///
+/// let (template, vertices) = ipman::example::cube();
+/// let batch = Batch::new(&template, &vertices, &[0.0, 1.0, 0.0], &[0.0], &|| false)?;
+/// let pressure = batch.value(&Pressure { curve: PressureCurve { alpha: 100.0, gamma: 10.0 } })?;
+/// // 1 on the ground, e^(−10) at the top, 1 m above it.
+/// assert!(pressure.iter().all(|p| *p <= 1.0 + 1e-9 && *p >= f64::exp(-10.0) - 1e-9));
+/// # Ok::<(), ipman::Error>(())
+/// ```
 pub struct Pressure {
     pub curve: PressureCurve,
 }
@@ -107,6 +119,18 @@ impl<R: Real> Kernel<(PressureCurve, &Walk, Vec<R>, &[R])> for PressureBackward 
 }
 
 /// The centre of pressure (Eq. 3) s̄ = Σ ρ_i v_i / (Σ ρ_i + epsilon) in the world, metres.
+///
+/// ```
+/// use ipman::Batch;
+/// use ipman::pressure::{CenterOfPressure, PressureCurve};
+///
+/// let (template, vertices) = ipman::example::cube();
+/// let batch = Batch::new(&template, &vertices, &[0.0, 1.0, 0.0], &[0.0], &|| false)?;
+/// let curve = PressureCurve { alpha: 100.0, gamma: 10.0 };
+/// let [x, y, z] = batch.value(&CenterOfPressure { curve, epsilon: 0.0 })?[..] else { unreachable!() };
+/// assert!((x - 0.5).abs() < 0.1 && y < 0.1 && (z - 0.5).abs() < 0.1);
+/// # Ok::<(), ipman::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct CenterOfPressure {
     pub curve: PressureCurve,
@@ -114,19 +138,18 @@ pub struct CenterOfPressure {
     pub epsilon: f64,
 }
 
-/// The sums over the samples as they are looked at.
+/// Running sums over the samples.
 ///
-/// Where every vertex is above the ground, ρ is divided by e^(−γ · lowest height), which leaves the ratio unchanged and
-/// keeps a hovering body's sums from underflowing: the height is the lowest vertex's, or the lowest sample's of a body so
-/// large that it may lie out of reach of the vertex ([`DEEP`]). A positive epsilon forbids that, for it is an absolute
-/// amount.
+/// If every vertex is above the ground, ρ is divided by e^(−γ · lowest height), which leaves the ratio unchanged and
+/// keeps a hovering body's sums from underflowing. The height is the lowest vertex's, or for very large bodies the
+/// lowest sample's ([`DEEP`]). With a positive epsilon this is not done, because epsilon is an absolute amount.
 pub struct LoadSums<R: Real> {
     of: CenterOfPressure,
     shift: R,
     total: R::Wide,
     /// q = Wᵀρ: the load that each vertex bears, so that Σ ρ_i v_i = Σ_v q_v v.
     loads: Vec<R>,
-    /// ρ of the samples that are looked at.
+    /// ρ of the current chunk of samples.
     density: Row<R>,
 }
 
@@ -157,7 +180,7 @@ impl<R: Real> LoadSums<R> {
         chunk.scatter_add(&self.density, &mut self.loads);
     }
 
-    /// Σ ρ_i, the shift taken back.
+    /// Σ ρ_i, with the shift undone.
     pub fn total_pressure(&self) -> R::Wide {
         self.total * (R::Wide::of(-self.of.curve.gamma) * self.shift.widen()).exp()
     }
@@ -173,7 +196,7 @@ impl<R: Real> LoadSums<R> {
     }
 }
 
-/// Exponents of e up to which single precision keeps its digits, and by how much a body's may differ.
+/// Largest difference of the exponents γh within a body for which single precision keeps its digits.
 const DEEP: f64 = 60.0;
 
 /// The height of a hovering body's lowest vertex, or sample, in each lane; 0 in the others.
@@ -232,8 +255,8 @@ impl<R: Real> Kernel<(&[Vec3<R>], &[R], &mut Vec3<R::Wide>)> for Moment {
 }
 
 impl<R: Real> Cop<R> {
-    /// ∂s̄/∂v_i = ρ_i / Σρ and ∂s̄/∂ρ_i = (v_i − s̄) / Σρ, added to `d_points`; so is what `d_heights` holds already, a
-    /// gradient by the vertices' heights.
+    /// ∂s̄/∂v_i = ρ_i / Σρ and ∂s̄/∂ρ_i = (v_i − s̄) / Σρ, added to `d_points`. `d_heights` may already hold a gradient
+    /// by the vertices' heights; it is added, too.
     pub fn backward(
         &self,
         posed: &PosedBody<R>,
@@ -257,7 +280,7 @@ impl<R: Real> Cop<R> {
     }
 }
 
-/// d·v − lever of each vertex: what a unit of load there does to d·s̄.
+/// d·v − lever of each vertex: the effect of a unit of load there on d·s̄.
 struct Arms;
 
 impl<R: Real> Kernel<(&[Vec3<R>], Vec3<R>, R)> for Arms {

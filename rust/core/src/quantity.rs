@@ -8,13 +8,13 @@ use crate::posed::PosedBody;
 use crate::template::Template;
 
 pub trait Quantity: Send + Sync + 'static {
-    /// What the forward keeps for the backward.
+    /// Intermediate results that the forward saves for the backward.
     type Saved<R: Real>;
 
-    /// How many numbers it has for one body.
+    /// How many numbers it has per body.
     fn num_outputs(&self, template: &Template) -> usize;
 
-    /// An error names the option that is out of its range.
+    /// The error names the option that is out of range.
     fn check(&self, template: &Template) -> Result<()>;
 
     fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Self::Saved<R>;
@@ -22,7 +22,7 @@ pub trait Quantity: Send + Sync + 'static {
     /// Adds Σ d_out · ∂out/∂points to `d_points`, the virtual vertices' included.
     fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]);
 
-    /// Both, for a quantity that can share work between them.
+    /// Both together; to be overridden by quantities that can share work between them.
     fn forward_and_backward<R: Real>(
         &self,
         posed: &PosedBody<R>,

@@ -1,5 +1,5 @@
-//! The terms of a training step, reduced over a batch: their weighted total with its gradient, or each of them with the
-//! Jacobian that its backward needs, in one pass.
+//! Reduction of a training step's terms over a batch, in one pass: their weighted total with its gradient, or each term
+//! with the Jacobian that its backward needs.
 
 use crate::batch::Batch;
 use crate::error::{Error, Result, unknown_choice};
@@ -9,13 +9,13 @@ use crate::number::Data;
 use crate::quantity::Quantity;
 use crate::threads;
 
-/// How bodies are put together.
+/// How the bodies' terms are reduced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reduction {
-    /// Over the bodies that count.
+    /// Mean over the bodies that count.
     Mean,
     Sum,
-    /// One number a body.
+    /// No reduction: one number per body.
     None,
 }
 
@@ -30,24 +30,25 @@ impl Reduction {
     }
 }
 
-/// A body counts if `valid` says so (or is None) and its first term is a number: it is NaN for a broken body.
+/// Which bodies count, and how they are reduced. A body counts if it is `valid` (all are if None) and its first term is
+/// not NaN, as it is for a body that is not finite.
 pub struct Pool<'a> {
-    /// One a body.
+    /// One per body.
     pub valid: Option<&'a [bool]>,
     pub reduction: Reduction,
 }
 
-/// A batch's terms, pooled.
+/// A batch's reduced terms.
 pub struct Pooled {
-    /// K numbers, or B·K where nothing is reduced; 0 where no body counts.
+    /// K numbers, or B·K without reduction; 0 if no body counts.
     pub terms: Vec<f64>,
-    /// What each body counts for.
+    /// The share of each body in the reduced terms.
     pub shares: Vec<f64>,
 }
 
 impl Pool<'_> {
-    /// The terms and their Σ λ · term by the `weights` λ: one number, or one a body where nothing is reduced. Writes the
-    /// gradient of the total (of Σ totals where nothing is reduced) by the vertices, B·V·3 numbers.
+    /// The weighted total Σ λ · term with `weights` λ (one number, or one per body without reduction), and the terms.
+    /// Writes the gradient of the total (of the sum of totals without reduction) by the vertices, B·V·3 numbers.
     pub fn weighted<T: Data, Q: Quantity>(
         &self,
         batch: &Batch<T>,
@@ -57,23 +58,23 @@ impl Pool<'_> {
     ) -> Result<(Vec<f64>, Pooled)> {
         let (bodies, size) = (batch.len(), quantity.num_outputs(batch.template()));
         if size != weights.len() {
-            let expected = format!("{size} numbers, one a term");
+            let expected = format!("{size} numbers, one per term");
             return Err(Error::Argument { name: "weights", expected, got: weights.len().to_string() });
         }
         if let Some(weight) = weights.iter().find(|&&weight| !T::of(weight).value().is_finite()) {
             let expected = "finite numbers".into();
             return Err(Error::Argument { name: "weights", expected, got: weight.to_string() });
         }
-        let dealt = self.share((0..bodies).filter(|&body| self.valid(body)).count());
-        let part = |i: usize| if self.valid(i / size) { T::of(weights[i % size] * dealt) } else { T::zero() };
-        let room = || Ok((memory::collect((0..bodies * size).map(part)), memory::filled(T::zero(), bodies * size)));
-        let (d_out, mut values) = memory::guarded(room)?;
+        let provisional = self.share((0..bodies).filter(|&body| self.valid(body)).count());
+        let part = |i: usize| if self.valid(i / size) { T::of(weights[i % size] * provisional) } else { T::zero() };
+        let buffers = || Ok((memory::collect((0..bodies * size).map(part)), memory::filled(T::zero(), bodies * size)));
+        let (d_out, mut values) = memory::guarded(buffers)?;
         batch.value_and_vjp_into(quantity, &d_out, &mut values, gradient)?;
 
-        // Broken bodies are known only now, after the shares of a mean were dealt out: put that right.
+        // Bodies whose term is NaN are known only now. The mean was taken over them, too: rescale its gradient.
         let (pooled, share) = self.pool(&values, size)?;
-        if share != dealt {
-            let factor = T::of(share / dealt);
+        if share != provisional {
+            let factor = T::of(share / provisional);
             gradient.iter_mut().for_each(|d| *d = *d * factor);
         }
         let total = |terms: &[f64]| -> f64 { terms.iter().zip(weights).map(|(term, weight)| term * weight).sum() };
@@ -93,17 +94,17 @@ impl Pool<'_> {
         self.valid.is_none_or(|valid| valid[body])
     }
 
-    /// What one of `count` bodies counts for.
+    /// The share of one of `count` bodies.
     fn share(&self, count: usize) -> f64 {
         if self.reduction == Reduction::Mean { 1.0 / count.max(1) as f64 } else { 1.0 }
     }
 
-    /// And what a body that counts does so for.
+    /// Also returns the share of each counted body.
     fn pool<T: Data>(&self, values: &[T], size: usize) -> Result<(Pooled, f64)> {
-        memory::guarded(|| Ok(self.put_together(values, size)))
+        memory::guarded(|| Ok(self.reduce(values, size)))
     }
 
-    fn put_together<T: Data>(&self, values: &[T], size: usize) -> (Pooled, f64) {
+    fn reduce<T: Data>(&self, values: &[T], size: usize) -> (Pooled, f64) {
         let rows = || values.chunks_exact(size);
         let counts =
             memory::collect(rows().enumerate().map(|(body, row)| self.valid(body) && !row[0].value().is_nan()));
@@ -113,7 +114,7 @@ impl Pool<'_> {
             Reduction::None => {
                 memory::collect(values.iter().enumerate().map(|(i, &term)| counted(i / size, term, 1.0)))
             }
-            // Rust's sum of nothing is −0.
+            // `iter().sum()` of an empty iterator is −0.0; `0.0 +` makes it +0.0.
             _ => (0..size)
                 .map(|k| 0.0 + rows().enumerate().map(|(body, row)| counted(body, row[k], share)).sum::<f64>())
                 .collect(),
@@ -123,8 +124,8 @@ impl Pool<'_> {
     }
 }
 
-/// The backward of [`Pool::terms`] from what it wrote: the gradient by the vertices, B·V·3 numbers. `d_terms` is the
-/// upstream of a batch's three terms, or of each body's; `normals` are the ground's, one or B.
+/// The backward of [`Pool::terms`] from its Jacobian and shares: the gradient by the vertices, B·V·3 numbers. `d_terms`
+/// is the upstream gradient of the batch's terms, or of each body's; `normals` are the ground's, one or B.
 pub fn terms_backward<T: Data>(
     jacobian: &[T],
     shares: &[T],
@@ -143,7 +144,7 @@ pub fn terms_backward<T: Data>(
         if shares[body].value() == 0.0 {
             return gradient.fill(T::zero());
         }
-        // One row may stand for all bodies.
+        // A single row applies to all bodies.
         let d_terms = d_terms.as_chunks::<NUM_TERMS>().0;
         let [first, pull, push] = d_terms[body % d_terms.len()].map(|d_term| shares[body] * d_term);
         let normal = normals[body % normals.len()];

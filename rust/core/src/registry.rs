@@ -1,4 +1,4 @@
-//! The list of all quantities, by name: the place where a new one is registered.
+//! The list of all quantities by name.
 
 use crate::error::{Error, Result};
 use crate::losses::balance::{BalanceCost, Wrap};
@@ -15,7 +15,7 @@ use crate::support::{Contact, ContactRule, SupportMargin};
 use crate::template::Template;
 use crate::volume::PartVolumes;
 
-/// Calls back with the quantity of that name and these options: the place where a new one is registered.
+/// Calls `visitor` with the quantity of this name and these options. A new quantity is registered here.
 pub fn named<V: Visitor>(template: &Template, name: &str, options: &[f64], visitor: V) -> Result<V::Output> {
     let unknown = || Error::UnknownQuantity(format!("{name} with {} options", options.len()));
     let words: Vec<&str> = name.split('.').collect();
@@ -45,12 +45,12 @@ pub fn named<V: Visitor>(template: &Template, name: &str, options: &[f64], visit
     })
 }
 
-/// What to do with a quantity whose type is known only once its name has been read.
+/// A computation on a quantity whose type depends on a name that is known only at run time.
 pub trait Visitor {
     type Output;
     fn visit<Q: Quantity>(self, quantity: Q) -> Self::Output;
 
-    /// For a visitor that wants more of loss terms.
+    /// For visitors that treat the terms of a loss differently.
     fn visit_terms<Q: Terms>(self, quantity: Q) -> Self::Output
     where
         Self: Sized,

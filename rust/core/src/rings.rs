@@ -1,9 +1,9 @@
 //! Rings: around each point of a closed part its neighbours in cyclic order.
 //!
-//! The faces at a point v close a fan; the sum of their area vectors is the area vector A of the ring, whatever point the
-//! fan has. So ∂vol/∂v = A/3, and since the volume is homogeneous of degree three, vol = ⅓ Σ_v v·∂vol/∂v = Σ_v v·A_v/9:
-//! one walk over the rings is the part's volume and its gradient. A ring is walked from its own first neighbour, so the
-//! edges that enter are short and keep single precision.
+//! The faces at a point v close a fan; the sum of their area vectors is the area vector A of the ring, whatever point
+//! the fan has. So ∂vol/∂v = A/3, and since the volume is homogeneous of degree three, vol = ⅓ Σ_v v·∂vol/∂v = Σ_v
+//! v·A_v/9: one pass over the rings gives the part's volume and its gradient. A ring's edges are taken relative to its
+//! first neighbour, so they are short and keep their accuracy in single precision.
 
 use crate::memory;
 use crate::number::vector::{Vec3, add_cross, sub};
@@ -63,7 +63,7 @@ impl Rings {
         &self.blocks
     }
 
-    /// Twice the area vector of each ring of a block; behind the block's end nothing is written.
+    /// Twice the area vector of each ring of a block; nothing is written beyond the block's end.
     #[inline(always)]
     pub fn area_vectors<R: Real>(&self, block: &Block, points: &[Vec3<R>], doubled: &mut [Vec3<R>; BLOCK]) {
         match block.size {
@@ -82,7 +82,7 @@ impl Rings {
         }
     }
 
-    /// The same with a size that the compiler knows.
+    /// The same with a size known at compile time.
     #[inline(always)]
     fn of_size<R: Real, const N: usize>(&self, block: &Block, points: &[Vec3<R>], doubled: &mut [Vec3<R>; BLOCK]) {
         let rings = self.neighbours[block.start..].as_chunks::<N>().0;
@@ -106,7 +106,7 @@ fn area_vector<R: Real>(ring: &[u32], points: &[Vec3<R>]) -> Vec3<R> {
     doubled
 }
 
-/// A ring on its way to its block.
+/// A ring before it is assigned to a block.
 struct Cycle {
     point: u32,
     /// Where its corners are.

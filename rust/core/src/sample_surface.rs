@@ -9,6 +9,18 @@ use crate::sampling::Samples;
 use crate::template::Template;
 
 /// The samples' positions in the world, metres: W V.
+///
+/// ```
+/// use ipman::Batch;
+/// use ipman::sample_surface::SampleSurface;
+///
+/// let (template, vertices) = ipman::example::cube();
+/// let batch = Batch::new(&template, &vertices, &[0.0, 1.0, 0.0], &[0.0], &|| false)?;
+/// let samples = batch.value(&SampleSurface)?;
+/// assert_eq!(samples.len(), 3 * 2_000);
+/// assert!(samples.iter().all(|x| (-1e-12..=1.0 + 1e-12).contains(x)));
+/// # Ok::<(), ipman::Error>(())
+/// ```
 pub struct SampleSurface;
 
 impl Quantity for SampleSurface {

@@ -10,7 +10,7 @@ use crate::number::vector::{Vec3, add_scaled, dot};
 use crate::number::{BLOCK, Kernel, Real};
 use crate::rings::Rings;
 
-/// Signed volume of each part, m³, and what its gradient is made of.
+/// Signed volume of each part, m³, with what its backward needs.
 pub struct SignedVolumes<R: Real> {
     pub of_parts: Vec<R::Wide>,
     /// Twice the area vector of each ring, part after part.
@@ -75,7 +75,7 @@ impl<R: Real> Kernel<(&SignedVolumes<R>, &Closing, &[R::Wide], &mut [Vec3<R>])> 
     }
 }
 
-/// The volumes' absolute values, and the signs that lead back.
+/// Absolute values of the volumes, and their signs for the backward.
 #[inline(always)]
 pub fn absolute<W: Real>(signed: &[W]) -> (Vec<W>, Vec<W>) {
     let sign = |v: &W| v.if_negative(W::of(-1.0), W::of(1.0));

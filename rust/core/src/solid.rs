@@ -11,7 +11,7 @@ use crate::posed::{self, PosedBody};
 /// m/s²
 pub const GRAVITY: f64 = 9.81;
 
-/// How far the bodies of the lanes reach.
+/// Heights and bounds of the bodies, one per lane.
 pub struct Extent<R: Real> {
     /// h of each vertex.
     pub heights: Vec<R>,
@@ -52,18 +52,18 @@ impl Solid {
         Solid { status: status::NON_FINITE, mass: f64::NAN, centre: nan, inertia: [nan; 3], lowest: f64::NAN }
     }
 
-    /// Whether it can move at all: finite, and with a volume.
+    /// Whether it has mass properties: it is finite and has a volume.
     pub fn is_solid(&self) -> bool {
         self.status & (status::NON_FINITE | status::NO_VOLUME) == 0
     }
 
-    /// Whether it can move, and stands or lies on its ground.
+    /// Whether it has mass properties and touches its ground.
     pub fn is_grounded(&self) -> bool {
         self.is_solid() && self.status & status::NO_CONTACT == 0
     }
 
-    /// The bodies of the lanes, each in its own coordinates, for one number or one a part of `densities`. A body with its
-    /// lowest vertex higher than `contact` metres is in the air.
+    /// The solid of each lane, in local coordinates. A body whose lowest vertex is higher than `contact` metres counts
+    /// as in the air.
     pub fn of_lanes<R: Real>(
         posed: &PosedBody<R>,
         extent: &Extent<R>,
@@ -88,7 +88,7 @@ impl Solid {
         (0..R::LANES).map(of_lane).collect()
     }
 
-    /// The same in coordinates with another origin, which lies at `origin` there.
+    /// The same solid in coordinates in which the present origin lies at `origin`.
     pub fn moved(mut self, origin: Vec3<f64>) -> Self {
         self.centre = add(self.centre, origin);
         self
@@ -101,14 +101,14 @@ impl Solid {
         [f64::from(self.status), self.mass, x, y, z, xx, xy, xz, yx, yy, yz, zx, zy, zz, self.lowest]
     }
 
-    /// NaN for everything where there is no solid.
+    /// NaN for all but status and lowest height unless it is a solid.
     pub fn or_nowhere(self) -> Self {
         if self.is_solid() { self } else { Solid { status: self.status, lowest: self.lowest, ..Solid::nowhere() } }
     }
 }
 
-/// Whether the second moments that an inertia stands for are those of some matter: positive in every direction. Signed
-/// volumes of a surface that runs through itself need not be.
+/// Whether the second moments of an inertia tensor are positive in every direction, as those of real matter are. Signed
+/// volumes of a self-intersecting surface can violate this.
 fn is_of_matter(inertia: [Vec3<f64>; 3]) -> bool {
     let half = (inertia[0][0] + inertia[1][1] + inertia[2][2]) / 2.0;
     let [xx, yy, zz] = [half - inertia[0][0], half - inertia[1][1], half - inertia[2][2]];

@@ -1,6 +1,6 @@
-//! Threads: how many, and the pool. The only file that knows them.
+//! Threads: how many, and the pool.
 //!
-//! The pool belongs to the process that made it: after a fork the child makes its own.
+//! A pool belongs to one process: after a fork the child creates its own.
 
 use crate::error::{Error, Result};
 use crate::memory;
@@ -9,17 +9,17 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, OnceLock};
 
-/// Items a thread does between two questions for an interruption.
+/// Items per thread between two checks for an interruption.
 const WAVE: usize = 4;
 
-/// What the system's allocator sets aside for a thread, bytes of addresses. One for which there is no room would take a page
-/// for every small vector; then all is done on the calling thread.
+/// Address space that the system's allocator reserves per thread, bytes. Without it a thread would take a page for
+/// every small vector, so then everything runs on the calling thread.
 const ARENA_BYTES: usize = 64 << 20;
 
-/// What the small vectors of a wave take at most, bytes: they are not asked for one by one.
+/// Upper bound of the small vectors of a wave, bytes; they are not checked one by one.
 const WAVE_BYTES: usize = 1 << 20;
 
-/// Runs `f` on every item, on the pool if `parallel`. Between waves the calling thread asks whether to give up.
+/// Runs `f` on every item, on the pool if `parallel`. Between waves the calling thread checks for an interruption.
 pub fn each<I: Send>(
     items: Vec<I>,
     parallel: bool,
@@ -49,12 +49,12 @@ pub fn each<I: Send>(
     })
 }
 
-/// What was asked for, and what another library of this process uses; 0 where nothing is known.
+/// The number of threads set by the user, and that of another library in this process; 0 if unknown.
 static ASKED: AtomicUsize = AtomicUsize::new(0);
 static FOLLOWED: AtomicUsize = AtomicUsize::new(0);
 
-/// The threads that batches use: [`set_num_threads`], else `RAYON_NUM_THREADS`, else as [`follow`] says, else the
-/// machine's cores.
+/// The number of threads that batches use: of [`set_num_threads`], else `RAYON_NUM_THREADS`, else of [`follow`], else
+/// the number of cores.
 pub fn num_threads() -> usize {
     static ENVIRONMENT: OnceLock<usize> = OnceLock::new();
     static CORES: OnceLock<usize> = OnceLock::new();
@@ -69,18 +69,18 @@ pub fn num_threads() -> usize {
 
 const MOST: usize = 1024;
 
-/// None goes back to what the environment or another library says.
+/// None restores the default: the environment's or another library's number.
 pub fn set_num_threads(threads: Option<usize>) {
     ASKED.store(threads.map_or(0, |threads| threads.clamp(1, MOST)), Relaxed);
 }
 
-/// Uses as many threads as another library of this process, so that the two together do not ask for more than there are.
+/// Uses as many threads as another library of this process, so that the two share one setting.
 pub fn follow(threads: usize) {
     FOLLOWED.store(threads.clamp(1, MOST), Relaxed);
 }
 
-/// The pool of this process with the wanted number of threads; None where the system refuses new threads. Pools are
-/// leaked: a forked child must not even drop its parent's.
+/// This process's pool with the wanted number of threads; None if the system refuses new threads. Pools are leaked,
+/// because a forked child must not even drop its parent's.
 fn pool() -> Option<&'static ThreadPool> {
     static POOLS: Mutex<Vec<(u32, usize, &'static ThreadPool)>> = Mutex::new(Vec::new());
     let (process, wanted) = (std::process::id(), num_threads());

@@ -1,4 +1,4 @@
-//! The volume of each closed part, without its sign.
+//! The volume of each closed part (absolute value).
 
 use crate::error::Result;
 use crate::memory;
@@ -10,6 +10,17 @@ use crate::signed_volume::{SignedVolumes, absolute};
 use crate::template::Template;
 
 /// The volume of each part, m³ (the paper's vol^P).
+///
+/// ```
+/// use ipman::Batch;
+/// use ipman::volume::PartVolumes;
+///
+/// let (template, vertices) = ipman::example::cube();
+/// let batch = Batch::new(&template, &vertices, &[0.0, 1.0, 0.0], &[0.0], &|| false)?;
+/// let volumes = batch.value(&PartVolumes)?;
+/// assert!((volumes[0] - 1.0).abs() < 1e-12);
+/// # Ok::<(), ipman::Error>(())
+/// ```
 pub struct PartVolumes;
 
 impl Quantity for PartVolumes {

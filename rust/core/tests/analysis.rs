@@ -67,7 +67,7 @@ impl Visitor for Values<'_> {
     }
 }
 
-/// To the bit: the rooms are the same ones.
+/// To the bit: the formulas are the same ones.
 #[test]
 fn every_figure_is_its_own_quantity() {
     let (template, vertices) = common::template(2, 300);

@@ -1,4 +1,4 @@
-//! Groups of bodies, one body per lane, over the threads.
+//! The batch, and its distribution: groups of bodies, one body per lane, over the threads.
 
 use crate::error::{Error, Result};
 use crate::ground::Ground;
@@ -17,11 +17,11 @@ pub struct Batch<'a, T> {
     vertices: &'a [T],
     grounds: Vec<Ground<f64>>,
     level: Level,
-    /// Asked now and then from the calling thread; true gives up with [`Error::Interrupted`].
+    /// Called now and then on the calling thread; if it returns true the call fails with [`Error::Interrupted`].
     interrupted: &'a (dyn Fn() -> bool + Sync + 'a),
 }
 
-/// Work on one body costs at least this many vertices' worth before a second thread pays.
+/// Total number of vertices from which on a second thread pays.
 const INLINE_VERTICES: usize = 2_000;
 
 impl<'a, T: Data> Batch<'a, T> {
@@ -96,7 +96,7 @@ impl<'a, T: Data> Batch<'a, T> {
         bodies
     }
 
-    /// Shows one body to `f` as dual numbers along `d_vertices`, if it is finite.
+    /// Calls `f` with one body as dual numbers along `d_vertices`, if it is finite.
     pub(super) fn on_dual(&self, body: usize, d_vertices: &[T], f: impl FnOnce(&PosedBody<Dual>)) {
         let Some(origin) = self.origin(body) else { return };
         let row = 3 * self.template.mesh.num_vertices;
@@ -137,7 +137,8 @@ impl<'a, T: Data> Batch<'a, T> {
         points
     }
 
-    /// Runs `f` on groups of finite bodies, with their rows of the outputs, which are NaN and then zero for the others.
+    /// Runs `f` on groups of finite bodies, with their rows of the outputs. Rows of other bodies become NaN in the
+    /// first output and zero in the second.
     pub(super) fn each<const N: usize>(
         &self,
         outputs: [(&mut [T], usize); N],
@@ -163,19 +164,19 @@ impl<'a, T: Data> Batch<'a, T> {
         })
     }
 
-    /// Runs `f` on finite bodies side by side, over the threads: on each group with what belongs to its bodies.
+    /// Runs `f` on groups of finite bodies over the threads, with the items P of each group's bodies.
     pub(super) fn each_group<P: Send>(
         &self,
         bodies: Vec<(usize, Vec3<f64>, P)>,
         f: impl Fn(&Group, Vec<P>) + Sync,
     ) -> Result<()> {
         let widths = self.widths(bodies.len());
-        // Each body once more, in its group's small vectors.
+        // Each body is listed once more in its group's vectors.
         memory::ask(bodies.len() * (size_of::<P>() + size_of::<(usize, Vec3<f64>)>()));
         let mut groups = Vec::new();
         let mut rest = bodies.into_iter();
         for &width in widths {
-            // A group that is half empty takes as long as a full one.
+            // A half-empty group takes as long as a full one, so such a rest goes to narrower lanes.
             while 2 * rest.len() > width {
                 let mut group = Group { level: self.level, width, bodies: Vec::new(), origins: Vec::new() };
                 let mut own = Vec::with_capacity(width);
@@ -200,7 +201,7 @@ impl<'a, T: Data> Batch<'a, T> {
         threads::each(rows, self.pays_threads(), self.interrupted, &|(body, row)| f(body, row))
     }
 
-    /// The lanes to use for so many bodies. Two threads with half the lanes are faster than one alone with all.
+    /// The lane widths to use for this many bodies. Two threads with half the lanes are faster than one with all.
     fn widths(&self, bodies: usize) -> &'static [usize] {
         let widths = T::widths(self.level);
         let (widest, half) = (widths[0], *widths.get(1).unwrap_or(&1));
@@ -212,13 +213,13 @@ impl<'a, T: Data> Batch<'a, T> {
         self.len() * self.template.mesh.num_vertices >= INLINE_VERTICES
     }
 
-    /// Shows a group of bodies, one a lane, to `work`.
+    /// Runs `work` on a group of bodies, one per lane.
     pub(super) fn on_lanes<W: OnLanes<T>>(&self, group: &Group, work: W) {
         T::run_on_lanes(group.level, group.width, ReadBodies { batch: self, group, work });
     }
 }
 
-/// Finite bodies that are computed side by side, by their index, and their local origins.
+/// Indices and local origins of finite bodies that are computed together, one per lane.
 pub(super) struct Group {
     level: Level,
     width: usize,
@@ -227,18 +228,18 @@ pub(super) struct Group {
 }
 
 impl Group {
-    /// The body of each lane; lanes that are left over repeat the last body.
+    /// The body of each lane, as an index into `bodies`; spare lanes repeat the last body.
     fn lanes(&self) -> impl Iterator<Item = usize> {
         (0..self.width).map(|lane| lane.min(self.bodies.len() - 1))
     }
 }
 
-/// What is done with bodies on lanes.
+/// A computation on a group of bodies, one per lane.
 pub(super) trait OnLanes<T> {
     fn run<R: Real<Data = T>>(self, posed: &PosedBody<R>);
 }
 
-/// Turns the bodies of a group into lanes.
+/// Reads the bodies of a group into lanes and runs `work` on them.
 struct ReadBodies<'a, T, W> {
     batch: &'a Batch<'a, T>,
     group: &'a Group,

@@ -1,7 +1,8 @@
-//! Batches: many bodies of one template, over the lanes of a number and over threads.
+//! Batches: many bodies of one template, over SIMD lanes and threads.
 //!
-//! Every body is computed from start to end in one lane by one thread, and all numbers of a CPU level round alike, so its
-//! bits depend neither on the number of threads nor on its neighbours nor on its place.
+//! Every body is computed from start to end in one lane by one thread, and all number types of a CPU level round
+//! identically, so its bits depend neither on the number of threads nor on the other bodies nor on its position in the
+//! batch.
 
 mod groups;
 mod per_body;

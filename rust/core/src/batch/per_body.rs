@@ -25,7 +25,7 @@ impl<T: Data> Batch<'_, T> {
         self.per_body(nowhere, &Support { contact, method })
     }
 
-    /// All figures of each body ([`Analysis`]): B·K numbers, and the corners of the base of support.
+    /// All results for each body ([`Analysis`]): writes B·K numbers and returns the corners of the bases of support.
     pub fn analysis_into(&self, analysis: &Analysis, out: &mut [T]) -> Result<Vec<Polygon>> {
         let size = analysis.size(self.template);
         analysis.check(self.template)?;
@@ -59,7 +59,7 @@ impl<T: Data> Batch<'_, T> {
         self.per_body(status::NON_FINITE, &Status { contact })
     }
 
-    /// Each body as one solid. One with its lowest vertex higher than `contact` metres is in the air.
+    /// Each body as one solid. A body whose lowest vertex is higher than `contact` metres counts as in the air.
     pub fn solids(&self, densities: &MassProperties, contact: f64) -> Result<Vec<Solid>> {
         densities.check(self.template)?;
         positive("contact", contact)?;
@@ -82,7 +82,7 @@ impl<T: Data> Batch<'_, T> {
         })
     }
 
-    /// The result of each body; `bad` for a body that is not finite.
+    /// The result for each body; `bad` for bodies that are not finite.
     fn per_body<F: PerBody>(&self, bad: F::Output, result: &F) -> Result<Vec<F::Output>> {
         memory::guarded(|| {
             let mut out = memory::filled(bad, self.len());
@@ -92,7 +92,7 @@ impl<T: Data> Batch<'_, T> {
     }
 }
 
-/// A result per body that is no [`Quantity`].
+/// A result per body that is not a [`Quantity`].
 trait PerBody: Sync {
     type Output: Clone + Send;
     /// One per lane.
@@ -169,7 +169,7 @@ impl PerBody for TipTest {
     }
 }
 
-/// The bits of one lane. Whether a volume is nothing or less is decided in double precision.
+/// The status bits of one lane. Volumes are computed in double precision, because their sign decides.
 fn status_of<R: Real>(posed: &PosedBody<R>, lane: usize, num_contacts: usize) -> u32 {
     let vertices = &posed.points[..posed.template.mesh.num_vertices];
     let mut points: Vec<Vec3<f64>> = memory::with_capacity(posed.points.len());

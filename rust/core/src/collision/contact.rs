@@ -1,11 +1,11 @@
-//! The cost of a body's contact with itself: what is inside another part is pushed out, what is near is pulled closer
+//! The cost of a body's contact with itself: vertices inside another part are pushed out, nearby ones are pulled closer
 //! (Müller et al., *On Self-Contact and Human Pose*, CVPR 2021).
 
 use super::nearest::Nearest;
 use crate::error::{Error, Result};
 use crate::number::vector::{Vec3, add_scaled};
 
-/// A vertex with opposite surface around it, or near.
+/// A vertex that is inside opposite surface, or near it.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
     pub vertex: u32,
@@ -36,8 +36,8 @@ impl SelfContact {
         Ok(SelfContact { push_width, pull_width, pull_weight, near })
     }
 
-    /// [push, pull]; adds their gradients by the vertices. The nearest point is held where it is on its face: as the
-    /// nearest it does not change the distance by sliding.
+    /// [push, pull]; adds their gradients by the vertices. The nearest point is held fixed on its face: sliding does
+    /// not change the distance to first order.
     pub fn cost(&self, touches: &[Touch], faces: &[[u32; 3]], gradients: [&mut [Vec3<f64>]; 2]) -> [f64; 2] {
         let mut costs = [0.0; 2];
         for touch in touches {

@@ -1,4 +1,4 @@
-//! Neighbourhoods on the rest shape: what lies within a distance of each vertex, along the edges of the mesh.
+//! Neighbourhoods on the rest shape: what lies within a given distance of each vertex along the edges of the mesh.
 
 use super::tree::Tree;
 use crate::error::Result;
@@ -27,7 +27,7 @@ impl Neighbourhoods {
         let edges = Edges::new(mesh, vertices);
         let mut near = Bits::new(vertices.len(), vertices.len());
         let mut nodes = Bits::new(vertices.len(), tree.nodes.len());
-        // For the heap of every thread's walk: at most one entry an edge.
+        // For the heap of every thread's search: at most one entry per edge.
         memory::ask(threads::num_threads() * edges.neighbours.len() * size_of::<(u64, u32)>());
         let rows = memory::collect(near.rows().zip(nodes.rows()).enumerate());
         threads::each(rows, true, interrupted, &|(vertex, (near, nodes))| {
@@ -82,7 +82,7 @@ impl Edges {
     }
 }
 
-/// Dijkstra's walk from a vertex, as far as the radius. Lengths are ordered as their bits are: none is negative.
+/// Dijkstra's algorithm from a vertex, up to the radius. Lengths are not negative, so they are ordered as their bits.
 fn spread(start: usize, edges: &Edges, radius: f64, near: &mut [u64]) {
     let mut lengths = memory::filled(f64::INFINITY, edges.starts.len() - 1);
     let mut next = BinaryHeap::from([Reverse((0.0_f64.to_bits(), start as u32))]);

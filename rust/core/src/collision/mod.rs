@@ -1,9 +1,9 @@
-//! A body that touches or penetrates itself: which vertices are inside another part of it, what surface of other parts is
-//! nearest, and the cost of both.
+//! Self-contact: which vertices of a body are inside another part of it, the nearest surface of other parts, and the
+//! cost of both.
 //!
-//! Skin is no obstacle to itself: faces within a distance of a vertex, along the rest shape's surface, are not opposite to
-//! it. A vertex is inside another part where the winding number of the body there is more than its own surface explains
-//! ([`winding`]) and the opposite surface has the larger share in that, so that a crease of skin is none.
+//! Nearby skin does not count: faces within a given distance of a vertex along the rest shape's surface are not
+//! opposite to it. A vertex is inside another part if the body's winding number there is larger than its own surface
+//! explains ([`winding`]) and the opposite surface contributes most of it, so that a crease of skin does not count.
 
 pub mod contact;
 pub mod geodesic;
@@ -26,18 +26,19 @@ use winding::OfTriangles;
 
 /// The body's winding number above which a vertex is inside another part.
 pub const INSIDE: f64 = 0.99;
-/// The share of opposite surface in it: half of the directions, so that a body that ends inside another counts.
+/// The winding number of the opposite surface above which it counts: half of the directions, so that a limb that ends
+/// inside another part counts.
 const OPPOSITE: f64 = 0.5;
-/// Winding numbers nearer than this to a decision are looked at once more in double precision: single precision is right
+/// Winding numbers closer than this to a threshold are computed again in double precision: single precision is accurate
 /// to 1e-4.
 const CLOSE: f64 = 0.01;
-/// The cosine between the way to the nearest opposite surface and the way out there. Less, and it is the rim of
-/// the vertex's own neighbourhood that is nearest: no way out, but where the opposite begins.
+/// Least cosine between the direction to the nearest opposite point and the surface normal there. Below it the nearest
+/// point is the rim of the vertex's own neighbourhood, where opposite surface begins, and no way out.
 const FACING: f64 = 0.5;
-/// So many vertices must there be in all before a second thread pays.
+/// Total number of vertices from which on a second thread pays.
 const INLINE_VERTICES: usize = 100;
 
-/// All that is known of a template's collisions before a pose.
+/// Pose-independent data for the self-contact of a template.
 pub struct Collision {
     num_vertices: usize,
     tree: Tree,
@@ -142,7 +143,8 @@ impl Collision {
         })
     }
 
-    /// Shows every finite body to `f`, with its rows of the outputs, which are NaN and then zero for the others.
+    /// Runs `f` on every finite body with its rows of the outputs. Rows of other bodies become NaN in the first output
+    /// and zero in the second.
     fn each<T: Data, const N: usize>(
         &self,
         vertices: &[T],
@@ -167,12 +169,12 @@ impl Collision {
     }
 }
 
-/// A body in its pose, in coordinates of its own.
+/// A posed body in local coordinates.
 struct Posed<'a> {
     collision: &'a Collision,
     points: Vec<Vec3<f64>>,
     boxes: Vec<Aabb>,
-    /// Of the vertices, outwards, of length 1.
+    /// Outward unit normals of the vertices.
     normals: Vec<Vec3<f64>>,
     level: Level,
 }
@@ -239,8 +241,8 @@ impl<'a> Posed<'a> {
         touches
     }
 
-    /// Whether the way to the nearest point leaves the surface there. The normal is one of the point, not of the face, for
-    /// on an edge it is chance which of its faces is found.
+    /// Whether the direction to the nearest point leaves the body there. The normal is interpolated at the point rather
+    /// than taken from the face, because on an edge it is arbitrary which face is found.
     fn leads_out(&self, nearest: &Nearest) -> bool {
         let mut normal = zero();
         for (&corner, weight) in self.collision.tree.faces[nearest.face].iter().zip(nearest.weights) {

@@ -9,12 +9,12 @@ pub struct Nearest {
     /// Among [`Tree::faces`].
     pub face: usize,
     pub weights: [f64; 3],
-    /// From there to the point.
+    /// Vector from the nearest point to the given point.
     pub offset: Vec3<f64>,
     pub squared_distance: f64,
 }
 
-/// The nearest point that is less than `reach` away, on faces that are not skipped: all of a node, or one face.
+/// The nearest point less than `reach` away on the faces that are not skipped, by whole nodes or one by one.
 pub fn nearest(
     tree: &Tree,
     boxes: &[Aabb],
@@ -48,7 +48,7 @@ pub fn nearest(
     best
 }
 
-/// The weights of the triangle's point that is nearest to `at`, and the way from it to `at`.
+/// The weights of the triangle's point nearest to `at`, and the vector from it to `at`.
 fn on_triangle(corners: [Vec3<f64>; 3], at: Vec3<f64>) -> ([f64; 3], Vec3<f64>) {
     let [a, b, c] = corners;
     let normal = cross(sub(b, a), sub(c, a));

@@ -1,4 +1,4 @@
-//! A tree over the faces of a template, split on its rest shape. Its boxes are fitted to every pose anew.
+//! A bounding-volume tree over the faces of a template, built on its rest shape. The boxes are refitted to every pose.
 
 use crate::memory;
 use crate::mesh::Mesh;
@@ -11,11 +11,11 @@ const LEAF: usize = 8;
 pub struct Tree {
     /// Parents before their children; the first is the root.
     pub nodes: Vec<Node>,
-    /// The mesh's faces, leaf by leaf, and which they are.
+    /// The mesh's faces, leaf by leaf.
     pub faces: Vec<[u32; 3]>,
     pub face_indices: Vec<u32>,
     pub closures: Vec<[u32; 3]>,
-    /// The vertices that belong to a face, neighbours beside each other.
+    /// The vertices that belong to a face, ordered so that neighbours are close.
     pub vertices: Vec<u32>,
 }
 
@@ -23,8 +23,8 @@ pub struct Node {
     /// Into [`Tree::faces`].
     pub faces: Range<usize>,
     pub children: Option<[usize; 2]>,
-    /// Into [`Tree::closures`]: few triangles with the same boundary as the node's faces. Seen from outside the node's box
-    /// the two have the same winding number, for together they enclose nothing that is out there.
+    /// Into [`Tree::closures`]: few triangles with the same boundary as the node's faces. Outside the node's box the
+    /// two have the same winding number, because together they enclose nothing there.
     pub closure: Range<usize>,
 }
 
@@ -69,7 +69,8 @@ fn center(face: [u32; 3], vertices: &[Vec3<f64>]) -> Vec3<f64> {
     [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
 }
 
-/// Adds the node of these faces, which start at `start` in the order of all, and those below it; its index.
+/// Adds the node of these faces, whose first index in the order of all is `start`, and its descendants; returns its
+/// index.
 fn split(faces: &mut [u32], start: usize, centers: &[Vec3<f64>], nodes: &mut Vec<Node>) -> usize {
     let index = nodes.len();
     memory::push(nodes, Node { faces: start..start + faces.len(), children: None, closure: 0..0 });

@@ -1,9 +1,10 @@
 //! Generalised winding numbers: how often a surface goes around a point (Jacobson et al. 2013).
 //!
-//! Exact: a group of faces whose box does not hold the point is replaced by the few triangles that close it, which have the
-//! same winding number there. The solid angle of a triangle is van Oosterom and Strackee's; a triangle that has the point
-//! as its corner counts nothing. So a vertex of a surface has what the surface's inside takes up of the directions around
-//! it, between 0 and 1, and 1 more for every other part of the body that it is inside of.
+//! Exact: a group of faces whose box does not contain the point is replaced by the few triangles that close it, which
+//! have the same winding number there. The solid angle of a triangle is van Oosterom and Strackee's; a triangle with
+//! the point as a corner contributes nothing. At a vertex of the surface the winding number is therefore the fraction
+//! of directions that point into the body, between 0 and 1, plus 1 for every other part of the body that the vertex is
+//! inside of.
 
 use super::tree::{Aabb, Tree};
 use crate::memory;
@@ -17,14 +18,14 @@ pub struct AtVertices<'a, T> {
     pub tree: &'a Tree,
     pub boxes: &'a [Aabb],
     pub points: &'a [Vec3<f64>],
-    /// The same in the caller's precision.
+    /// The same, in the caller's precision.
     pub rounded: &'a [Vec3<T>],
 }
 
 impl<T: Data> Work<T> for AtVertices<'_, T> {
     type Output = Vec<f64>;
 
-    /// Lanes are vertices that lie beside each other: they look at the same triangles.
+    /// Lanes are neighbouring vertices, which share their triangles.
     fn run<R: Real<Data = T>>(self) -> Vec<f64> {
         let mut windings = memory::filled(0.0, self.points.len());
         let mut triangles = Vec::new();
@@ -52,7 +53,7 @@ pub struct OfTriangles<'a> {
 }
 
 impl OfTriangles<'_> {
-    /// The same in a precision of choice.
+    /// The same, in the precision of T.
     pub fn sum<T: Data>(self, level: Level) -> f64 {
         T::run_on_lanes(level, T::widths(level)[0], self)
     }
@@ -79,8 +80,8 @@ impl<T: Data> Work<T> for OfTriangles<'_> {
     }
 }
 
-/// Triangles with the winding number that the faces have at `at` for which `whole` says so of all of a node, or `single` of
-/// one face.
+/// Triangles with the same winding number at `at` as the faces chosen by `whole` (all faces of a node) and `single`
+/// (one face).
 pub fn of_some(
     tree: &Tree,
     boxes: &[Aabb],
@@ -104,7 +105,7 @@ pub fn of_some(
     triangles
 }
 
-/// The triangles that stand for `node`, seen from anywhere in a box.
+/// The triangles that replace `node` for points in a box.
 fn gather(tree: &Tree, boxes: &[Aabb], from: &Aabb, node: usize, triangles: &mut Vec<[u32; 3]>) {
     let mut stack = vec![node];
     while let Some(index) = stack.pop() {
@@ -119,7 +120,7 @@ fn gather(tree: &Tree, boxes: &[Aabb], from: &Aabb, node: usize, triangles: &mut
     }
 }
 
-/// Half the solid angles of triangles seen from the points of lanes.
+/// Half the solid angles of triangles at several points, one per lane.
 struct SumOfAngles;
 
 impl<R: Real> Kernel<(&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)> for SumOfAngles {
@@ -138,7 +139,7 @@ impl<R: Real> Kernel<(&[[u32; 3]], &[Vec3<R::Data>], Vec3<R>)> for SumOfAngles {
     }
 }
 
-/// The same of triangles on lanes, seen from the origin.
+/// The same at the origin, with one triangle per lane.
 struct SumOfLanes;
 
 impl<R: Real> Kernel<&[[Vec3<R>; 3]]> for SumOfLanes {
@@ -154,8 +155,8 @@ impl<R: Real> Kernel<&[[Vec3<R>; 3]]> for SumOfLanes {
     }
 }
 
-/// Angles are added up as complex numbers are multiplied: (re, im) points along the sum, and whole turns are counted. No
-/// arc tangents but one at the end.
+/// A sum of angles by multiplying complex numbers: (re, im) points along the sum, and whole turns are counted, so that
+/// one arc tangent at the end suffices.
 #[inline(always)]
 fn add_angle<R: Real>(sum: &mut [R; 3], [a, b, c]: [Vec3<R>; 3]) {
     let [re, im, turns] = *sum;
@@ -163,11 +164,11 @@ fn add_angle<R: Real>(sum: &mut [R; 3], [a, b, c]: [Vec3<R>; 3]) {
     let (la, lb, lc) = (dot(a, a).sqrt(), dot(b, b).sqrt(), dot(c, c).sqrt());
     let y = dot(a, cross(b, c));
     let x = la * lb * lc + (dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
-    // A corner, or a point of an edge, sees no angle.
+    // At a corner or on an edge the angle is undefined and counts as 0.
     let nothing = x.abs() + y.abs() - tiny;
     let (x, y) = (nothing.if_negative(one, x), nothing.if_negative(zero, y));
     let (next_re, next_im) = (re * x - im * y, re * y + im * x);
-    // Two angles above the axis have a sum below it, or the other way round: it went past half a turn.
+    // Two angles above the axis whose sum lies below it, or the reverse: the sum has passed half a turn.
     let down = next_im.if_negative(one, zero);
     let above = im.if_negative(zero, y.if_negative(zero, one));
     let below = im.if_negative(y.if_negative(one, zero), zero);

@@ -12,7 +12,7 @@ use crate::quantity::Quantity;
 use crate::sampling::{CHUNK, Row, fold};
 use crate::template::Template;
 
-/// How "tanh x squared" is read.
+/// The two readings of "tanh x squared".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tanh {
     /// (tanh x)², the paper's.
@@ -49,6 +49,22 @@ impl Tanh {
     }
 }
 
+/// (pull, push) as a quantity.
+///
+/// ```
+/// use ipman::Batch;
+/// use ipman::losses::ground::{GroundLoss, Tanh};
+/// use ipman::points::Points;
+///
+/// let (template, vertices) = ipman::example::cube();
+/// let batch = Batch::new(&template, &vertices, &[0.0, 1.0, 0.0], &[0.0], &|| false)?;
+/// let (alpha1, alpha2, beta1, beta2) = (1.0, 0.15, 10.0, 0.15);
+/// let loss = GroundLoss { points: Points::Vertices, tanh: Tanh::Squared, alpha1, alpha2, beta1, beta2 };
+/// let [pull, push] = batch.value(&loss)?[..] else { unreachable!() };
+/// // Four of the eight vertices lie on the ground, four 1 m above it.
+/// assert!((pull - f64::tanh(1.0 / 0.15).powi(2) / 2.0).abs() < 1e-9 && push == 0.0);
+/// # Ok::<(), ipman::Error>(())
+/// ```
 pub struct GroundLoss {
     pub points: Points,
     pub tanh: Tanh,
@@ -60,32 +76,32 @@ pub struct GroundLoss {
     pub beta2: f64,
 }
 
-/// What differs above and below the ground.
+/// The constants above and below the ground.
 struct Sides<R> {
     tanh: Tanh,
-    /// 1/α2 and −1/β2: below the ground x = −h/β2 is positive, too.
+    /// 1/α2 and −1/β2, so that x = −h/β2 below the ground is positive, too.
     widths: [R; 2],
-    /// What x's slope is worth, times the width.
+    /// Upstream gradient of each side divided by the number of points, times its width.
     shares: [R; 2],
 }
 
-/// The sums of both curves as the points are looked at, and their gradients by the vertices' heights where wanted.
+/// Running sums of both curves over the points and, if requested, their gradients by the vertices' heights.
 pub struct GroundSums<'a, R: Real> {
     of: &'a GroundLoss,
     sides: Sides<R>,
     pull: R::Wide,
     push: R::Wide,
     gradient: Gradient<'a, R>,
-    /// Of the points that are looked at.
+    /// Slopes at the current chunk of points.
     slopes: Row<R>,
 }
 
-/// Where the gradient by the vertices' heights is added.
+/// What the gradient by the vertices' heights is added to.
 enum Gradient<'a, R> {
     Unasked,
-    /// Of both terms together.
+    /// One gradient, of both terms together.
     Of(&'a mut [R]),
-    /// Of pull and of push.
+    /// Separate gradients of pull and of push.
     OfEach([&'a mut [R]; 2]),
 }
 
@@ -94,7 +110,7 @@ impl GroundLoss {
         self.sums_and(Gradient::Unasked, [R::zero(); 2])
     }
 
-    /// With the gradient of what the upstream `d_out` makes of (pull, push).
+    /// Sums with the gradient of d_out · (pull, push).
     pub fn sums_and_gradient<'a, R: Real>(
         &'a self,
         template: &Template,
@@ -104,7 +120,7 @@ impl GroundLoss {
         self.sums_and(Gradient::Of(d_heights), self.shares(template, d_out))
     }
 
-    /// With the gradients of pull and of push.
+    /// Sums with the separate gradients of pull and of push.
     pub fn sums_and_jacobian<'a, R: Real>(
         &'a self,
         template: &Template,
@@ -118,7 +134,7 @@ impl GroundLoss {
         GroundSums { of: self, sides, pull: R::Wide::zero(), push: R::Wide::zero(), gradient, slopes }
     }
 
-    /// What the slope of each side is worth: the gradients by (pull, push) over the number of points.
+    /// Upstream gradient of each side divided by the number of points.
     fn shares<R: Real>(&self, template: &Template, d_out: &[R]) -> [R; 2] {
         let share = 1.0 / self.points.count(template) as f64;
         [d_out[0] * R::of(self.alpha1 * share), d_out[1] * R::of(self.beta1 * share)]
@@ -141,7 +157,7 @@ impl<R: Real> Sides<R> {
 }
 
 impl<R: Real> GroundSums<'_, R> {
-    /// Looks at the points of a place.
+    /// Adds a chunk of points.
     pub fn add(&mut self, chunk: &PointChunk, heights: &Row<R>) {
         let sums = [&mut self.pull, &mut self.push];
         R::dispatch::<AddChunk, _>((&self.sides, heights, chunk.len(), &mut self.slopes, sums));
@@ -157,7 +173,7 @@ impl<R: Real> GroundSums<'_, R> {
         }
     }
 
-    /// Looks at all its points.
+    /// Adds all points.
     pub fn add_all(&mut self, template: &Template, heights: &[R]) {
         let mut row = [R::zero(); CHUNK];
         for chunk in self.of.points.chunks(template) {
@@ -183,7 +199,7 @@ impl<R: Real> Kernel<ChunkToAdd<'_, R>> for AddChunk {
 
     #[inline(always)]
     fn run((sides, heights, len, slopes, [pull, push]): ChunkToAdd<'_, R>) {
-        // Pull as positive, push as negative numbers.
+        // Pull as positive and push as negative numbers, so that one row holds both.
         let mut values = [R::zero(); CHUNK];
         for ((&height, signed), slope) in heights.iter().zip(&mut values).zip(slopes) {
             let (value, scaled) = sides.value_and_slope(height);

@@ -1,4 +1,4 @@
-//! The losses: one term a file. Each is one number a body (two for the ground), unweighted.
+//! The losses, one term per file. Each is one number per body (two for the ground), unweighted.
 
 pub mod balance;
 pub mod ground;

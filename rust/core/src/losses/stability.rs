@@ -11,6 +11,21 @@ use crate::pressure::{CenterOfPressure, Cop};
 use crate::quantity::Quantity;
 use crate::template::Template;
 
+/// L_stability (Eq. 4) as a quantity, metres.
+///
+/// ```
+/// use ipman::Batch;
+/// use ipman::losses::stability::StabilityLoss;
+/// use ipman::mass::Method;
+/// use ipman::pressure::{CenterOfPressure, PressureCurve};
+///
+/// let (template, vertices) = ipman::example::cube();
+/// let batch = Batch::new(&template, &vertices, &[0.0, 1.0, 0.0], &[0.0], &|| false)?;
+/// let pressure = CenterOfPressure { curve: PressureCurve { alpha: 100.0, gamma: 10.0 }, epsilon: 0.0 };
+/// let loss = batch.value(&StabilityLoss { method: Method::Exact, pressure })?[0];
+/// assert!(loss < 0.1, "a cube stands in balance");
+/// # Ok::<(), ipman::Error>(())
+/// ```
 pub struct StabilityLoss {
     pub method: Method,
     pub pressure: CenterOfPressure,
@@ -25,7 +40,7 @@ pub fn distance_on_ground<R: Real>(posed: &PosedBody<R>, centre: &Centre<R>, cop
 }
 
 impl StabilityLoss {
-    /// The backward, which adds what `d_heights` holds already, too: a gradient by the vertices' heights.
+    /// The backward. `d_heights` may already hold a gradient by the vertices' heights; it is added, too.
     pub fn backward_with<R: Real>(
         &self,
         posed: &PosedBody<R>,

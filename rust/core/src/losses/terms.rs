@@ -1,6 +1,6 @@
 //! The terms of a training or fitting step together: (stability, pull, push), Eqs. 4, 6 and 7, or (balance, pull, push).
 //!
-//! Stability and ground look at the samples together.
+//! Stability and ground share one pass over the samples.
 
 use crate::error::Result;
 use crate::losses::balance::{Balance, BalanceCost};
@@ -17,10 +17,10 @@ use crate::quantity::Quantity;
 use crate::sampling::CHUNK;
 use crate::template::Template;
 
-/// A first term, pull and push.
+/// The first term, pull and push.
 pub const NUM_TERMS: usize = 3;
 
-/// A first term, and pull and push. The gradients of these two run along the ground's normal.
+/// The terms (first, pull, push). The gradients of pull and push are parallel to the ground's normal.
 pub trait Terms: Quantity {
     /// The values; the gradient of the first term, added to `d_first`, the virtual vertices' included; and the gradients
     /// of pull and push by the vertices' heights, added to `d_ground`.
@@ -33,14 +33,35 @@ pub trait Terms: Quantity {
     );
 }
 
+/// (stability, pull, push) in one pass; the values are those of the separate losses.
+///
+/// ```
+/// use ipman::Batch;
+/// use ipman::losses::ground::{GroundLoss, Tanh};
+/// use ipman::losses::stability::StabilityLoss;
+/// use ipman::losses::terms::StabilityTerms;
+/// use ipman::mass::Method;
+/// use ipman::points::Points;
+/// use ipman::pressure::{CenterOfPressure, PressureCurve};
+///
+/// let (template, vertices) = ipman::example::cube();
+/// let batch = Batch::new(&template, &vertices, &[0.0, 1.0, 0.0], &[0.0], &|| false)?;
+/// let pressure = CenterOfPressure { curve: PressureCurve { alpha: 100.0, gamma: 10.0 }, epsilon: 0.0 };
+/// let stability = StabilityLoss { method: Method::Pcom, pressure };
+/// let (alpha1, alpha2, beta1, beta2) = (1.0, 0.15, 10.0, 0.15);
+/// let ground = GroundLoss { points: Points::Samples, tanh: Tanh::Squared, alpha1, alpha2, beta1, beta2 };
+/// let alone = [batch.value(&stability)?, batch.value(&ground)?].concat();
+/// assert_eq!(batch.value(&StabilityTerms { stability, ground })?, alone);
+/// # Ok::<(), ipman::Error>(())
+/// ```
 pub struct StabilityTerms {
     pub stability: StabilityLoss,
     pub ground: GroundLoss,
 }
 
 impl StabilityTerms {
-    /// Values, and what the stability's backward needs. Where the sums ask for it, the ground's backward is done at the
-    /// same look at the samples.
+    /// The values, with what the stability's backward needs. If `ground` requests gradients, they come from the same
+    /// pass over the samples.
     fn one_pass<R: Real>(
         &self,
         posed: &PosedBody<R>,
@@ -115,6 +136,7 @@ impl Terms for StabilityTerms {
     }
 }
 
+/// (balance, pull, push).
 pub struct BalanceTerms {
     pub balance: BalanceCost,
     pub ground: GroundLoss,

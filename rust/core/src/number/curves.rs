@@ -1,13 +1,14 @@
-//! 2^x and tanh from additions and multiplications alone: the same bits on every machine of a CPU level, and no calls.
+//! 2^x and tanh from additions and multiplications only: the same bits on every machine of a CPU level, and no library
+//! calls.
 
 use super::Real;
 
-/// What the curves need to know of a floating-point format.
+/// Constants of a floating-point format.
 pub(super) trait Format: Real {
     /// 1.5 · 2^(mantissa bits) + the exponents' bias: adding it to x leaves the nearest integer k, biased, in the lowest
     /// bits of the mantissa.
     const ROUNDER: f64;
-    /// Exponents of the smallest and largest power of two that are kept.
+    /// Exponents of the smallest and largest normal power of two.
     const EXPONENTS: (f64, f64);
     /// The polynomial for (2^f − 1) / f on |f| ≤ 1/2, to the format's rounding.
     const POWERS: &'static [f64];
@@ -68,7 +69,8 @@ pub(super) fn tanh_of_positive<T: Format>(x: T) -> T {
     let exponent = x * T::of(-2.0 * std::f64::consts::LOG2_E);
     let (power, fraction) = split(exponent.at_least(T::of(T::EXPONENTS.0)));
     let m = power.mul_add(fraction, power - T::of(1.0));
-    // Not −m: of one number aarch64 compiles −(a·b + c) to (−a)·b − c, whose zero has the other sign than the lanes'.
+    // Not −m: for one lane aarch64 compiles −(a·b + c) to (−a)·b − c, whose zero has the opposite sign to the SIMD
+    // lanes'.
     m / (T::of(-2.0) - m)
 }
 

@@ -1,4 +1,5 @@
-//! [`Data`] of f32 and f64: which numbers each level computes with, and the only way to them.
+//! [`Data`] for f32 and f64: which number types each CPU level computes with. SIMD types are reachable only through
+//! here.
 
 use super::simd_level::Level;
 use super::{Data, Fused, Work};
@@ -39,7 +40,7 @@ impl Data for f32 {
     }
 }
 
-/// Double precision is for exactness: it runs one body at a time.
+/// Double precision is for accuracy, not speed: one body at a time.
 impl Data for f64 {
     const EPSILON: f64 = f64::EPSILON;
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! Dual numbers: a value and its derivative along one direction.
 //!
-//! Run through a room's forward they give the directional derivative (jvp); run through its backward they give the
-//! derivative of the gradient (Hessian times vector), so no room has to write either by hand.
+//! In a quantity's forward they give the directional derivative (jvp), in its backward the derivative of the gradient
+//! (Hessian-vector product); neither has to be written by hand.
 
 use super::{Real, Scalar};
 use std::ops::{Add, Div, Mul, Neg, Sub};

@@ -1,10 +1,10 @@
-//! One number whose operations round as the lanes do: `mul_add` is one rounding.
+//! A number with one lane that rounds as the SIMD types do: `mul_add` rounds once.
 
 use super::curves::{self, Format};
 use super::{Kernel, Real, Scalar, target};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A float of a CPU level with fused operations. Elsewhere it is correct, and slow.
+/// A float on a CPU level with fused multiply-add. Correct on any CPU, but slow without it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(transparent)]
 pub struct Fused<F>(pub F);

@@ -1,11 +1,12 @@
-//! The number that every room is written in.
+//! The number types that every formula is written in.
 //!
-//! A room computes with [`Real`] and so is at once the exact path (`f64`), the fast path (lanes: one lane = one body) and
-//! the forward-mode derivative ([`Dual`]). No method returns a bool, for lanes may disagree: a choice between two values
-//! is made by [`Real::if_negative`].
+//! A formula is generic over [`Real`], and so is at once the exact path (`f64`), the fast path (SIMD lanes, one body
+//! per lane) and the forward-mode derivative ([`Dual`]). No method returns a bool, because lanes may differ:
+//! [`Real::if_negative`] chooses between two values lane by lane.
 //!
-//! All numbers of one CPU level ([`gate`]) round alike, operation by operation: a body has the same bits alone and in
-//! any lane of any width. Therefore rooms fix the order of their sums, and write `mul_add` where one rounding is meant.
+//! All number types of one CPU level ([`simd_level`]) round identically, operation by operation, so a body gets the
+//! same bits alone and in any lane of any width. Formulas therefore fix the order of their sums, and write `mul_add`
+//! where a single rounding is meant.
 
 mod curves;
 mod dual;

@@ -1,4 +1,4 @@
-//! Lane types on aarch64, of 128 bits: NEON is in every such CPU.
+//! SIMD types for aarch64, 128 bits wide: every such CPU has NEON.
 
 use super::registers::*;
 use super::target::run_neon;
@@ -43,7 +43,7 @@ mod single128 {
         unsafe { vreinterpretq_f32_u32(vshlq_n_u32::<23>(vreinterpretq_u32_f32(x))) }
     }
     pub const LANES: u32 = 4;
-    /// One bit a lane.
+    /// One bit per lane.
     #[inline(always)]
     pub unsafe fn negative(x: float32x4_t) -> u32 {
         // SAFETY: the CPU has the level.
@@ -88,7 +88,7 @@ mod double128 {
         unsafe { vreinterpretq_f64_u64(vshlq_n_u64::<52>(vreinterpretq_u64_f64(x))) }
     }
     pub const LANES: u32 = 2;
-    /// One bit a lane.
+    /// One bit per lane.
     #[inline(always)]
     pub unsafe fn negative(x: float64x2_t) -> u32 {
         // SAFETY: the CPU has the level.

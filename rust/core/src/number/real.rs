@@ -4,23 +4,23 @@ use super::simd_level::Level;
 use std::mem::MaybeUninit;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// So many numbers are summed in their own precision before the sum goes on in [`Real::Wide`]: sums that short lose
-/// next to nothing, and the step to the wider number is paid once for all of them.
+/// How many numbers are summed in their own precision before the sum continues in [`Real::Wide`]: such short sums lose
+/// almost no accuracy, and the conversion is paid once per block.
 pub const BLOCK: usize = 16;
 
-/// Running sums over a row: one body alone sums in the same order as in a lane, and yet its sums vectorise.
+/// Number of interleaved partial sums over a row: a single body's sum vectorises, and has the same order as in a lane.
 pub const SUMS: usize = 8;
 
-/// Something to compute with any number that reads and writes arrays of `D`.
+/// A computation that is generic over the number type; the numbers are read from and written to arrays of `D`.
 pub trait Work<D> {
     type Output;
     fn run<R: Real<Data = D>>(self) -> Self::Output;
 }
 
-/// A function that is compiled once for each number, see [`Real::dispatch`].
+/// A function that is compiled separately for each number type and its instruction set, see [`Real::dispatch`].
 pub trait Kernel<Arguments> {
     type Output;
-    /// To be marked `#[inline(always)]`.
+    /// Implementations must be `#[inline(always)]`.
     fn run(arguments: Arguments) -> Self::Output;
 }
 
@@ -38,7 +38,7 @@ pub trait Real:
 {
     /// One lane of it.
     type Scalar: Scalar<Data = Self::Data>;
-    /// What one lane of it is in memory outside.
+    /// The format of one lane in the caller's arrays.
     type Data: Data;
     /// The type that long sums run in: the same lanes in double precision.
     type Wide: Real<Wide = Self::Wide>;
@@ -56,13 +56,13 @@ pub trait Real:
     fn if_negative(self, below: Self, otherwise: Self) -> Self;
     fn at_least(self, floor: Self) -> Self;
     fn at_most(self, ceiling: Self) -> Self;
-    /// Square root, with derivative 0 at 0: the norm's subgradient that the losses want.
+    /// Square root, with derivative 0 at 0: a subgradient of the norm, which the losses rely on.
     fn sqrt(self) -> Self;
     fn ln(self) -> Self;
     /// 2^self, relative error of a few ulp, within the type's normal range (no underflow to 0, no infinity).
     fn exp2(self) -> Self;
     fn tanh(self) -> Self;
-    /// tanh where self is known not to be negative.
+    /// tanh for self ≥ 0.
     #[inline(always)]
     fn tanh_of_positive(self) -> Self {
         self.tanh()
@@ -70,14 +70,14 @@ pub trait Real:
     /// The nearest integer, with slope zero; |self| below 2^22 (2^51 in double precision).
     fn nearest(self) -> Self;
     fn widen(self) -> Self::Wide;
-    /// [`Real::widen`] for loops whose own work is in double precision: there a call costs more than its registers.
+    /// [`Real::widen`], inlined: for loops that compute in double precision anyway, where the call would cost more than
+    /// the registers that it saves.
     #[inline(always)]
     fn widen_in_line(self) -> Self::Wide {
         self.widen()
     }
     fn narrow(wide: Self::Wide) -> Self;
-    /// Enters `F` in a function of its own that may use the CPU's instructions for this number. Gates inline all that they
-    /// lead to; a large room that many quantities enter is compiled once behind this door.
+    /// Runs kernel `F` in a non-inlined function compiled for this number's instruction set.
     #[inline(never)]
     fn dispatch<F: Kernel<A>, A>(arguments: A) -> F::Output {
         F::run(arguments)
@@ -101,7 +101,7 @@ pub trait Real:
         *sum = *sum + self.widen();
     }
 
-    /// The lanes in which self < 0, as bits.
+    /// A bit mask of the lanes in which self < 0.
     #[inline(always)]
     fn negative(self) -> u32 {
         let mut lanes = 0;
@@ -122,13 +122,13 @@ pub trait Real:
         (self * Self::of(std::f64::consts::LOG2_E)).exp2()
     }
 
-    /// Rows of coordinates, one row a lane and all as long as `out`, as one row of lanes, each coordinate k less its lane's
-    /// `origin[k % 3]`. Writes all of `out`.
+    /// Transposes rows of coordinates, one row per lane and each as long as `out`, into one row of lanes; `origin[k %
+    /// 3]` of the lane is subtracted from coordinate k. Writes all of `out`.
     fn read_rows(rows: &[&[Self::Data]], origin: &[[Self::Data; 3]], out: &mut [MaybeUninit<Self>]) {
         read_rows_one_by_one(rows, origin, out);
     }
 
-    /// The way back: lane l of every number to `rows[l]`.
+    /// The inverse of [`Real::read_rows`] without the origin: writes lane l of every number to `rows[l]`.
     fn write_rows(numbers: &[Self], rows: &mut [&mut [Self::Data]]) {
         write_rows_one_by_one(numbers, rows);
     }
@@ -137,32 +137,33 @@ pub trait Real:
 /// One lane of a number in double precision.
 pub type WideScalar<R> = <<R as Real>::Wide as Real>::Scalar;
 
-/// A number that stands alone, so that decisions (contact, hull) can be taken on its value.
+/// A number with one lane, so that decisions (contact, hull) can be taken on its value.
 pub trait Scalar: Real<Scalar = Self> {
     fn value(self) -> f64;
     fn read(data: Self::Data) -> Self;
     fn data(self) -> Self::Data;
 }
 
-/// Looks at 1024 numbers before it decides whether to go on: so the look vectorises.
+/// Whether all numbers are finite. Checks 1,024 values at a time so that the loop vectorises.
 pub fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
     let broken = |piece: &[S]| piece.iter().fold(false, |broken, x| broken | !x.value().is_finite());
     !numbers.chunks(1024).any(broken)
 }
 
-/// A floating-point format of the caller's arrays, itself a number with one lane.
+/// A floating-point format of the caller's arrays, f32 or f64; itself a number with one lane.
 pub trait Data: Scalar<Data = Self> {
     /// The distance from 1 to the next number.
     const EPSILON: f64;
-    /// The ones that are kept in this format, of constants that are kept in both.
+    /// Selects the copy in this format of constants that are stored in both.
     fn pick<'a>(single: &'a [f32], double: &'a [f64]) -> &'a [Self];
-    /// The lanes of its numbers at a level, most first.
+    /// The lane counts available at a level, largest first.
     fn widths(level: Level) -> &'static [usize];
-    /// Runs `work` on the number with `width` lanes, one of [`Data::widths`] of the level. Panics unless it is, and the CPU
-    /// has the level: this is the only way to the lane types, whose operations rely on its instructions.
+    /// Runs `work` on the number type with `width` lanes. Panics unless `width` is one of [`Data::widths`] and the CPU
+    /// supports the level: SIMD types are reachable only through here, because their operations require the level's
+    /// instructions.
     fn run_on_lanes<W: Work<Self>>(level: Level, width: usize, work: W) -> W::Output;
-    /// Runs `work` on the number with the most lanes that the level has in this format, for work on many numbers of one
-    /// body. Panics unless the CPU has the level.
+    /// Runs `work` on the widest number type of the level in this format, for work on many numbers of one body. Panics
+    /// unless the CPU supports the level.
     fn run_on_registers<W: Work<Self>>(level: Level, work: W) -> W::Output;
 }
 

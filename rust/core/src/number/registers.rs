@@ -1,11 +1,12 @@
-//! What lane types are made of on every CPU: registers of one or two parts, with an intrinsic for each operation.
+//! Building blocks of the SIMD types of all CPUs: one or two registers, with an intrinsic for each operation.
 //!
-//! A CPU's own file (`simd`, `neon`) names its intrinsics, and these macros write its types. Their
-//! operations may run only behind a gate ([`super::gate`]), which has asked the CPU for their level and is the only way to
-//! these types: what is called *behind the gate* in these files. The crossings between single and double precision are kept out of line, so
-//! that sums in double precision do not take registers from the loops around them.
+//! `simd` and `neon` name a CPU's intrinsics, and these macros generate its types. Their operations require the CPU
+//! level's instructions. That is sound because the types are reachable only through [`super::Data::run_on_lanes`] and
+//! [`super::Data::run_on_registers`], which check the level first; the safety comments *the CPU has the level* refer to
+//! this. Conversions between single and double precision are not inlined, so that sums in double precision do not take
+//! registers from the surrounding loops.
 
-// What the macros' text names: their users take all of this file.
+// Names used in the macros' expansions; `simd` and `neon` import all of this file.
 pub(super) use super::curves::{self, Format};
 pub(super) use super::{Fused, Kernel, Real, Scalar};
 pub(super) use std::mem::MaybeUninit;
@@ -31,7 +32,7 @@ macro_rules! splat_part {
     };
 }
 
-/// A lane type of `$lanes` numbers `$float` in the registers `$part`.
+/// A SIMD type of `$lanes` numbers `$float` in the registers `$part`.
 macro_rules! lanes {
     ($name:ident: $lanes:literal x $float:ty, $register:ty, $intrinsics:ident, $($part:tt)+) => {
         impl $name {
@@ -69,7 +70,7 @@ macro_rules! lanes {
     };
 }
 
-/// The methods of `Real` that every lane type has.
+/// The methods of `Real` that all SIMD types share.
 macro_rules! arithmetic {
     ($name:ident: $lanes:literal x $float:ty, $intrinsics:ident, $($part:tt)+) => {
         type Scalar = Fused<$float>;
@@ -106,7 +107,7 @@ macro_rules! arithmetic {
             // SAFETY: the CPU has the level.
             0 $(| (unsafe { $intrinsics::negative(self.$part) } << ($part * $intrinsics::LANES)))+
         }
-        // The instructions give their second operand where the first is NaN.
+        // The instructions return their second operand if either is NaN.
         #[inline(always)]
         fn at_least(self, floor: Self) -> Self {
             // SAFETY: the CPU has the level.
@@ -235,7 +236,7 @@ macro_rules! single {
     };
 }
 
-/// Blocks of bodies and numbers that are turned in registers.
+/// Square blocks of bodies × numbers, transposed in registers.
 pub(super) trait Square: Real<Data = f32> {
     unsafe fn load(from: *const f32) -> Self;
     unsafe fn store(self, to: *mut f32);
@@ -290,7 +291,7 @@ pub(super) fn write_squares<S: Square, const N: usize>(numbers: &[S], rows: &mut
     }
 }
 
-/// What crosses between single and double precision or between bodies and lanes: out of line.
+/// Non-inlined conversions between single and double precision, and between rows of bodies and lanes.
 macro_rules! border {
     ($module:ident, $features:literal, $single:ident, $double:ident, $lanes:literal, $widen:expr, $narrow:expr) => {
         mod $module {

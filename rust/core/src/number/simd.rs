@@ -1,4 +1,4 @@
-//! Lane types on x86-64, of 256 and 512 bits.
+//! SIMD types for x86-64, 256 and 512 bits wide.
 
 use super::registers::*;
 use super::target::{run_avx2, run_avx512};
@@ -26,7 +26,7 @@ mod single512 {
         unsafe { _mm512_castsi512_ps(_mm512_slli_epi32::<23>(_mm512_castps_si512(x))) }
     }
     pub const LANES: u32 = 16;
-    /// One bit a lane.
+    /// One bit per lane.
     #[inline(always)]
     pub unsafe fn negative(x: __m512) -> u32 {
         // SAFETY: the CPU has the level.
@@ -55,7 +55,7 @@ mod double512 {
         unsafe { _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(x))) }
     }
     pub const LANES: u32 = 8;
-    /// One bit a lane.
+    /// One bit per lane.
     #[inline(always)]
     pub unsafe fn negative(x: __m512d) -> u32 {
         // SAFETY: the CPU has the level.
@@ -81,7 +81,7 @@ mod single256 {
         unsafe { _mm256_castsi256_ps(_mm256_slli_epi32::<23>(_mm256_castps_si256(x))) }
     }
     pub const LANES: u32 = 8;
-    /// One bit a lane.
+    /// One bit per lane.
     #[inline(always)]
     pub unsafe fn negative(x: __m256) -> u32 {
         // SAFETY: the CPU has the level.
@@ -107,7 +107,7 @@ mod double256 {
         unsafe { _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(x))) }
     }
     pub const LANES: u32 = 4;
-    /// One bit a lane.
+    /// One bit per lane.
     #[inline(always)]
     pub unsafe fn negative(x: __m256d) -> u32 {
         // SAFETY: the CPU has the level.

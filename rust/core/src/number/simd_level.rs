@@ -1,9 +1,9 @@
-//! The CPU levels: what instructions a CPU offers beside those that every CPU of its kind has.
+//! CPU levels: the instruction set extensions that the kernels are compiled for.
 
 use crate::error::{Error, Result};
 use std::sync::OnceLock;
 
-/// What a CPU offers, least first.
+/// An instruction set level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
     Scalar,
@@ -38,17 +38,18 @@ impl Level {
         }
     }
 
-    /// Panics on a machine without the level.
+    /// Panics unless this CPU supports the level.
     pub(crate) fn expect_here(self) {
         assert!(self.is_here(), "this machine has no {}", self.name());
     }
 
-    /// Those that this machine has, the best first.
+    /// Levels supported by this CPU, best first.
     pub fn available() -> Vec<Level> {
         Self::ALL.into_iter().map(|(level, _)| level).filter(|level| level.is_here()).collect()
     }
 
-    /// The level that batches run on: the best, or the one that the environment variable IPMAN_SIMD names. It is read once.
+    /// The level that batches run on: the best one, or the one named by the environment variable IPMAN_SIMD, which is
+    /// read once.
     pub fn current() -> Result<Level> {
         static LEVEL: OnceLock<Result<Level>> = OnceLock::new();
         LEVEL.get_or_init(|| Self::chosen(std::env::var("IPMAN_SIMD").ok().as_deref())).clone()

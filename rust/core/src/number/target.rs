@@ -1,4 +1,4 @@
-//! Kernels in functions that are compiled for a CPU level's instructions.
+//! Functions compiled for a CPU level's instructions, which run a kernel.
 
 use super::Kernel;
 use super::simd_level::Level;
@@ -24,14 +24,14 @@ pub(super) fn run_neon<F: Kernel<A>, A>(arguments: A) -> F::Output {
     F::run(arguments)
 }
 
-/// [`Real::dispatch`] of a number whose level is known only when it runs.
+/// [`super::Real::dispatch`] for number types that exist on several levels: asks for the current one.
 #[inline(always)]
 pub(super) fn dispatch_at_current_level<F: Kernel<A>, A>(arguments: A) -> F::Output {
     #[cfg(target_arch = "x86_64")]
     match Level::current() {
-        // SAFETY: the level has been asked of the CPU.
+        // SAFETY: `Level::current` is a level that this CPU supports.
         Ok(Level::Avx512) => return unsafe { run_avx512::<F, A>(arguments) },
-        // SAFETY: the level has been asked of the CPU.
+        // SAFETY: `Level::current` is a level that this CPU supports.
         Ok(Level::Avx2) => return unsafe { run_avx2::<F, A>(arguments) },
         _ => {}
     }

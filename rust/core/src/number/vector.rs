@@ -1,4 +1,4 @@
-//! Three-vectors of numbers.
+//! Vectors of three numbers.
 
 use super::Real;
 

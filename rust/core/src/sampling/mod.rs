@@ -1,9 +1,9 @@
 //! Sampling: N_U points on the surface that move with it, and the passes over them.
 //!
 //! Triangle point picking, area-weighted on the template: the points are fixed barycentric weights on fixed faces, so a
-//! posed body's samples are W V with a sparse W of three weights a row, and gradients return by Wᵀ. Rooms need little
-//! more of a sample than a number or two, such as its height: these are interpolated from the vertices' numbers
-//! ([`Walk`]), and what a room finds for each sample is added to the vertices by the same weights.
+//! posed body's samples are W V with a sparse W with three weights per row, and gradients return by Wᵀ. Most quantities
+//! need only one or two numbers of a sample, such as its height. These are interpolated from the vertices' numbers
+//! ([`Walk`]), and gradients by them are added to the vertices' by the same weights.
 
 mod walk;
 
@@ -143,7 +143,8 @@ fn pick(areas: &[f64], num_samples: usize, seed: u64) -> (Vec<u32>, Vec<[f64; 3]
         picks.push((face as u32, pick as u32));
         points.push([1.0 - root, root * (1.0 - s), root * s]);
     }
-    // By face, so that a pass walks the vertices in order; then as they were picked: the order is part of the seed's meaning.
+    // Sorted by face, so that a pass visits the vertices in order; within a face as they were picked, because the order
+    // is part of what a seed means.
     picks.sort_unstable();
     let barycentric = memory::collect(picks.iter().map(|&(_, pick)| points[pick as usize]));
     (memory::collect(picks.iter().map(|&(face, _)| face)), barycentric)

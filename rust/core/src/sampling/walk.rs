@@ -1,10 +1,10 @@
-//! The walk: the order in which passes visit the samples, and how numbers go from vertices to samples and back.
+//! The walk: the order in which passes visit the samples, interpolation from vertices to samples, and its transpose.
 
 use crate::memory;
 use crate::number::{Data, Kernel, Real, SUMS};
 use std::ops::Range;
 
-/// Constants that are kept in both precisions, so that no loop has to convert them.
+/// Constants stored in both precisions, so that no loop has to convert them.
 #[derive(Clone, Debug, Default)]
 pub struct Weights {
     single: Vec<f32>,
@@ -22,16 +22,16 @@ impl Weights {
     }
 }
 
-/// The order in which passes visit the samples: faces with equally many samples one after the other, so that the loops
-/// over a face's samples have lengths that the compiler knows.
+/// The order in which passes visit the samples: faces with equally many samples follow each other, so that the loops
+/// over a face's samples have lengths known at compile time.
 #[derive(Clone, Debug, Default)]
 pub struct Walk {
-    /// Each sample's place in the public order.
+    /// Each sample's index in the public order.
     pub order: Vec<u32>,
     pub chunks: Vec<Chunk>,
     /// The vertices of each group of samples that share a face.
     corners: Vec<[u32; 3]>,
-    /// Three a sample.
+    /// Three per sample.
     weights: Weights,
 }
 
@@ -45,7 +45,7 @@ pub struct Chunk {
 /// Samples that a pass handles at once: short enough for single-precision partial sums.
 pub const CHUNK: usize = 64;
 
-/// A number for each sample of a chunk. What lies behind the chunk's end is finite and must not be summed.
+/// One number per sample of a chunk. Entries beyond the chunk's end are finite, and must not be summed.
 pub type Row<R> = [R; CHUNK];
 
 /// Samples of a face that are visited together; a face with more has several groups.
@@ -95,7 +95,7 @@ impl Walk {
         (&self.corners[chunk.groups.clone()], chunk.group_size())
     }
 
-    /// The weights of the sample at a place of the walk.
+    /// The weights of the sample at a position of the walk.
     #[inline(always)]
     pub fn weights<R: Real>(&self, place: usize) -> [R; 3] {
         [self.weights.get(3 * place), self.weights.get(3 * place + 1), self.weights.get(3 * place + 2)]

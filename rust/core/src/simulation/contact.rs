@@ -1,4 +1,5 @@
-//! What of a body can touch a plane: the corners of its convex hull, or those of the hulls of its convex decomposition.
+//! The points of a body that can touch a plane: the corners of its convex hull, or of the hulls of its convex
+//! decomposition.
 
 use crate::error::{Error, Result};
 use crate::memory;
@@ -8,18 +9,18 @@ use rapier3d_f64::math::Vector;
 use rapier3d_f64::parry::transformation::try_convex_hull;
 use rapier3d_f64::parry::transformation::vhacd::{VHACD, VHACDParameters};
 
-/// What collides.
+/// The collision shape.
 #[derive(Clone, Debug)]
 pub enum Shape {
     /// The convex hull of all vertices.
     Hull,
-    /// The paper's: the hulls of V-HACD on a grid of so many voxels along the body's longest side. They move the soles by
-    /// up to a voxel.
+    /// The paper's: the hulls of V-HACD on a grid with `resolution` voxels along the body's longest side. They move the
+    /// soles by up to a voxel.
     Decomposition { resolution: u32, faces: Vec<[u32; 3]> },
 }
 
-/// Bytes that the engine takes: for a vertex, where all of them are corners, about 4,000 were measured; a voxel of the grid is
-/// one, and those inside are listed besides.
+/// Memory that the engine takes, bytes. About 4,000 per vertex were measured where all are corners; a voxel of the grid
+/// takes one, and inner voxels are listed besides.
 const VERTEX_BYTES: usize = 6_000;
 const VOXEL_BYTES: usize = 4;
 
@@ -34,8 +35,8 @@ impl Shape {
         }
     }
 
-    /// Asks for what the engine takes for bodies of so many vertices on all threads, for it does not do so itself. Before
-    /// they start: a thread that asks would take from the others meanwhile.
+    /// Checks that the engine's memory for bodies of `num_vertices` vertices on all threads can be allocated, because
+    /// the engine does not. Called before the threads start, since a probing thread would take memory from the others.
     pub(super) fn ask(&self, num_vertices: usize) {
         let voxels = match self {
             Shape::Hull => 0,
@@ -44,7 +45,7 @@ impl Shape {
         memory::ask(num_threads() * (VERTEX_BYTES * num_vertices + VOXEL_BYTES * voxels));
     }
 
-    /// The points that can touch a plane. None where there is no hull.
+    /// The points that can touch a plane; None if there is no hull.
     pub fn touching(&self, points: &[Vec3<f64>]) -> Option<Vec<Vec3<f64>>> {
         let points = memory::collect(points.iter().map(|&[x, y, z]| Vector::new(x, y, z)));
         let corners = match self {
@@ -53,7 +54,7 @@ impl Shape {
                 let parameters = VHACDParameters { resolution: *resolution, ..VHACDParameters::default() };
                 let parts = VHACD::decompose(&parameters, &points, faces, false);
                 let hulls = parts.compute_convex_hulls(parameters.convex_hull_downsampling);
-                // All hulls are of one stiff body: on a plane it is their common hull that touches.
+                // The hulls belong to one stiff body, so on a plane their common hull touches.
                 corners(&hulls.into_iter().flat_map(|(points, _)| points).collect::<Vec<_>>())?
             }
         };

@@ -1,8 +1,8 @@
-//! The test of a pose by simulation: the stiff body is put on its ground and let go, in the engine rapier.
+//! The test of a pose by simulation: the stiff body is placed on its ground and released, in the engine rapier.
 //!
-//! On a plane a stiff body touches through the corners of its convex hull alone, so these are what collides: as tiny balls
-//! over a half-space, for hull against plane creeps in this engine. Mass, centre and inertia are the solid's, never the
-//! hull's. Each body has a world of its own in double precision with the engine's deterministic arithmetic.
+//! On a plane only the corners of the convex hull touch, so they alone collide: as tiny balls over a half-space,
+//! because a hull against a plane creeps in this engine. Mass, centre and inertia are the solid's, never the hull's.
+//! Each body has a world of its own in double precision with the engine's deterministic arithmetic.
 
 pub mod contact;
 mod world;
@@ -19,31 +19,32 @@ use crate::threads;
 use contact::Shape;
 pub use world::Placement;
 
-/// How bodies are put on their ground and let go.
+/// How bodies are placed on their ground and released.
 pub struct Simulation {
     pub densities: MassProperties,
-    /// A body with its lowest vertex higher than this is in the air, m.
+    /// A body whose lowest vertex is higher than this counts as in the air, m.
     pub contact: f64,
     pub shape: Shape,
-    /// Puts the lowest point of what collides on the ground first. Otherwise the body starts where it is, also in the air.
+    /// First moves the lowest point of the collision shape to the ground. Otherwise the body starts where it is, even
+    /// in the air.
     pub snap: bool,
     /// s
     pub step: f64,
     pub friction: f64,
-    /// When to look, in steps, ascending.
+    /// Steps after which the body's placement is recorded, ascending.
     pub looks: Vec<usize>,
 }
 
-/// What became of one body.
+/// The recorded motion of one body.
 #[derive(Clone, Debug)]
 pub struct Motion {
     pub status: u32,
-    /// Where it was let go, then one place a look; NaN for a body that is not simulated.
+    /// The placement at release, then one per recorded step; NaN for a body that is not simulated.
     pub places: Vec<Placement>,
 }
 
 impl Simulation {
-    /// An error names the number that is out of range.
+    /// The error names the number that is out of range.
     pub fn check(&self) -> Result<()> {
         positive("contact", self.contact)?;
         positive("step", self.step)?;
@@ -60,7 +61,7 @@ impl Simulation {
         Motion { status, places: memory::filled(Placement::nowhere(), 1 + self.looks.len()) }
     }
 
-    /// Whatever the engine may do to one body, the others must not notice.
+    /// A panic of the engine on one body does not affect the others.
     fn run(&self, solid: &Solid, normal: Vec3<f64>, height: f64, points: impl FnOnce() -> Vec<Vec3<f64>>) -> Motion {
         let places = memory::isolated(|| {
             let points = self.shape.touching(&points())?;
@@ -83,8 +84,7 @@ impl Simulation {
 }
 
 impl<T: Data> Batch<'_, T> {
-    /// What becomes of each body. Bodies that are no solid are not simulated, nor are those in the air when they are to
-    /// be put on the ground.
+    /// The motion of each body. Bodies without a volume are not simulated, nor, with `snap`, are those in the air.
     pub fn simulate(&self, simulation: &Simulation) -> Result<Vec<Motion>> {
         simulation.check()?;
         let solids = self.solids(&simulation.densities, simulation.contact)?;

@@ -1,14 +1,15 @@
-//! One body in a world of its own, in the engine rapier.
+//! One body in its own world of the engine rapier.
 
 use crate::memory;
 use crate::number::vector::{Vec3, add_scaled, scale};
 use crate::solid::{GRAVITY, Solid};
 use rapier3d_f64::prelude::*;
 
-/// Of the balls at the corners, m. They touch where their corner would, for the half-space lies lower by as much.
+/// Radius of the balls at the corners, m. The half-space lies lower by as much, so a ball touches where its corner
+/// would.
 const RADIUS: f64 = 1e-4;
 
-/// Where a body is: its centre of mass in the world, and how it has turned since its pose.
+/// Where a body is: its centre of mass in the world, and its rotation since release.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     pub centre: Vec3<f64>,
@@ -27,10 +28,10 @@ impl Placement {
 
 pub struct Fall<'a> {
     pub solid: &'a Solid,
-    /// Of the ground, and its height along it, m.
+    /// Normal of the ground, and its height along the normal, m.
     pub normal: Vec3<f64>,
     pub height: f64,
-    /// What can touch, as seen from the centre of mass.
+    /// The points that can touch, relative to the centre of mass.
     pub points: &'a [Vec3<f64>],
     pub friction: f64,
     /// s
@@ -38,7 +39,7 @@ pub struct Fall<'a> {
 }
 
 impl Fall<'_> {
-    /// Where the body is after so many steps, ascending; None if the engine loses it.
+    /// The placement after each of the given numbers of steps, ascending; None if it becomes non-finite.
     pub fn run(&self, centre: Vec3<f64>, looks: &[usize]) -> Option<Vec<Placement>> {
         let mut world = PhysicsWorld::new();
         world.gravity = vector(scale(-GRAVITY, self.normal));
@@ -57,8 +58,8 @@ impl Fall<'_> {
         Some(places)
     }
 
-    /// Contacts are found anew in every step, and each has its own friction. With the engine's usual iterations a box that
-    /// lands on four corners rocks, and with its usual softness bodies at their limit sink and tip over.
+    /// Contacts are detected anew in every step, each with its own friction. With the engine's default iterations a box
+    /// landing on four corners rocks; with its default softness bodies close to tipping sink and tip over.
     fn set_accuracy(&self, parameters: &mut IntegrationParameters) {
         parameters.dt = self.step;
         parameters.contact_recycling = false;

@@ -19,8 +19,7 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
         }
     }
 
-    /// Adds the share of the tiles from the first on, up to T; `upstream` tells the gradient by a body's vertices in a
-    /// tile.
+    /// Adds the contribution of up to T tiles from `first` on; `upstream` gives ∂loss/∂vertices of a body's tile.
     #[inline(always)]
     pub fn backward<V: Real, const P: usize, const N: usize, const T: usize>(
         &self,
@@ -165,7 +164,7 @@ fn spread<V: Real, const P: usize, const W: usize>(registers: &[V; P]) -> [Wide<
     numbers
 }
 
-/// Their sum, in the same order for registers of any size.
+/// The sum of W numbers, in the same order for registers of any size.
 #[inline(always)]
 fn fold<R: Real, const W: usize>(mut numbers: [R; W]) -> R {
     let mut half = W / 2;

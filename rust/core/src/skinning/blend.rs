@@ -6,7 +6,7 @@
 use crate::memory;
 use crate::number::{Real, Scalar};
 
-/// A number of W vertices each, from the start of a cache line: a register of them is never read from two lines.
+/// One number of each of W vertices, aligned to a cache line, so that no register load crosses two lines.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 pub struct Row<C, const W: usize>(pub [C; W]);
@@ -14,7 +14,7 @@ pub struct Row<C, const W: usize>(pub [C; W]);
 /// W vertices: x of each, y of each, z of each.
 pub type Tile<C, const W: usize> = [Row<C, W>; 3];
 
-/// The same in P registers an axis.
+/// The same in P registers per axis.
 pub type Registers<V, const P: usize> = [[V; P]; 3];
 
 /// A register of constants: the part-th of a row.
@@ -80,7 +80,7 @@ impl<C: Scalar, const W: usize> Blend<C, W> {
         let directions = &self.directions[tile * self.count..][..amounts.len()];
         let mut sums = *totals;
         for (direction, amounts) in directions.iter().zip(amounts) {
-            // In this order few registers are needed beside those of the sums.
+            // This order needs few registers beside those of the sums.
             for part in 0..P {
                 let mut along = [V::zero(); 3];
                 for axis in 0..3 {
@@ -97,8 +97,8 @@ impl<C: Scalar, const W: usize> Blend<C, W> {
         *totals = sums;
     }
 
-    /// The gradient by the amounts, as W sums each, from that by the points of a few tiles: so few that their directions
-    /// are still in the cache, and so many that the sums are rarely fetched.
+    /// The gradient by the amounts, as W partial sums each, from that by the points of a few tiles: few enough that
+    /// their directions stay in the cache, and enough that the sums are rarely reloaded.
     #[inline(always)]
     pub fn backward<V: Real, const P: usize, const N: usize>(
         &self,

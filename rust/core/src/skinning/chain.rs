@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::number::Real;
 use crate::number::vector::{Vec3, add, sub, zero};
 
-/// Who hangs on whom, and how the mesh rests.
+/// The joints' parents, and the rest pose of the mesh.
 pub struct Skeleton {
     /// A parent comes before its children.
     parents: Vec<Option<usize>>,
@@ -16,12 +16,12 @@ pub struct Skeleton {
 /// The posed chain.
 pub struct Chain<R> {
     pub world: Vec<Mat3<R>>,
-    /// Takes a resting bone to the world: world · rest_rotation.
+    /// Rotates a resting bone to the world: world · rest_rotation.
     pub turned: Vec<Mat3<R>>,
     pub joints: Vec<Vec3<R>>,
 }
 
-/// The gradient by what the chain was made of.
+/// The gradient by the local rotations and the resting joints.
 pub struct ChainGradient<R> {
     pub local: Vec<Mat3<R>>,
     pub rest_joints: Vec<Vec3<R>>,
@@ -49,7 +49,7 @@ impl Skeleton {
         self.parents[joint]
     }
 
-    /// Whether `other` is the joint or hangs on it.
+    /// Whether `other` is the joint or one of its descendants.
     pub fn carries(&self, joint: usize, other: usize) -> bool {
         let mut carrier = Some(other);
         while carrier.is_some_and(|carrier| carrier > joint) {

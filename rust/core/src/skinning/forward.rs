@@ -35,7 +35,7 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
         tile: usize,
         block: &Block<V::Scalar, N>,
     ) -> [Registers<V, P>; N] {
-        // Displacements are summed by themselves: beside the template's metres each addition would round.
+        // Displacements are summed separately: added to the template's coordinates one by one, each would round.
         let mut rest = [constants(&start.tiles[tile]); N];
         if !start.shaped {
             let displacements = self.shape(tile, &block.betas, &block.expression);

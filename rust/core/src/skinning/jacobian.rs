@@ -1,6 +1,6 @@
-//! The Jacobian of all vertices and joints by pose and shape: for the few points of a body that a fit looks at.
+//! The Jacobian of all vertices and joints by pose and shape, for bodies reduced to the few points that a fit uses.
 //!
-//! A small turn φ of joint j, about its place c_j, moves what hangs on it:
+//! A small rotation φ of joint j about its position c_j moves its descendants:
 //!
 //! ```text
 //! δ vertex = φ × Σ_i w_i (y_i − c_j) over the joints i that j carries, y_i = turned_i · rest + offset_i
@@ -16,7 +16,7 @@ use crate::memory;
 use crate::number::vector::{Vec3, add, add_scaled, cross, scale, sub, zero};
 use crate::number::{Dual, Scalar};
 
-/// A vertex as the joints see it.
+/// A vertex, as needed for its derivatives.
 struct Held {
     /// Σ w turned
     turned: Mat3<f64>,
@@ -30,7 +30,7 @@ impl<C: Scalar, const W: usize> Skin<C, W> {
     /// translation is the identity for every point. The rotations must be vectors.
     pub fn jacobian(&self, body: &Body<f64>) -> Vec<Vec3<f64>> {
         let (points, joints) = (self.num_vertices + self.num_joints(), self.num_joints());
-        // Of each vertex what its joints carry, in small pieces.
+        // Checked once, because the vertices' sums are allocated in small pieces.
         memory::ask(self.num_vertices * joints * size_of::<(Vec3<f64>, f64)>());
         let vertices = memory::collect((0..self.num_vertices).map(|vertex| self.held(vertex, body)));
         let mut rows = memory::with_capacity((3 * joints + body.parameters.betas.len()) * points);

@@ -4,7 +4,7 @@
 //! vertex = Σ_j w_j (turned_j · rest + offset_j) + translation
 //!
 //! Rotations and the chain run in double precision, which costs little; the vertices run in the data's precision. Sums
-//! have one order, whatever the batch.
+//! have the same order in any batch.
 
 mod backward;
 pub mod batch;
@@ -29,7 +29,7 @@ pub use model::Model;
 use rotation::Form;
 use weights::{Transform, Weights};
 
-/// A body model ready for skinning, its large arrays in the precision C, W vertices a tile.
+/// A body model ready for skinning: its large arrays in precision C, in tiles of W vertices.
 pub struct Skin<C, const W: usize> {
     pub num_vertices: usize,
     skeleton: Skeleton,
@@ -48,7 +48,7 @@ struct Directions<C, const W: usize> {
     joints: Vec<f64>,
 }
 
-/// What poses one body; missing betas and expressions at the end are zero.
+/// The parameters of one body; trailing betas and expressions may be left out and are zero.
 pub struct Parameters<R> {
     pub form: Form,
     pub pose: Vec<R>,
@@ -57,7 +57,7 @@ pub struct Parameters<R> {
     pub transl: Vec3<R>,
 }
 
-/// One body's joints in their places, ready to move vertices.
+/// One body with its joints placed, ready to move vertices.
 pub struct Body<R: Real> {
     parameters: Parameters<R>,
     pose: Vec<R::Wide>,
@@ -77,7 +77,7 @@ pub struct Start<'a, C, const W: usize> {
     pub shaped: bool,
 }
 
-/// How many shape gradients are asked for, beside the pose's and the translation's.
+/// Which gradients are requested beside the translation's: the pose's, and how many of the shape's.
 #[derive(Clone, Copy)]
 pub struct Wanted {
     pub pose: bool,
@@ -85,7 +85,7 @@ pub struct Wanted {
     pub expression: usize,
 }
 
-/// N bodies that move their vertices together, so that the directions are read once for all of them.
+/// N bodies that are skinned together, so that the directions are read once for all of them.
 pub struct Block<'a, R: Real, const N: usize> {
     pub bodies: &'a [Body<R>; N],
     betas: Vec<[R; N]>,
@@ -93,7 +93,7 @@ pub struct Block<'a, R: Real, const N: usize> {
     features: Vec<[R; N]>,
 }
 
-/// The gradient of N bodies, gathered tile by tile; as many sums each as a tile has vertices.
+/// The gradient of N bodies, accumulated tile by tile; each sum consists of one partial sum per vertex of a tile.
 pub struct Sums<V: Real, const P: usize, const N: usize> {
     betas: Vec<[[V; P]; N]>,
     expression: Vec<[[V; P]; N]>,
@@ -119,7 +119,7 @@ pub struct Totals<R: Real> {
 /// One lane of a register in double precision.
 type Wide<V> = <<V as Real>::Scalar as Real>::Wide;
 
-/// Tells the gradient by a body's vertices in a tile.
+/// Source of ∂loss/∂vertices for one tile of one body.
 pub trait VertexGradient<V, const P: usize> {
     fn of(&self, body: usize, tile: usize) -> Registers<V, P>;
 }

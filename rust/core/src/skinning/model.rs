@@ -1,4 +1,4 @@
-//! A body model as it comes: plain arrays, and whether they fit together.
+//! A body model as plain arrays, and the checks that they fit together.
 
 use crate::error::{Error, Result};
 
@@ -18,7 +18,7 @@ pub struct Model<'a> {
 }
 
 impl Model<'_> {
-    /// The numbers of betas and expressions, if all arrays fit together.
+    /// The numbers of betas and expressions; fails unless all arrays fit together.
     pub(super) fn check(&self) -> Result<(usize, usize)> {
         let (vertices, joints) = (self.v_template.len() / 3, self.parents.len());
         let expect = |name, expected: usize, got: usize| match got == expected {

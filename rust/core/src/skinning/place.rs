@@ -1,4 +1,4 @@
-//! One body's joints in their places: rotations, shape, kinematic chain.
+//! Placing one body's joints: rotations, shape, kinematic chain.
 
 use super::matrix::{Mat3, apply};
 use super::rotation::Form;
@@ -7,7 +7,7 @@ use crate::number::vector::{Vec3, add, add_scaled, narrow, of, sub};
 use crate::number::{Real, Scalar};
 
 impl<C: Scalar, const W: usize> Skin<C, W> {
-    /// Puts the joints of one body in their places.
+    /// Places the joints of one body.
     #[inline(always)]
     pub fn place<R: Real>(&self, parameters: Parameters<R>) -> Body<R> {
         let mut pose: Vec<R::Wide> = parameters.pose.iter().map(|&x| x.widen()).collect();

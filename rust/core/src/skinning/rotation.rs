@@ -5,7 +5,7 @@ use crate::number::Real;
 use crate::number::vector::{Vec3, add, add_scaled, cross, dot, scale, sub};
 use std::f64::consts::PI;
 
-/// How each joint's rotation relative to its parent is written.
+/// The representation of each joint's rotation relative to its parent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
     /// A rotation vector: its direction the axis, its length the angle in radians.
@@ -15,7 +15,7 @@ pub enum Form {
 }
 
 impl Form {
-    /// Numbers a joint.
+    /// Numbers per joint.
     pub fn width(self) -> usize {
         match self {
             Form::AxisAngle => 3,
@@ -196,7 +196,7 @@ fn polynomial<R: Real>(table: &[f64; TERMS], x: R) -> R {
 const PI_HIGH: f64 = (PI * 1_073_741_824.0) as i64 as f64 / 1_073_741_824.0;
 const PI_LOW: f64 = (PI - PI_HIGH) + 1.2246467991473532e-16;
 
-/// Both from additions and multiplications alone: the same bits on every machine.
+/// Both from additions and multiplications only: the same bits on every machine.
 #[inline(always)]
 fn sin_cos<R: Real>(x: R) -> (R, R) {
     let half_turns = (x * R::of(1.0 / PI)).nearest();

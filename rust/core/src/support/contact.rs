@@ -1,5 +1,5 @@
-//! Contact: which samples touch the ground. Double precision decides, so that single and double precision agree on the
-//! contacts; single precision is asked first, and its answer counts where it is further from τ than its rounding.
+//! Contact: which samples touch the ground. Single and double precision agree on the contacts: a sample whose height in
+//! single precision is closer to τ than the rounding error is decided in double precision.
 
 use crate::error::{Result, unknown_choice};
 use crate::ground::Plane;
@@ -26,7 +26,7 @@ impl ContactRule {
         }
     }
 
-    /// What is compared with τ.
+    /// The distance that is compared with τ.
     #[inline(always)]
     fn distance<R: Real>(self, height: R) -> R {
         match self {
@@ -48,20 +48,20 @@ const RELEASED_MINIMUM: usize = 11;
 /// The samples that touch the ground in any lane.
 pub struct Contacts<R: Real> {
     pub(super) touches: Vec<Touch<R>>,
-    /// Contacts of each lane, a whole number.
+    /// Number of contacts of each lane, an integer.
     count: R,
     rule: ContactRule,
-    /// More than a coordinate on the ground or a height is off by rounding, m.
+    /// Upper bound of the rounding error of a height or of a coordinate on the ground, m.
     pub(super) rounding: R,
 }
 
 pub(super) struct Touch<R> {
     pub sample: u32,
-    /// The lanes in which it touches, as bits.
+    /// Bit mask of the lanes in which it touches.
     pub lanes: u32,
     /// Negative in the lanes in which it touches.
     pub test: R,
-    /// Its position on the ground, as precise as R.
+    /// Its position on the ground, in the precision of R.
     pub flat: [R; 2],
 }
 
@@ -74,7 +74,7 @@ impl Contact {
         R::dispatch::<Find, _>((self, posed))
     }
 
-    /// Decides about one sample in double precision, for the lanes that are asked for.
+    /// The lanes among `lanes` in which a sample touches, decided in double precision.
     #[inline(always)]
     fn decide<R: Real>(&self, posed: &PosedBody<R>, sample: usize, lanes: u32) -> u32 {
         let height = posed.ground.signed_height(posed.template.samples.wide_point(sample, posed.points));
@@ -143,9 +143,9 @@ impl<R: Real> Kernel<(&Contact, &PosedBody<'_, R>)> for Find {
     }
 }
 
-/// A bound on what rounding does to the height or to a coordinate on the ground of any sample, m. Both come from a dot
-/// product with a vertex and two interpolations; each of the about 20 roundings is at most half ε of the longest vector
-/// and of the ground's height, and the bound is three times their sum.
+/// Upper bound of the rounding error of any sample's height or coordinate on the ground, m. Both are computed by a dot
+/// product with a vertex and two interpolations: about 20 roundings of at most half ε times the longest vector plus the
+/// ground's height each. The bound is three times their sum.
 #[inline(always)]
 fn rounding<R: Real>(posed: &PosedBody<R>, threshold: f64) -> R {
     let mut longest = R::zero();
@@ -156,7 +156,7 @@ fn rounding<R: Real>(posed: &PosedBody<R>, threshold: f64) -> R {
     R::of(32.0 * R::Data::EPSILON) * (longest + height + R::of(threshold.abs()))
 }
 
-/// For each vertex the lanes in which it certainly lies above contact: a face with three such vertices has no contacts.
+/// For each vertex the lanes in which it is certainly too high for contact: a face with three such vertices has none.
 #[inline(always)]
 fn lanes_above<R: Real>(heights: &[R], high: R) -> Vec<u32> {
     let mut above = memory::with_capacity(heights.len());
@@ -167,7 +167,7 @@ fn lanes_above<R: Real>(heights: &[R], high: R) -> Vec<u32> {
 }
 
 impl<R: Real> Contacts<R> {
-    /// How many contacts a lane has.
+    /// Number of contacts of a lane.
     pub fn count(&self, lane: usize) -> usize {
         let count = self.count.lane(lane).value() as usize;
         if self.rule == ContactRule::Released && count < RELEASED_MINIMUM { 0 } else { count }
@@ -185,7 +185,7 @@ impl<R: Real> Contacts<R> {
     }
 }
 
-/// One lane of a posed in double precision.
+/// One lane of a posed body, in double precision.
 pub(super) struct OneBody<'a, R: Real> {
     posed: &'a PosedBody<'a, R>,
     lane: usize,

@@ -1,5 +1,5 @@
-//! The hull of the contacts, on lanes as far as it goes: what lies inside the polygon of the contacts that are extreme in
-//! some directions (after Akl and Toussaint) cannot be a corner. What is left is for the exact hull.
+//! The hull of the contacts. A filter on SIMD lanes comes first: a contact inside the polygon of those that are extreme
+//! in some directions cannot be a corner (Akl and Toussaint). The exact hull is taken of the remaining ones.
 
 use crate::memory;
 use crate::number::{Kernel, Real, Scalar};
@@ -25,10 +25,10 @@ impl<R: Real> Contacts<R> {
     }
 }
 
-/// With 16 the exact hull has about half as many points left as with 8; more cost more than they spare.
+/// 16 leave about half as many points to the exact hull as 8; more cost more than they save.
 const DIRECTIONS: usize = 16;
 
-/// In each direction the place of the extreme contact among the touches, −1 in a lane without contacts.
+/// In each direction the index of the extreme contact among the touches, −1 in a lane without contacts.
 struct Extremes;
 
 impl<R: Real> Kernel<(&Contacts<R>,)> for Extremes {
@@ -57,7 +57,8 @@ impl<R: Real> Kernel<(&Contacts<R>,)> for Extremes {
     }
 }
 
-/// The edges of the extreme contacts' polygon: inside it all of normal · x + offset are positive, by more than rounding.
+/// The edges of the extreme contacts' polygon: for points inside it all normal · x + offset are positive by more than
+/// the rounding error.
 struct Edges<R> {
     normals: [[R; 2]; DIRECTIONS],
     offsets: [R; DIRECTIONS],
@@ -74,7 +75,7 @@ impl<R: Real> Edges<R> {
         }
     }
 
-    /// The lanes in which a point is inside, as bits.
+    /// Bit mask of the lanes in which a point is inside.
     #[inline(always)]
     fn inside(&self, [x, y]: [R; 2]) -> u32 {
         let depth = |k: usize| self.normals[k][0].mul_add(x, self.normals[k][1].mul_add(y, self.offsets[k]));
@@ -87,7 +88,7 @@ impl<R: Real> Edges<R> {
 }
 
 /// (normal, offset) of the edges in one lane, from the exact positions of the extreme contacts; with fewer corners than
-/// directions the edges repeat. Nothing is inside a polygon without area.
+/// directions edges repeat. No point is inside a polygon without area.
 fn lane_edges<R: Real>(
     contacts: &Contacts<R>,
     posed: &PosedBody<R>,

@@ -8,7 +8,7 @@ use robust::{Coord, orient2d};
 /// One distinct point gives one corner, collinear points give their two ends. Of equal points the first is the corner.
 pub fn convex_hull(points: &[[f64; 2]]) -> Vec<usize> {
     let mut order = memory::collect(0..points.len());
-    // −0 + 0 is 0: a total order has the two apart, and the chain then goes astray.
+    // −0 + 0 is 0: a total order tells the two zeros apart, which would break the chain.
     let along = |i: usize, j: usize, k: usize| (points[i][k] + 0.0).total_cmp(&(points[j][k] + 0.0));
     order.sort_unstable_by(|&i, &j| along(i, j, 0).then(along(i, j, 1)).then(i.cmp(&j)));
     order.dedup_by_key(|i| points[*i]);

@@ -28,15 +28,15 @@ impl<P: Copy> Nearest<P> {
 }
 
 impl Nearest<usize> {
-    /// For a counter-clockwise polygon of any number of corners; None without corners. Two corners are an edge that is
-    /// walked both ways, which puts every point outside it or on it.
+    /// For a counter-clockwise polygon with any number of corners; None without corners. Two corners are an edge
+    /// traversed both ways, so every point is outside or on it.
     pub fn find(corners: &[[f64; 2]], point: [f64; 2]) -> Option<Self> {
         if corners.len() < 2 {
             return corners.first().map(|_| Nearest::Corner(0));
         }
         let edges = (0..corners.len()).map(|a| (a, (a + 1) % corners.len()));
-        // From outside only the edges that turn their right to the point can be nearest. Deciding that exactly, and not
-        // by the distance, keeps the sign of thin hulls: their two sides are equally far.
+        // From outside, only edges with the point on their right can be nearest. Deciding this exactly instead of by
+        // distance keeps the sign correct for thin hulls, whose two sides are equally far away.
         let faces = |&(a, b): &(usize, usize)| turn(corners[a], corners[b], point) < 0.0;
         let outside = edges.clone().any(|edge| faces(&edge));
         let candidates = edges.filter(|edge| !outside || faces(edge));

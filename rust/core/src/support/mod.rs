@@ -34,7 +34,7 @@ pub struct BaseOfSupport {
 }
 
 impl BaseOfSupport {
-    /// That of each lane, with its centre of mass.
+    /// The base of support of each lane, given its centre of mass.
     pub fn new<R: Real>(posed: &PosedBody<R>, contact: &Contact, centre: &Centre<R>) -> Vec<Self> {
         let centre = posed.plane.flatten(centre.point);
         let hulls = contact.find(posed).hulls(posed);
@@ -83,6 +83,20 @@ pub fn is_supported_lp<R: Real>(posed: &PosedBody<R>, contact: &Contact, method:
 }
 
 /// The signed margin as a differentiable quantity, m.
+///
+/// ```
+/// use ipman::Batch;
+/// use ipman::mass::Method;
+/// use ipman::support::{Contact, ContactRule, SupportMargin};
+///
+/// let (template, vertices) = ipman::example::cube();
+/// let batch = Batch::new(&template, &vertices, &[0.0, 1.0, 0.0], &[0.0], &|| false)?;
+/// let contact = Contact { rule: ContactRule::Paper, threshold: 0.1 };
+/// let margin = batch.value(&SupportMargin { contact, method: Method::Exact })?[0];
+/// // From the middle of the base to its edge; the hull of the samples is slightly smaller than the base.
+/// assert!(margin > 0.4 && margin <= 0.5);
+/// # Ok::<(), ipman::Error>(())
+/// ```
 pub struct SupportMargin {
     pub contact: Contact,
     pub method: Method,
@@ -104,7 +118,7 @@ impl SupportMargin {
         hulls.iter().enumerate().map(nearest).collect()
     }
 
-    /// The margin and its derivatives, with the nearest boundary held.
+    /// The margin and its derivatives, for a fixed nearest boundary.
     #[inline(always)]
     fn margin<R: Real>(
         posed: &PosedBody<R>,

@@ -9,8 +9,8 @@ use faer::linalg::solvers::{Ldlt, Solve};
 use faer::{Col, Mat, Side};
 
 const MAX_ITERATIONS: usize = 100;
-/// Mean complementarity from which on only rounding is left: the iteration ends when the residuals stop falling. They
-/// reach about 1e-13, and the hull's reach is then known to about 1e-12 of its size.
+/// Mean complementarity below which only rounding is left: the iteration then ends once the residuals stop falling.
+/// They reach about 1e-13, which gives the hull's extent to about 1e-12 of its size.
 const CONVERGED_GAP: f64 = 1e-10;
 
 /// Whether `point` is a convex combination of `points`.
@@ -68,7 +68,7 @@ fn reach(columns: &[[f64; 3]]) -> f64 {
 }
 
 /// t at the programme's optimal vertex, by pivots of the simplex method from the ray and the two heaviest points. An
-/// interior iterate comes close to it, on some programmes no closer than 1e-9; the vertex itself is exact to rounding.
+/// interior iterate only approaches it, on some programmes no closer than 1e-9; the vertex is exact to rounding.
 fn vertex(columns: &[[f64; 3]], x: &[f64]) -> Option<f64> {
     let ([ray_x, ray_y, _], points) = columns.split_last()?;
     let points = memory::collect(points.iter().map(|p| [p[0], p[1]]));
@@ -109,7 +109,7 @@ impl Edge {
         cross(self.ends[0], self.ray) / cross(self.ray, self.along())
     }
 
-    /// How far along the ray that is.
+    /// The distance along the ray to the crossing.
     fn reach(&self) -> f64 {
         cross(self.ends[0], self.along()) / cross(self.ray, self.along())
     }

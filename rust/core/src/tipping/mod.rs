@@ -1,9 +1,9 @@
 //! The tip test: how firmly a stiff body stands, without a simulation.
 //!
-//! It stands on the hull of its vertices that are nearly as low as its lowest one. Over an edge of that hull, with the
-//! centre of mass at height h and s inside, it must be lifted by E = m g (√(h² + s²) − h), and an angular velocity of
-//! √(2E / I) tips it, I the inertia about the edge. With the centre outside it falls like an inverted pendulum,
-//! d(t) ≈ |s| (cosh λt − 1), λ = √(m g h / I). Where it comes to rest if nothing is quick, [`roll`] finds.
+//! The body stands on the hull of the vertices that are nearly as low as its lowest one. Over an edge of that hull,
+//! with the centre of mass at height h and s inside, it must be lifted by E = m g (√(h² + s²) − h), and an angular
+//! velocity of √(2E / I) tips it, I the inertia about the edge. With the centre outside it falls like an inverted
+//! pendulum, d(t) ≈ |s| (cosh λt − 1), λ = √(m g h / I). [`roll`] finds where it comes to rest in quasi-static motion.
 
 pub mod roll;
 
@@ -24,23 +24,23 @@ pub use roll::BAND;
 use roll::{Cloud, Orientation, Roller, angle};
 use std::f64::consts::TAU;
 
-/// What is asked of each body.
+/// The constants of the test.
 pub struct TipTest {
     /// kg/m³, one for all parts or one for each.
     pub densities: MassProperties,
-    /// A body with its lowest vertex higher than this is in the air, m.
+    /// A body whose lowest vertex is higher than this counts as in the air, m.
     pub contact: f64,
     /// It stands on the vertices up to this height above its lowest one, m; at most [`BAND`].
     pub tolerance: f64,
-    /// Where it rests it is tilted by so much in each of [`HEADINGS`], and let roll again, rad.
+    /// At rest it is tilted by this angle in each of [`HEADINGS`] directions and rolls again, rad.
     pub nudge: f64,
-    /// One that has tilted by more than this has fallen, and is not nudged, rad.
+    /// A body tilted by more than this has fallen and is not nudged, rad.
     pub fallen: f64,
 }
 
 const HEADINGS: usize = 8;
 
-/// How firmly one body stands: NaN for a body that is no solid, or in the air.
+/// How firmly one body stands; NaN for a body in the air or without a volume.
 #[derive(Clone, Debug)]
 pub struct Tipping {
     pub solid: Solid,
@@ -84,7 +84,7 @@ pub struct Stance {
 }
 
 impl TipTest {
-    /// An error names the number that is out of its range.
+    /// The error names the number that is out of range.
     pub fn new(densities: &[f64], contact: f64, tolerance: f64, nudge: f64, fallen: f64) -> Result<Self> {
         let densities = MassProperties { densities: densities.to_vec() };
         let test = TipTest { densities, contact, tolerance, nudge, fallen };
@@ -92,7 +92,7 @@ impl TipTest {
         Ok(test)
     }
 
-    /// An error names the number that is out of its range, or densities that are not the template's.
+    /// The error names the number that is out of range, or densities that do not fit the template.
     pub fn check(&self, template: &Template) -> Result<()> {
         self.densities.check(template)?;
         self.check_numbers()
@@ -108,7 +108,7 @@ impl TipTest {
         not_negative("fallen", self.fallen)
     }
 
-    /// What the lanes know of each body.
+    /// The footing of each lane.
     pub fn footings<R: Real>(&self, posed: &PosedBody<R>) -> Vec<Footing> {
         let extent = Extent::of(posed);
         let solids = Solid::of_lanes(posed, &extent, &self.densities, self.contact);
@@ -142,7 +142,8 @@ impl TipTest {
         Tipping { solid: solid.moved(origin), stance, rest, stance_at_rest }
     }
 
-    /// A pose that rests on a facet of a millimetre only does not stand: the largest tilt after a nudge in any direction.
+    /// The largest tilt after a nudge in any direction: a pose that rests on a facet of a millimetre does not stand
+    /// firmly.
     fn nudged_tilt(&self, roller: &mut Roller<impl Cloud>, start: Vec3<f64>, end: Orientation, tilt: f64) -> f64 {
         let mut largest = tilt;
         let [e1, e2] = Ground { normal: end.down, height: 0.0 }.axes();
@@ -161,7 +162,7 @@ impl TipTest {
         largest
     }
 
-    /// On the lowest of some points, as seen from the centre of mass.
+    /// The stance on the lowest of some points, given relative to the centre of mass.
     fn stance(&self, solid: &Solid, down: Vec3<f64>, points: &[Vec3<f64>]) -> Stance {
         let plane = Plane { axes: Ground { normal: scale(-1.0, down), height: 0.0 }.axes() };
         let height = points.iter().map(|point| dot(down, *point)).fold(f64::NEG_INFINITY, f64::max);
@@ -194,7 +195,7 @@ struct Pendulum {
 }
 
 impl Pendulum {
-    /// What lifts the centre until it is above the axis, J. √(h² + s²) − h without its cancellation.
+    /// The energy that lifts the centre until it is above the axis, J. √(h² + s²) − h without its cancellation.
     fn barrier(&self) -> f64 {
         self.weight * self.arm * self.arm / (self.height.hypot(self.arm) + self.height)
     }
@@ -213,7 +214,7 @@ impl Stance {
         Stance { height: f64::NAN, margin: f64::NAN, barrier: f64::NAN, push: f64::NAN, rate: f64::NAN }
     }
 
-    /// On a convex polygon around the foot of the centre of mass, which is at the origin: of any number of corners.
+    /// The stance on a convex polygon with any number of corners; the centre of mass projects to the origin.
     fn on(corners: &[[f64; 2]], height: f64, pendulum: impl Fn([f64; 2], f64) -> Pendulum) -> Self {
         const FOOT: [f64; 2] = [0.0; 2];
         let Some(nearest) = Nearest::find(corners, FOOT).filter(|_| height > 0.0) else { return Stance::unknown() };
@@ -263,7 +264,7 @@ impl Tipping {
     }
 }
 
-/// A body on its ground, in coordinates with an origin of its own.
+/// A body on its ground, in local coordinates.
 #[derive(Clone)]
 pub struct Footing {
     solid: Solid,
@@ -282,7 +283,7 @@ impl Footing {
     }
 }
 
-/// The vertices of one body as seen from its centre of mass.
+/// The vertices of one body relative to its centre of mass.
 struct Vertices<'a, T> {
     vertices: &'a [[T; 3]],
     origin: Vec3<f64>,
@@ -292,7 +293,8 @@ struct Vertices<'a, T> {
 
 impl<T: Data> Cloud for Vertices<'_, T> {
     fn offsets(&self, vertices: impl Iterator<Item = u32>) -> Vec<Vec3<f64>> {
-        // The origin is a number of the caller's precision, and near: nothing rounds before the centre is subtracted.
+        // The local origin is exact in the caller's precision and near, so nothing rounds before the centre is
+        // subtracted.
         let offset = |vertex: u32| {
             let point = self.vertices[vertex as usize];
             [0, 1, 2].map(|k| (point[k].value() - self.origin[k]) - self.centre[k])

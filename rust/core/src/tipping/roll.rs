@@ -1,7 +1,7 @@
-//! The quasi-static roll: where a stiff body comes to rest on level ground if nothing is quick.
+//! The quasi-static roll: where a stiff body comes to rest on level ground if it moves slowly.
 //!
-//! In the body's own coordinates it is the ground that turns around it. With `down` towards the ground, the centre of mass
-//! is at the height H(down) = max over the points p of down · p, p from the centre. Gravity turns `down` where H falls
+//! In the body's own coordinates the ground turns around it. With `down` towards the ground, the centre of mass is at
+//! the height H(down) = max over the points p of down · p, p from the centre. Gravity turns `down` where H falls
 //! fastest: away from the nearest point of what touches, so that the body pivots over a vertex or an edge until another
 //! point touches. It rests where the centre lies over what touches.
 
@@ -12,17 +12,17 @@ use crate::number::{Fused, Kernel, Real};
 use crate::support::hull::convex_hull;
 use crate::support::margin::{Margin, Nearest};
 
-/// Vertices up to this height above the lowest are collected at first, m; the higher ones are looked at when the body
-/// rolls so far that they may touch.
+/// Vertices up to this height above the lowest are collected first, m; the higher ones are read once the body has
+/// rolled so far that they may touch.
 pub const BAND: f64 = 0.03;
 /// Points within this height of the lowest touch, m.
 const TOUCH: f64 = 1e-9;
-/// The same of a body that rolls on: wide enough for some ten degrees.
+/// Height above the lowest up to which points are stored while a body rolls, m: enough for about ten degrees.
 const WIDE: f64 = 0.2;
-/// So many turns no body needs: a ball of a million points has fewer on any way down.
+/// Upper bound of the number of turns: a ball of a million points needs fewer.
 const MOST_TURNS: usize = 10_000;
 
-/// The points of a body as seen from its centre of mass.
+/// The points of a body relative to its centre of mass.
 pub trait Cloud {
     fn offsets(&self, points: impl Iterator<Item = u32>) -> Vec<Vec3<f64>>;
     fn count(&self) -> usize;
@@ -30,7 +30,7 @@ pub trait Cloud {
     fn reach(&self) -> f64;
 }
 
-/// Between two directions, rad.
+/// The angle between two directions, rad.
 pub fn angle(a: Vec3<f64>, b: Vec3<f64>) -> f64 {
     let across = cross(a, b);
     dot(across, across).sqrt().atan2(dot(a, b))
@@ -96,7 +96,7 @@ impl<'a, C: Cloud> Roller<'a, C> {
         self.near.points.stop(down)
     }
 
-    /// The direction down when the next point touches. None where there is none, or not within a right angle.
+    /// The direction down when the next point touches; None if none does within a right angle.
     fn turn(&mut self, down: Vec3<f64>, way: &Way, height: f64) -> Option<Vec3<f64>> {
         let turned = self.near.points.turned(down, way, height);
         if let Some(next) = turned.filter(|next| self.near.holds(*next, dot(*next, way.pivot), self.reach)) {
@@ -128,33 +128,34 @@ impl Near {
         Near { points, down, height, band }
     }
 
-    /// Whether in another direction every point that is `height` below the centre or more is one of them: the others have
-    /// come down by less than `reach` times the turn, and were higher by `band`.
+    /// Whether in another direction these points include every point that is at least `height` below the centre: the
+    /// others were higher by `band`, and have come down by less than `reach` times the turn.
     fn holds(&self, down: Vec3<f64>, height: f64, reach: f64) -> bool {
         let turn = sub(down, self.down);
         height > self.height - self.band + TOUCH + reach * dot(turn, turn).sqrt()
     }
 }
 
-/// x, y and z apart, so that the loops over them vectorise.
+/// x, y and z in separate arrays, so that the loops over them vectorise.
 struct Points {
     axes: [Vec<f64>; 3],
 }
 
-/// What touches in one direction, and the height of the centre.
+/// The points that touch in one direction, and the height of the centre.
 struct Stop {
     height: f64,
     touching: Vec<Vec3<f64>>,
 }
 
-/// Where `down` turns to, a unit vector at right angles to it, and a point over which the body pivots.
+/// The direction towards which `down` turns, a unit vector at right angles to it, and a point over which the body
+/// pivots.
 struct Way {
     towards: Vec3<f64>,
     pivot: Vec3<f64>,
 }
 
 impl Stop {
-    /// None where the body is at rest.
+    /// None if the body is at rest.
     fn downhill(&self, down: Vec3<f64>) -> Option<Way> {
         let plane = Plane { axes: Ground { normal: down, height: 0.0 }.axes() };
         let flat = memory::collect(self.touching.iter().map(|point| plane.flatten(*point)));
@@ -172,7 +173,7 @@ impl Points {
         Points { axes: [0, 1, 2].map(|k| memory::collect(offsets.iter().map(|offset| offset[k]))) }
     }
 
-    /// Of all points, towards `down`, and the largest.
+    /// Distances of all points along `down`, and the largest.
     fn heights(&self, down: Vec3<f64>) -> (Vec<f64>, f64) {
         Fused::<f64>::dispatch::<Along, _>((self, down))
     }
@@ -193,7 +194,7 @@ impl Points {
         memory::collect(low.map(|(point, _)| self.at(point)))
     }
 
-    /// The direction in which the first of the points touches that do not yet.
+    /// The direction down when the first further point touches.
     fn turned(&self, down: Vec3<f64>, way: &Way, height: f64) -> Option<Vec3<f64>> {
         // At the angle θ a point touches that is a above the ground and b beyond the pivot with a cos θ = b sin θ.
         let steepest =
@@ -224,7 +225,7 @@ impl Kernel<(&Points, Vec3<f64>)> for Along {
     }
 }
 
-/// Maxima that run side by side.
+/// Number of interleaved maxima.
 const WIDTH: usize = 16;
 
 #[inline(always)]
@@ -305,7 +306,7 @@ mod tests {
             let down = scale(1.0 / dot(down, down).sqrt(), down);
             let low = Points::new(&cloud.0).near(down, BAND);
             assert!(low.len() < cloud.count() / 2);
-            // Whose points are all near from the start, never looks again.
+            // With all points near from the start, no point is ever read again.
             let whole = Points3(cloud.0.clone());
             let mut roller = Roller::new(down, &low, &cloud);
             let rest = roller.to_rest(down).unwrap();

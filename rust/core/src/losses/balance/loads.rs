@@ -1,6 +1,6 @@
 //! The load that the samples bear at an exponent λ, and its moments.
 //!
-//! Most samples bear nothing: chunks of them that cannot reach the heaviest one's load, but for rounding, are passed over.
+//! Most samples bear no load. Chunks whose load is below the rounding error of the heaviest sample's are skipped.
 
 use crate::memory;
 use crate::number::vector::{Vec3, add, narrow, sub, widen};
@@ -9,11 +9,11 @@ use crate::posed::PosedBody;
 use crate::pressure::PressureCurve;
 use crate::sampling::{CHUNK, Chunk, Row, Walk, fold};
 
-/// What the samples' numbers are interpolated from, and where each chunk of samples reaches.
+/// Heights and arms of the vertices, from which the samples' are interpolated, and bounds for each chunk of samples.
 pub(super) struct Supports<R> {
     /// Of the vertices.
     pub(super) heights: Vec<R>,
-    /// From a fixed point (the centre of mass, first) to the vertices, in the plane's coordinates.
+    /// From a fixed point (at first the centre of mass) to the vertices, in the plane's coordinates.
     pub(super) arms: [Vec<R>; 2],
     pub(super) reaches: Vec<Reach<R>>,
 }
@@ -44,7 +44,7 @@ pub(super) struct Load<R: Real> {
     pub(super) total: R::Wide,
 }
 
-/// Exponents this far below the top add up to less than rounding, however many samples have them.
+/// Exponents this far below the top add up to less than the rounding error, however many samples have them.
 #[inline(always)]
 pub(super) fn negligible<R: Real>() -> R {
     R::of(R::Data::EPSILON.log2() - 16.0)
@@ -66,7 +66,7 @@ impl<R: Real> Supports<R> {
         Supports { heights, arms, reaches }
     }
 
-    /// The same supports seen from another point, `by` further in the plane: arms are exact where they are short.
+    /// The same supports with arms from another point, displaced by `by` in the plane: short arms are more accurate.
     #[inline(always)]
     pub(super) fn seen_from(&self, posed: &PosedBody<R>, centre: Vec3<R::Wide>, by: [R::Wide; 2]) -> Self {
         let arms = R::dispatch::<Arms, _>((posed, add(centre, posed.plane.raise(by))));
@@ -83,7 +83,8 @@ impl<R: Real> Supports<R> {
     }
 }
 
-/// Arms of the vertices from a point. The point's rounding is taken off, too: a shift of all arms moves λ.
+/// Arms of the vertices from a point. The point's rounding error is subtracted, too, because a common shift of all arms
+/// changes λ.
 pub(super) struct Arms;
 
 impl<R: Real> Kernel<(&PosedBody<'_, R>, Vec3<R::Wide>)> for Arms {
@@ -104,7 +105,7 @@ impl<R: Real> Kernel<(&PosedBody<'_, R>, Vec3<R::Wide>)> for Arms {
     }
 }
 
-/// The reach of a chunk from its rows of heights and arms.
+/// The bounds of a chunk from its rows of heights and arms.
 pub(super) struct Reaches;
 
 impl<R: Real> Kernel<(&[Row<R>; 3], usize)> for Reaches {
@@ -162,7 +163,7 @@ impl<R: Real> Exponent<R> {
         height.mul_add(self.by_height, x.mul_add(self.by_arm[0], y * self.by_arm[1]))
     }
 
-    /// No sample of the chunk has a larger one.
+    /// Upper bound of the exponents of a chunk's samples.
     #[inline(always)]
     pub(super) fn bound(&self, reach: &Reach<R>) -> R {
         let mut bound = reach.lowest * self.by_height;
@@ -174,7 +175,7 @@ impl<R: Real> Exponent<R> {
         bound
     }
 
-    /// Some sample has this one, and it is not far from the top.
+    /// The exponent of some sample, close to the largest.
     #[inline(always)]
     pub(super) fn high(&self, reaches: &[Reach<R>]) -> R {
         let mut high = R::of(-1e30);
@@ -185,14 +186,14 @@ impl<R: Real> Exponent<R> {
     }
 }
 
-/// The factor of the density that its exponent leaves: 1 above the ground, and below it linear with slope `fall`.
+/// The density divided by its exponential: 1 above the ground, linear with slope `fall` below it.
 #[inline(always)]
 pub(super) fn factor<R: Real>(fall: R, height: R) -> R {
     height.if_negative(fall.mul_add(height, R::of(1.0)), R::of(1.0))
 }
 
-/// One walk over the samples: their load at an exponent, and its first and second moments about the anchor. Lanes with
-/// negative `idle` do not need it and make no chunk worth a visit.
+/// One pass over the samples: their load at an exponent, and its first and second moments about the anchor. Lanes with
+/// negative `idle` need no result; a chunk is skipped if only they would need it.
 pub(super) struct Weigh;
 
 impl<R: Real> Kernel<(&Supports<R>, &Walk, &PressureCurve, Exponent<R>, R)> for Weigh {
@@ -232,8 +233,8 @@ pub(super) fn read<R: Real>(supports: &Supports<R>, walk: &Walk, chunk: &Chunk, 
     walk.interpolate(chunk, &supports.arms[1], &mut rows[2]);
 }
 
-/// Adds a chunk, in the lanes where its clearance is not negative, to the sums. The sums are over 2^top: they are scaled
-/// down where the top rises.
+/// Adds a chunk to the sums, in the lanes where its clearance is not negative. The sums are divided by 2^top, and
+/// rescaled when the top rises.
 pub(super) struct WeighChunk;
 
 pub(super) type ChunkToWeigh<'a, R> =
@@ -272,8 +273,8 @@ impl<R: Real> Kernel<ChunkToWeigh<'_, R>> for WeighChunk {
     }
 }
 
-/// Σ of w, wx, wy, wxx, wxy, wyy over rows whose weights behind the chunk's end are 0. In three passes, so that the
-/// running sums stay in registers; `loads` is for wx.
+/// Σ of w, wx, wy, wxx, wxy, wyy over rows whose weights beyond the chunk's end are 0. In three passes, so that the
+/// running sums stay in registers; `loads` is scratch space for wx.
 #[inline(always)]
 pub(super) fn moments<R: Real>(weights: &Row<R>, x: &Row<R>, y: &Row<R>, loads: &mut Row<R>) -> [R; 6] {
     let zero = [R::zero(); SUMS];

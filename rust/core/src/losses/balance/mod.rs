@@ -1,5 +1,5 @@
-//! The balance cost, a stability term of our own beside the paper's: how implausible a redistribution of load over the
-//! existing supports balance would need.
+//! The balance cost, an alternative to the paper's stability term: how implausible the redistribution of load over the
+//! existing supports is that balance would require.
 //!
 //! J(m) = min_w KL(w‖p) subject to Σ w_i x_i = m, with p the pressure distribution, x_i the samples on the ground and m
 //! the centre of mass there. Its dual, with supports blurred by σ so that J stays finite outside their hull, is
@@ -24,7 +24,7 @@ use crate::template::Template;
 use loads::{Exponent, Reach, Weigh, all_lanes, factor, negligible, read};
 use newton::{Solution, Solve};
 
-/// What is made of J, so that bodies far from balance do not rule a loss.
+/// How J is compressed, so that badly unbalanced bodies do not dominate the loss.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wrap {
     /// log(1 + J)
@@ -57,6 +57,21 @@ impl Wrap {
     }
 }
 
+/// The balance cost as a quantity.
+///
+/// ```
+/// use ipman::Batch;
+/// use ipman::losses::balance::{BalanceCost, Wrap};
+/// use ipman::mass::Method;
+/// use ipman::pressure::PressureCurve;
+///
+/// let (template, vertices) = ipman::example::cube();
+/// let batch = Batch::new(&template, &vertices, &[0.0, 1.0, 0.0], &[0.0], &|| false)?;
+/// let curve = PressureCurve { alpha: 100.0, gamma: 50.0 };
+/// let cost = BalanceCost { method: Method::Exact, wrap: Wrap::None, curve, sigma: 0.02 };
+/// assert!(batch.value(&cost)?[0] < 0.1, "the load hardly has to be redistributed");
+/// # Ok::<(), ipman::Error>(())
+/// ```
 pub struct BalanceCost {
     pub method: Method,
     pub wrap: Wrap,
@@ -72,7 +87,7 @@ pub struct Balance<R: Real> {
 }
 
 impl BalanceCost {
-    /// The forward about a centre of mass that is known already.
+    /// The forward, given the centre of mass.
     pub fn forward_about<R: Real>(&self, posed: &PosedBody<R>, centre: Centre<R>, out: &mut [R]) -> Balance<R> {
         let solution = R::dispatch::<Solve, _>((&self.curve, self.sigma, posed, centre.point));
         out[0] = R::narrow(self.wrap.value_and_slope(solution.cost).0);
@@ -101,7 +116,7 @@ impl Quantity for BalanceCost {
     }
 }
 
-/// The backward of the cost. Its supports are seen from the loaded mean, so that the weights are exact.
+/// The backward of the cost. Arms are taken from the loaded mean, so that the weights are accurate.
 struct Backward;
 
 impl<R: Real> Kernel<(&BalanceCost, &PosedBody<'_, R>, &Balance<R>, R, &mut [Vec3<R>])> for Backward {
@@ -145,7 +160,7 @@ impl<R: Real> Kernel<(&BalanceCost, &PosedBody<'_, R>, &Balance<R>, R, &mut [Vec
     }
 }
 
-/// Either side of the comparison: w, or p.
+/// One of the two distributions: w or p.
 struct Side<R> {
     exponent: Exponent<R>,
     top: R,
@@ -159,7 +174,7 @@ impl<R: Real> Side<R> {
         self.exponent.bound(reach) - self.top - negligible::<R>()
     }
 
-    /// Its share of the load over the density's factor; 0 in the lanes that the walk has passed over.
+    /// A sample's share of the load divided by the density's linear factor; 0 in the lanes that skip this chunk.
     #[inline(always)]
     fn of(&self, clearance: R, height: R, x: R, y: R) -> R {
         let share = self.share * (self.exponent.at(height, x, y) - self.top).exp2();

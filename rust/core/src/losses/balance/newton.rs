@@ -10,7 +10,7 @@ use crate::sampling::Walk;
 /// The solved problem.
 pub(super) struct Solution<R: Real> {
     pub(super) supports: Supports<R>,
-    /// Of the pressure alone, at λ = 0.
+    /// The load of the pressure alone, at λ = 0.
     pub(super) still: Load<R>,
     pub(super) lambda: [R::Wide; 2],
     /// Σ w_i x_i − m, nearly.
@@ -27,11 +27,11 @@ struct Objective<W> {
     mean: [W; 2],
 }
 
-/// Newton steps and halvings together. Balanced bodies need 5 or 6; a body that lies metres outside needs about 40.
+/// Newton steps and halvings together. Balanced bodies need 5 or 6; a centre of mass metres outside needs about 40.
 const MAX_STEPS: usize = 100;
 
-/// Residual in metres at which Newton's last full step reaches rounding, for it squares the residual over the length on
-/// which the loads change, a few centimetres.
+/// Residual in metres from which one more full Newton step reaches the rounding error: the step squares the residual
+/// relative to the length over which the loads change, a few centimetres.
 #[inline(always)]
 fn tolerance<R: Real>() -> R::Wide {
     R::Wide::of(0.03 * R::Data::EPSILON.sqrt())
@@ -67,8 +67,9 @@ fn objective<R: Real>(
     (objective, load)
 }
 
-/// Newton with backtracking, each lane at its own pace, and one full step at the end, which also carries a dual number's
-/// derivative of λ. Arms are taken from the mean of the last step, for exponents are exact where they are short.
+/// Newton with backtracking, each lane with its own step length, and one full step at the end, which also gives a dual
+/// number's derivative of λ. Arms are taken from the mean of the previous step, because exponents are most accurate
+/// where arms are short.
 pub(super) struct Solve;
 
 impl<R: Real> Kernel<(&PressureCurve, f64, &PosedBody<'_, R>, Vec3<R::Wide>)> for Solve {
@@ -86,7 +87,7 @@ impl<R: Real> Kernel<(&PressureCurve, f64, &PosedBody<'_, R>, Vec3<R::Wide>)> fo
         let mut length = one;
         for _ in 0..MAX_STEPS {
             let excess = here.residual() - tolerance::<R>();
-            // A lane without a number never leaves and must not keep the others waiting.
+            // A NaN lane never converges and must not keep the others iterating.
             if (-excess).negative() == 0 {
                 break;
             }
@@ -95,10 +96,10 @@ impl<R: Real> Kernel<(&PressureCurve, f64, &PosedBody<'_, R>, Vec3<R::Wide>)> fo
             let anchor = [R::narrow(here.mean[0]), R::narrow(here.mean[1])];
             let idle = R::narrow((-excess).if_negative(R::Wide::zero(), -one));
             let (there, _) = objective(curve, sigma, &supports, walk, trial, anchor, idle);
-            // The slack admits steps whose gain drowns in rounding.
+            // The slack accepts steps whose gain is below the rounding error.
             let slack = R::Wide::of(epsilon) * (one + here.value.abs());
             let gain = there.value - here.value - R::Wide::of(1e-4) * length * here.along(step) - slack;
-            // A lane that has arrived stays, however long the others take.
+            // A converged lane no longer changes while the others iterate.
             let refused = excess.if_negative(one, gain);
             lambda = [refused.if_negative(trial[0], lambda[0]), refused.if_negative(trial[1], lambda[1])];
             here = here.replaced_where_negative(refused, there);
@@ -108,7 +109,7 @@ impl<R: Real> Kernel<(&PressureCurve, f64, &PosedBody<'_, R>, Vec3<R::Wide>)> fo
         // So close to the minimum F is its quadratic model.
         let divergence = start - here.value - R::Wide::of(0.5) * here.along(step);
         let lambda = [lambda[0] + step[0], lambda[1] + step[1]];
-        // J is a divergence: below zero there is only rounding.
+        // J is a divergence: a negative value is only rounding.
         Solution { supports, still, lambda, mean: here.mean, cost: divergence.at_least(R::Wide::zero()) }
     }
 }

@@ -7,9 +7,9 @@ use crate::skinning::rotation::Form;
 use std::mem::take;
 use std::ops::Range;
 
-/// Vertices a tile: one to four vector registers, by the machine.
+/// Vertices per tile: one to four vector registers, depending on the CPU.
 pub const TILE: usize = 16;
-/// One row of `width` numbers a body, or a single one that all bodies share; of width 0 where nothing is given.
+/// One row of `width` numbers per body, or a single row shared by all; width 0 if not given.
 #[derive(Clone, Copy)]
 pub struct Rows<'a, T> {
     pub numbers: &'a [T],
@@ -40,10 +40,10 @@ pub struct Upstream<'a, T> {
     pub joints: &'a [T],   // (B, J, 3)
 }
 
-/// Gradients by pose, betas, expression and translation, one row a body; an empty one is not asked for.
+/// Gradients by pose, betas, expression and translation, one row per body; an empty one is not computed.
 pub type Gradients<'a, T> = [&'a mut [T]; 4];
 
-/// A direction has the shape of the parameters, as far as it is given.
+/// Checks that a direction has the shapes of the parameters; parts of it may be missing.
 pub(super) fn check_direction<T: Copy>(bodies: &Bodies<T>, along: &Bodies<T>, num_bodies: usize) -> Result<()> {
     let pairs = [
         ("along_pose", bodies.pose, along.pose),
@@ -70,7 +70,7 @@ pub(super) fn gradient_widths<T>(gradients: &Gradients<T>, given: [usize; 4], nu
     Ok(widths)
 }
 
-/// How many leading columns have a number other than zero.
+/// Index of the last non-zero column, plus one.
 pub(super) fn used<T: Scalar>(rows: Rows<T>) -> usize {
     let last = |row: &[T]| row.iter().rposition(|x| x.value() != 0.0).map_or(0, |last| last + 1);
     rows.numbers.chunks_exact(rows.width.max(1)).map(last).max().unwrap_or(0)
@@ -84,12 +84,12 @@ pub(super) fn triple<R: Real>(numbers: &[R]) -> [R; 3] {
     std::array::from_fn(|axis| numbers.get(axis).copied().unwrap_or(R::zero()))
 }
 
-/// The rows of some bodies, if there are any.
+/// The rows of some bodies; empty if `numbers` is.
 pub(super) fn rows<T>(numbers: &[T], bodies: Range<usize>, row: usize) -> &[T] {
     numbers.get(bodies.start * row..bodies.end * row).unwrap_or_default()
 }
 
-/// Cuts off the first n.
+/// Splits off the first n.
 pub(super) fn front<'a, T>(rest: &mut &'a mut [T], n: usize) -> &'a mut [T] {
     let (front, back) = take(rest).split_at_mut(n);
     *rest = back;

@@ -1,5 +1,5 @@
-//! Many posed bodies of one model, over threads. A few bodies at a time share each pass over the model's tables; the
-//! bits of a body depend neither on the number of threads nor on its neighbours.
+//! Skinning of many bodies of one model, over threads. A few bodies at a time share each pass over the model's tables;
+//! a body's bits depend neither on the number of threads nor on the other bodies.
 
 mod arguments;
 mod passes;
@@ -27,9 +27,9 @@ pub struct PosedBatch<'a, T> {
     form: Form,
     level: Level,
     bodies: Bodies<'a, T>,
-    /// Betas and expressions that are not zero in every body: those after them cost nothing.
+    /// Number of leading betas and of expressions in use: those after them are zero in every body and cost nothing.
     used: [usize; 2],
-    /// Asked now and then from the calling thread; true gives up with [`Error::Interrupted`].
+    /// Called now and then on the calling thread; if it returns true the call fails with [`Error::Interrupted`].
     interrupted: &'a (dyn Fn() -> bool + Sync + 'a),
 }
 
@@ -74,7 +74,7 @@ impl<'a, T: Data> PosedBatch<'a, T> {
         memory::guarded(|| self.pull::<Dual>(self.skin.start(), parameters, constant, number, upstream, gradients))
     }
 
-    /// Numbers of [`PosedBatch::jacobian`] a body.
+    /// Numbers per body of [`PosedBatch::jacobian`].
     pub fn jacobian_width(&self) -> usize {
         let parameters = 3 * self.skin.num_joints() + self.bodies.betas.width;
         parameters * (self.skin.num_vertices + self.skin.num_joints()) * 3
@@ -186,7 +186,7 @@ impl<'a, T: Data> PosedBatch<'a, T> {
         }
     }
 
-    /// One body's parameters as dual numbers; what is not given, or has no direction, does not move.
+    /// One body's parameters as dual numbers; a parameter that is missing, or without a direction, has slope zero.
     fn dual(&self, body: usize, along: &Bodies<T>) -> Parameters<Dual> {
         let pairs = |values: Rows<T>, slopes: Rows<T>| -> Vec<Dual> {
             let (values, slopes) = (values.of(body), slopes.of(body));
@@ -202,7 +202,7 @@ impl<'a, T: Data> PosedBatch<'a, T> {
         }
     }
 
-    /// The resting body of the one shape that several bodies share.
+    /// The resting body, if several bodies share one shape.
     fn shaped<V: Real<Data = T>>(&self) -> Option<Vec<Tile<T, TILE>>> {
         let [betas, expression] = [(self.bodies.betas, self.used[0]), (self.bodies.expression, self.used[1])];
         let alike = |(rows, used): (Rows<T>, usize)| rows.shared || used == 0;
@@ -266,7 +266,7 @@ impl<T: Data> Work<T> for BackwardWork<'_, '_, T> {
     }
 }
 
-/// Writes one body's gradient: zero for a body that is not finite, unless the upstream gradient is to blame.
+/// Writes one body's gradient; zero for a body that is not finite, unless the upstream gradient is not finite.
 fn write_gradient<R: Scalar, T: Scalar>(
     body: &Body<R>,
     gradient: &Gradient<R>,

@@ -1,4 +1,4 @@
-//! The passes over a model's tiles: every tile is read once for a group of bodies.
+//! Passes over a model's tiles: each tile is read once for a group of bodies.
 
 use super::arguments::{TILE, rows};
 use crate::number::{Data, Kernel, Real, Scalar};
@@ -11,7 +11,7 @@ pub(super) trait Pass<V: Real>: Sized {
     fn run<const P: usize, const N: usize>(self);
 }
 
-/// Runs a pass behind the gate of its registers.
+/// Runs a pass compiled for its registers' instruction set.
 pub(super) fn run<V: Real, A: Pass<V>>(pass: A) {
     V::dispatch::<Widths<V>, _>((pass,))
 }
@@ -72,7 +72,7 @@ fn write<V: Real, T, const P: usize, const N: usize>(
     let row = vertices.len() / N;
     for (points, vertices) in tiles.iter().zip(vertices.chunks_exact_mut(row)) {
         let out = &mut vertices[3 * TILE * tile..];
-        // A constant length lets the compiler unroll.
+        // A constant length lets the compiler unroll the loop.
         match out.first_chunk_mut::<{ 3 * TILE }>() {
             Some(out) => interleave(points, out, number),
             None => interleave(points, out, number),
@@ -96,7 +96,7 @@ pub(super) struct Backward<'a, T, R: Real, F, G> {
     pub skin: &'a Skin<T, TILE>,
     pub start: Start<'a, T, TILE>,
     pub bodies: &'a [Body<R>],
-    /// One row a body, or empty: zeros.
+    /// One row per body; empty means zeros.
     pub d_vertices: &'a [T],
     pub d_joints: &'a [T],
     pub constant: F,
