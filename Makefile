@@ -115,6 +115,7 @@ lint: $(VENV)/test-tools $(VENV)/lint-tools
 	ruff check
 	ruff format --check
 	pyright
+	lint-imports
 	python tools/third_party_notices.py --check
 
 format: $(VENV)/lint-tools

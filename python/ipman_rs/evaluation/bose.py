@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ipman_rs.arrays import Bodies
 from ipman_rs.checks import choice, real_array
 from ipman_rs.ground import Ground
-from ipman_rs.mass import Method
+from ipman_rs.quantities import Method
 from ipman_rs.support import support_margin
 from ipman_rs.template import BodyTemplate
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import ipman_rs as ip
 from ipman_rs import view
-from ipman_rs.mass import Method
+from ipman_rs.quantities import Method
 from ipman_rs.view import cells, colors
 from ipman_rs.view.picture import camera_on
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ipman_rs.files import being_written
 
+from .layout import FOR_ALL, NUMBERS, TEXT
 from .rows import RowsOnDisk, of_npy
 
 _BATCH = 4096  # rows
@@ -33,8 +34,6 @@ def needed() -> tuple[Any, Any]:
 def read(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any], frozenset[str]]:
     """The columns of predictions, unpacked into a folder, what is one for all frames, and the names of all columns.
     ValueError if damaged."""
-    from .predictions import FOR_ALL, NUMBERS, TEXT
-
     needed()
     try:
         with _opened(path) as file:

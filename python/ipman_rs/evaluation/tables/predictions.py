@@ -33,17 +33,10 @@ from ipman_rs.files import regular, safe_npz
 from ipman_rs.ground import Ground
 
 from . import parquet
+from .layout import FOR_ALL, LABELS, LENGTHS, NUMBERS, POINTS, TEXT
 from .rows import RowsOnDisk, of_npz
 
-TEXT = ("names", "sequences", "genders")
-LENGTHS = ("transl", "vertices", "joints", "center_of_mass", "center_of_pressure")
-LABELS = ("standing", "contact")
-NUMBERS = (
-    "pose", "betas", "transl", "vertices", "joints", "ground", "center_of_mass", "center_of_pressure", *LABELS,
-)  # fmt: skip
-POINTS = ("pose", "vertices", "joints")  # (F, n, 3)
 LISTED = 12  # names of arrays
-FOR_ALL = ("body", "joint_names", "frame_rate")
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ import ipman_rs.torch as ipt
 from ipman_rs import BodyTemplate
 from ipman_rs.body import BodyModel
 from ipman_rs.checks import not_negative
-from ipman_rs.losses import Wrap
+from ipman_rs.quantities import Wrap
 
 from ..candidate import Candidate
 from ..problem import Problem
