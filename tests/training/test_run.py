@@ -26,6 +26,8 @@ from ipman_rs.training import recipes
 from ipman_rs.training.augment import Augmentation, Augmenting, crop
 from ipman_rs.training.projection import project
 from ipman_rs.training.trainer import config
+from ipman_rs.training.trainer.checkpoints import WholeFiles
+from ipman_rs.training.trainer.curve import Curve, drop_after
 from ipman_rs.training.trainer.module import Training
 from tests.helpers import ipman_script
 
@@ -103,6 +105,53 @@ def test_a_killed_run_goes_on_as_if_nothing_had_been(whole, settings, tmp_path):
     again, straight = curve(folder), curve(whole)
     assert [int(line["step"]) for line in again] == list(range(max(24, saved + 3)))
     assert again[:24] == straight  # to the last digit
+
+
+class Killed(BaseException):
+    """Nothing catches it: the run ends here, as by a kill."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("moment", ["before validation.csv", "after validation.csv", "after best.ckpt"])
+def test_a_kill_around_a_validation_leaves_the_same_bytes(whole, settings, tmp_path, monkeypatch, moment):
+    """Step 12 is saved and validated: killed between the two, the next run validates it once, no more and no less."""
+    when, name = moment.split()
+    write, save = Curve._write, WholeFiles.save_checkpoint
+
+    def written(self, file, step, numbers):
+        if (when, name, step) == ("before", file, 12):
+            raise Killed
+        write(self, file, step, numbers)
+        if (when, name, step) == ("after", file, 12):
+            raise Killed
+
+    def saved(self, checkpoint, path, *options, **named):
+        save(self, checkpoint, path, *options, **named)
+        if Path(path).name == name:
+            raise Killed
+
+    arguments = ["train", str(settings), "-o", str(tmp_path / "out"), "save=4"]
+    with monkeypatch.context() as patched:
+        patched.setattr(Curve, "_write", written)
+        patched.setattr(WholeFiles, "save_checkpoint", saved)
+        with pytest.raises(Killed):
+            CliRunner().invoke(main, arguments)
+    assert len(curve(tmp_path / "out")) == 12
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.output
+    for file in ("curve.csv", "validation.csv"):
+        assert (tmp_path / "out" / file).read_bytes() == (whole / file).read_bytes()
+    again, straight = (torch.load(place / "best.ckpt", weights_only=True) for place in (tmp_path / "out", whole))
+    assert again["global_step"] == straight["global_step"]
+    assert all(torch.equal(value, straight["state_dict"][key]) for key, value in again["state_dict"].items())
+
+
+def test_lines_that_a_kill_cut_short_are_dropped(tmp_path):
+    for content, kept in ((b"", None), (b"step,lo", None), (b"step,loss\n0,1.0\n1,2.0\n2,3", b"step,loss\n0,1.0\n")):
+        path = tmp_path / "curve.csv"
+        path.write_bytes(content)
+        drop_after(path, 0)
+        assert (path.read_bytes() if path.exists() else None) == kept
 
 
 def test_a_gradient_is_clipped_and_one_that_is_infinite_dropped(settings, tmp_path):

@@ -1,4 +1,4 @@
-"""Checkpoints that are whole or not there: written beside their place and then moved; the last step has one, too."""
+"""Checkpoints that are whole or not there: written beside their place and then moved."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import lightning
 import torch
+from lightning.pytorch.callbacks import Checkpoint
 from lightning.pytorch.plugins.io import TorchCheckpointIO
 
 from ipman_rs.files import being_written
@@ -20,12 +21,23 @@ class WholeFiles(TorchCheckpointIO):
             torch.save(checkpoint, file)
 
 
-class AtEnd(lightning.Callback):
-    """Saves the last step, which may be no multiple of those that are saved."""
+class LastCheckpoint(Checkpoint):
+    """The checkpoint that an interrupted run goes on from: of every `every`-th step and of the last.
 
-    def __init__(self, place: Path, every: int) -> None:
-        self.place, self.every = place, every
+    A step that is validated (every `validated`-th, none where 0) is saved after its validation: a run that goes on from
+    it does not validate it again. As a `Checkpoint` it is called after all other callbacks, and last of these.
+    """
+
+    def __init__(self, place: Path, every: int, validated: int) -> None:
+        self.place, self.every, self.validated = place, every, validated
 
     def on_train_batch_end(self, trainer: lightning.Trainer, *_: Any, **__: Any) -> None:
-        if trainer.global_step == trainer.max_steps and trainer.global_step % self.every:
-            trainer.save_checkpoint(self.place)
+        if not (self.validated and trainer.global_step % self.validated == 0):
+            self._save(trainer)
+
+    def on_validation_end(self, trainer: lightning.Trainer, *_: Any) -> None:
+        self._save(trainer)
+
+    def _save(self, trainer: lightning.Trainer) -> None:
+        if trainer.global_step % self.every == 0 or trainer.global_step == trainer.max_steps:
+            trainer.save_checkpoint(self.place, weights_only=False)

@@ -25,7 +25,7 @@ class Curve(lightning.Callback):
     def on_train_start(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
         if trainer.is_global_zero:
             for name, last in (("curve.csv", trainer.global_step - 1), ("validation.csv", trainer.global_step)):
-                _drop_after(self.folder / name, last)
+                drop_after(self.folder / name, last)
 
     def on_train_batch_end(
         self, trainer: lightning.Trainer, pl_module: lightning.LightningModule, outputs: Any, batch: Any, batch_idx: int
@@ -41,7 +41,7 @@ class Curve(lightning.Callback):
 
     def _write(self, name: str, step: int, numbers: Mapping[str, float]) -> None:
         path, text = self.folder / name, io.StringIO()
-        lines = csv.writer(text)
+        lines = csv.writer(text, lineterminator="\n")
         if not path.exists():
             lines.writerow(["step", *numbers])
         lines.writerow([step, *(repr(value) for value in numbers.values())])
@@ -56,10 +56,14 @@ class Curve(lightning.Callback):
                 raise
 
 
-def _drop_after(path: Path, last: int) -> None:
+def drop_after(path: Path, last: int) -> None:
+    """Leaves the lines of steps up to `last`, whole ones only."""
     if not path.exists():
         return
-    head, *lines = path.read_text().splitlines(keepends=True)
+    head, *lines = path.read_text().splitlines(keepends=True) or [""]
+    if not head.endswith("\n"):  # a kill came before the first whole line
+        path.unlink()
+        return
     # A kill may have cut the last line short.
     kept = [line for line in lines if line.endswith("\n") and int(line.partition(",")[0]) <= last]
     write_whole(path, "".join([head, *kept]))

@@ -13,7 +13,7 @@ from lightning.pytorch.loggers import TensorBoardLogger
 
 from ipman_rs.files import write_whole
 
-from .checkpoints import AtEnd, WholeFiles
+from .checkpoints import LastCheckpoint, WholeFiles
 from .config import Config, load, plain
 from .curve import Curve
 from .module import Training
@@ -83,14 +83,11 @@ def _keep(settings: Config, folder: Path) -> None:
 
 
 def _callbacks(settings: Config, folder: Path) -> list[lightning.Callback]:
-    last = ModelCheckpoint(
-        folder, LAST.removesuffix(".ckpt"), every_n_train_steps=settings.save, save_top_k=1, monitor=None,
-        enable_version_counter=False, save_on_train_epoch_end=False,
-    )  # fmt: skip
-    found: list[lightning.Callback] = [Curve(folder), last, AtEnd(folder / LAST, settings.save)]
-    if settings.validation and settings.validate:
+    found: list[lightning.Callback] = [Curve(folder)]
+    validated = settings.validate if settings.validation else 0
+    if validated:
         found.append(ModelCheckpoint(folder, BEST, monitor="PVE", mode="min", enable_version_counter=False))
-    return found
+    return [*found, LastCheckpoint(folder / LAST, settings.save, validated)]
 
 
 def _logger(folder: Path) -> TensorBoardLogger | bool:
