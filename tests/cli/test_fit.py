@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
 import re
@@ -359,9 +360,7 @@ def test_mirrored_points_and_a_camera_of_another_image_are_flagged(fit, tmp_path
 
 
 def test_without_torch(tmp_path, standing, monkeypatch):
-    from ipman_rs.cli import fit as command
-
-    monkeypatch.setattr(command.importlib.util, "find_spec", lambda name: None if name == "torch" else object())
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else object())
     result = CliRunner().invoke(main, ["fit", "x.json", "-o", str(tmp_path)])
     assert result.exit_code == 1
     assert "pip install 'ipman_rs[fit]'" in result.stderr

@@ -188,5 +188,5 @@ def test_broken_labels_are_left_out(truth, estimate, posing):
 
 
 def test_unknown_keypoints_are_named():
-    with pytest.raises(ValueError, match="no 'left_antenna'"):
+    with pytest.raises(ValueError, match="no landmark 'left_antenna'"):
         Posing(ipt.BodyModel("anny-lite"), ["nose", "left_antenna"])
