@@ -169,3 +169,11 @@ def test_demand_tells_all_that_is_wrong():
 def test_names_of_data_sets():
     with pytest.raises(ValueError, match="name: expected one of 3dpw, amass, .*got 'h36m'"):
         data.open("h36m", "somewhere")
+
+
+def test_an_extent_beyond_double_precision_is_infinite(recwarn):
+    points = np.zeros((3, 2, 3))
+    points[:, 1] = 1e200, 0, 0
+    assert check.extent_of(points) == np.inf
+    assert check.extent_of(points * 1e-200) == pytest.approx(1.0)
+    assert not recwarn

@@ -260,6 +260,7 @@ def test_columns_that_are_missing(folder):
     ("header", "note"),
     [
         ("nRows=3\n", "its header says 3 rows, it has 2"),
+        (f"nRows={'9' * 5000}\n", "its header says 999999999999… rows, it has 2"),
         ("datarows 1\n", "its header says 1 rows, it has 2"),
         ("nColumns=3\nnRows=2\n", "its header says 3 columns, it has 2"),
         ("nColumns=2\nnRows=2\n", None),

@@ -169,8 +169,9 @@ def extent_of(points: NDArray[Any]) -> float:
     seen = ~np.isnan(points).all(axis=(1, 2))
     if not seen.any():
         return np.nan
-    span = np.nanmax(points[seen], axis=1) - np.nanmin(points[seen], axis=1)
-    return float(np.median(np.linalg.norm(span, axis=-1)))
+    with np.errstate(over="ignore"):  # beyond double precision is infinite
+        span = np.nanmax(points[seen], axis=1) - np.nanmin(points[seen], axis=1)
+        return float(np.median(np.linalg.norm(span, axis=-1)))
 
 
 def units_of(extent: float) -> list[tuple[str, str, float]]:

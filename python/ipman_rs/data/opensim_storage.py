@@ -117,8 +117,10 @@ def _said(header: list[str]) -> dict[str, int | str]:
     for line in header:
         key, _, value = line.strip().replace("=", " ", 1).partition(" ")
         key, value = key.lower().removeprefix("n").removeprefix("data"), value.strip()
-        if key in ("rows", "columns") and value.isdigit():
-            said[key] = int(value)
+        if key in ("rows", "columns") and value.isdecimal():
+            said[key] = (
+                int(value) if len(value) <= 18 else f"{value[:12]}…"
+            )  # Python refuses to read thousands of digits
         elif key == "indegrees":
             said[key] = value
     return said
