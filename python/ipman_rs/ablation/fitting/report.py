@@ -10,12 +10,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.evaluation import Interval, paired
 from ipman_rs.files import being_written, read_json, write_whole
+from ipman_rs.files.page_templates import environment
 from ipman_rs.jsonable import jsonable
 
 from ...synthetic import at_rest
@@ -77,12 +77,8 @@ def render(folder: Path) -> Path:
 
 def page(record: dict[str, Any]) -> str:
     """The Markdown of a record, as `write` leaves it in the JSON."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent), trim_blocks=True, lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )  # fmt: skip
-    environment.filters |= {"interval": _interval, "mean_of": lambda interval: interval[0]}
-    return environment.get_template(f"{NAME}.md.j2").render(
+    pages = environment(Path(__file__).parent, interval=_interval, mean_of=lambda interval: interval[0])
+    return pages.get_template(f"{NAME}.md.j2").render(
         record, verdicts=verdicts(record["blocks"]), claims=claims(record["blocks"]), claimed=CLAIMED,
         families=at_rest.FAMILIES, digits=DIFFERENCES,
     )  # fmt: skip

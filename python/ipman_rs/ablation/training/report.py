@@ -10,11 +10,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.files import being_written, write_whole
+from ipman_rs.files.page_templates import environment
 
 from ...training.metrics import COLUMNS, Figures, columns
 from .claims import UNITS, judged
@@ -57,14 +57,10 @@ def write(found: Found, run: Benchmark) -> Path:
 
 def page(record: dict[str, Any]) -> str:
     """The Markdown of a record, as `write` leaves it in the JSON."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent), trim_blocks=True, lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )  # fmt: skip
-    environment.filters |= {"interval": _interval, "signed": _signed}
+    pages = environment(Path(__file__).parent, interval=_interval, signed=_signed)
     task = record["run"]["name"]
     tilts = tuple(block["tilt"] for block in record["blocks"])
-    return environment.get_template(TEMPLATE).render(
+    return pages.get_template(TEMPLATE).render(
         record, name=PAGES[task], tilts="" if tilts == TILTS[task] else "".join(f" --tilt {tilt:g}" for tilt in tilts),
         verdicts=verdicts(record["blocks"]), claims=judged(record["blocks"]), units=UNITS, columns=COLUMNS,
         differences=DIFFERENCES,

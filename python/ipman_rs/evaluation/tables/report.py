@@ -10,11 +10,11 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 
 from ipman_rs import __version__
 from ipman_rs.files import being_written, cell, write_whole
+from ipman_rs.files.page_templates import environment
 
 from ..statistics.bootstrap import Interval
 from . import parquet
@@ -80,11 +80,7 @@ def texts(report: Report) -> dict[str, str]:
 
 
 def markdown(report: Report) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent), trim_blocks=True, lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )  # fmt: skip
-    return environment.get_template(f"{NAME}.md.j2").render(
+    return environment(Path(__file__).parent).get_template(f"{NAME}.md.j2").render(
         report=report, figures=report.figures, table=rows(report), missing=_missing(report), version=__version__,
         shown=shown, interval=_interval, verdict=_verdict,
     )  # fmt: skip
