@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from . import layouts
+from .keypoint_format import KeypointFormat
 from .layouts import COCO_17, Layout
 from .people import (
     Array,
@@ -194,3 +195,6 @@ def _flags(points: Array) -> Array:
 
 def _count(points: Array) -> str:
     return f"{len(points)} of {points.shape[1]} numbers" if points.ndim == 2 else f"shape {points.shape}"
+
+
+COCO = KeypointFormat(NAMES, matches, images)

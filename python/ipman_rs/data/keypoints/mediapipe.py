@@ -13,7 +13,7 @@ relative where no visible one is beyond ±3. Relative ones need an image size, i
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ import numpy as np
 
 from ipman_rs.files import write_whole
 
+from .keypoint_format import KeypointFormat, Pixels, Sizes, relative_to_pixels
 from .layouts import MEDIAPIPE_33
 from .people import Array, Image, Person, numbers, plain, scored, size_of, width_height
 
@@ -197,3 +198,11 @@ def write(path: str | Path, image: str, size: tuple[int, int], landmarks: Array,
         "world_landmarks": world.round(6).tolist(),
     }
     write_whole(path, json.dumps(content, indent=1) + "\n")
+
+
+def _pixels(people: Sequence[Array], sizes: Sizes, source: str) -> Pixels:
+    """That landmarks are relative to the image is the format, and needs no note."""
+    return relative_to_pixels(people, sizes, source)[0], []
+
+
+MEDIAPIPE = KeypointFormat(NAMES, matches, images, pixels=_pixels)

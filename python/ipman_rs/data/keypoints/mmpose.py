@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from . import coco
+from .keypoint_format import KeypointFormat
 from .people import Image, each, plain
 
 NAMES = coco.NAMES
@@ -59,3 +60,6 @@ def _check_names(meta: Any, source: str) -> None:
     names = meta.get("keypoint_id2name") if isinstance(meta, dict) else None
     if isinstance(names, dict) and "0" in names:
         coco.named(list(names.values()), f"{source}: meta_info")
+
+
+MMPOSE = KeypointFormat(NAMES, matches, images)

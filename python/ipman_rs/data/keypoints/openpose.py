@@ -9,6 +9,7 @@ be pixels, or relative to the image: 0 to 1 or -1 to 1 (OpenPose's --keypoint_sc
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from ..judge import RELATIVE
 from . import layouts
 from .hand import hand
+from .keypoint_format import KeypointFormat, relative_to_pixels
 from .layouts import BODY_25 as BODY_25
 from .layouts import Layout
 from .people import (
@@ -113,3 +115,6 @@ def _body(given: Any, place: str) -> tuple[Layout, Array]:
         got = "none" if points.size == 0 else f"{points.size / 3:g}"
         raise ValueError(f"{place}: expected {counts(LAYOUTS)} points of 3 numbers, got {got}")
     return LAYOUTS[count][1], finite(points.reshape(count, 3), place)
+
+
+OPENPOSE = KeypointFormat(NAMES, matches, images, pixels=partial(relative_to_pixels, shares=shares))

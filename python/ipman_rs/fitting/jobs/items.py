@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...data.keypoints import suffixes
 from ...files import regular
 from ...files.errors import FileError
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from ...data.keypoints.detections import Detections
 
 IMAGES = (".png", ".jpg", ".jpeg")
-KEYPOINTS = (".json",)
+KEYPOINTS = suffixes()
 MARKERS = (".trc", ".c3d")
 ENDINGS = (*KEYPOINTS, *IMAGES, *MARKERS)
 
