@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.body.formats import FORMATS
 from ipman_rs.files import safe_npz
 from ipman_rs.ground import Ground
 
@@ -41,7 +42,7 @@ SPLITS = {
         "BMLrub", "BioMotionLab_NTroje", "EKUT", "TCD_handMocap", "TCDHands", "ACCAD",
     ),
 }  # fmt: skip
-BODIES = {72: "smpl", 156: "smplh", 165: "smplx"}  # by the columns of poses
+BODIES = {3 * len(FORMATS[name].joints): name for name in ("smpl", "smplh", "smplx")}  # by the columns of poses
 RATES = ("mocap_framerate", "mocap_frame_rate")
 REQUIRED = ("poses", "betas", "trans")
 

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import joints
+from ipman_rs.body.formats import FORMATS
 from ipman_rs.ground import Ground
 
 from . import naming
@@ -45,7 +45,7 @@ SHAPES: dict[str, tuple[int, ...] | str] = {
     "cam_int": (3, 3), "cam_ext": (4, 4), "gender": TEXT, "gtkps": (-1, -1), "hand_det_conf": (-1,),
 }  # fmt: skip
 REQUIRED = ("imgname", "center", "scale", "pose_world", "trans_world", "shape", "cam_int", "cam_ext")
-BODIES = {72: "smpl", 165: "smplx"}
+BODIES = {3 * len(FORMATS[name].joints): name for name in ("smpl", "smplx")}  # by the columns of pose_world
 
 
 class Scene:
@@ -99,7 +99,7 @@ class Scene:
         """The first of gtkps: the joints of the body model, in BEDLAM2's files OpenPose's."""
         if "gtkps" not in self.file:
             return {}
-        names = OPENPOSE if "hand_det_conf" in self.file else joints.BY_COUNT[self.num_joints]
+        names = OPENPOSE if "hand_det_conf" in self.file else FORMATS[self.body].joints
         points = self.file.numbers("gtkps", rows)[:, : len(names), :2]
         return {"keypoints": np.dstack([points, np.ones(points.shape[:2])]), "keypoint_names": names[: points.shape[1]]}
 

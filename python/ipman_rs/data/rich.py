@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import pose_arrays
+from ipman_rs.body.formats import FORMATS
 from ipman_rs.body.hands import Hands
 from ipman_rs.body.joints import SMPLX
 from ipman_rs.files import safe_pickle
@@ -216,7 +216,7 @@ def _body(file: Path, hands: Hands | None) -> tuple[Array, Array, Array]:
     pose = np.zeros((len(SMPLX), 3))
     for name in PIECES:
         if name in content:
-            joints = [SMPLX.index(joint) for joint in pose_arrays.PIECES[name][0]]
+            joints = [SMPLX.index(joint) for joint in FORMATS["smplx"].pieces[name][0]]
             pose[joints] = _array(file, name, content[name], 3 * len(joints)).reshape(-1, 3)
     if hands is not None and all(name in content for name in HANDS):
         weights = [_array(file, name, content[name], None) for name in HANDS]

@@ -258,7 +258,8 @@ class DataFit(Resumable):
         if self.keypoints is None:
             return data_frames.detections_of(frame)
         name = str(frame.names[0])
-        places = [self.keypoints / f"{name}{ending}" for ending in (".json", "_keypoints.json")]
+        endings = [f"{said}{suffix}" for suffix in keypoints.suffixes() for said in ("", "_keypoints")]
+        places = [self.keypoints / f"{name}{ending}" for ending in endings]
         place = next((place for place in places if place.is_file()), None)
         if place is None:
             raise ValueError(f"no keypoint file {places[0]}")
@@ -357,7 +358,7 @@ class DataFit(Resumable):
             for name in filled[0]
             if name not in ("left_out", "why")
         }
-        kind = embedded.kind_of(self.model(str(arrays["genders"][0])))
+        kind = self.model(str(arrays["genders"][0])).kind
         columns = {name: arrays[name] for name in _COLUMNS if name in arrays}
         with being_written(self.folder / PREDICTIONS) as out:
             np.savez(out, allow_pickle=False, body=np.array(kind), **columns)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..body import pose_arrays, rotations
+from ..body import formats, pose_arrays, rotations
 from ..body.joints import LEFT_HAND, RIGHT_HAND
 from ..body.sequence import Index, PosedSequence, rows_of
 from ..data import check, judge
@@ -28,6 +28,7 @@ _VERTICES = ("vertices", "verts", "v")
 _BETAS = ("betas", "shape", "shapes", "smpl_betas")
 _TRANSLATIONS = ("trans", "transl", "Th", "smpl_trans", "cam_trans")
 _FRAME_RATES = ("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate", "framerate")
+_KINDS = ("model", "model_type", "surface_model_type", "body")
 _MODEL_BETAS = 10  # that a model file is asked for at least
 
 
@@ -58,6 +59,9 @@ class _Npz:
         if name not in self.names:
             return ""
         self.used.add(name)
+        return self._word(name)
+
+    def _word(self, name: str) -> str:
         value = safe_npz.read(self.path, name).reshape(-1)
         if value.dtype.kind not in "US" or len(value) != 1:
             return ""
@@ -69,6 +73,17 @@ class _Npz:
 
         named = self.word("model")
         return named if named in embedded.NAMES else "anny"
+
+    def kind(self) -> str | None:
+        """What kind of model the parameters are of, where the file says."""
+        for name in (name for name in _KINDS if name in self.names):
+            try:
+                found = formats.kind_named(self._word(name))
+            except ValueError:  # Python objects
+                continue
+            if found is not None:
+                return found
+        return None
 
     def unused(self) -> tuple[str, ...]:
         return tuple(sorted(self.names - self.used))
@@ -84,7 +99,7 @@ def read_npz(
     try:
         stored = _Npz(path)
         model = model or stored.model()
-        has_pose = bool(stored.names & {*pose_arrays.NAMES})
+        has_pose = bool(stored.names & pose_arrays.names())
         if stored.names & {*_VERTICES} and not (has_pose and _are_of_another_body(stored, model)):
             found = _read_vertices(stored, model, unit, rate)
         elif has_pose:
@@ -159,7 +174,7 @@ def _read_parameters(stored: _Npz, model: str, unit: float, degrees: bool, rate:
     easymocap = "Rh" in stored.names
     amass = not easymocap and bool(stored.names & {"poses", "root_orient"})
     body = _body(stored, model, amass)
-    pieces = pose_arrays.read(stored.first, degrees)
+    pieces = pose_arrays.read(stored.first, degrees, stored.kind() or body.kind)
     pose = _Pose(pieces, body)
     trans = _translations(stored, len(pose), unit)
     betas, shape = _betas(stored, body, len(pose), amass or easymocap)
@@ -361,8 +376,9 @@ def _gender(stored: _Npz, body: Any, model: str) -> list[Finding]:
 def _pass_over_repeated(stored: _Npz, pieces: Sequence[pose_arrays.Piece]) -> None:
     """Pieces of a pose that are in the whole pose beside them, too, are not missed."""
     for piece in pieces:
-        for name in pose_arrays.PIECES.keys() & stored.names - stored.used:
-            joints = next((one for one in pose_arrays.PIECES[name] if set(one) <= set(piece.joints)), None)
+        known = pose_arrays.pieces_of()
+        for name in known.keys() & stored.names - stored.used:
+            joints = next((one for one in known[name] if set(one) <= set(piece.joints)), None)
             if joints is None:
                 continue
             columns = [piece.joints.index(joint) for joint in joints]

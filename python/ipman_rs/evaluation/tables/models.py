@@ -10,15 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ipman_rs as ip
-from ipman_rs.body import BodyModel, embedded, mesh_file
+from ipman_rs.body import BodyModel, embedded, formats, mesh_file
 from ipman_rs.body.hands import Hands
 from ipman_rs.data.frames import Frames
 
 GENDERS = ("neutral", "male", "female")
 _ENDINGS = (".npz", ".pkl")
-# Names under which SMPL itself is downloaded; all else is called SMPLX_NEUTRAL.npz and so on.
-_DOWNLOADED = {"neutral": "basicmodel_neutral_lbs", "male": "basicmodel_m_lbs", "female": "basicmodel_f_lbs"}
-_BODY_JOINTS = 22  # of every model of the family, in one order
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +52,7 @@ class Models:
     _loaded: dict[tuple[str, str, int, str | None], BodyModel] = field(default_factory=dict)
 
     def get(self, kind: str, gender: str = "neutral", betas: int = 10, rest_shape: str | None = None) -> BodyModel:
-        """The model of a kind ("smpl", "smplh", "smplx", or an embedded one's name).
+        """The model of a kind (one of `body.formats.FORMATS`, or an embedded one's name).
 
         `rest_shape`: a mesh file of a person's own body in the zero pose, instead of the model's mean. ValueError if
         there is no file, or if the mesh has other vertices than the model.
@@ -117,7 +114,7 @@ class Models:
             model = self.get(kind, str(gender), width, frames.rest_shape)
             betas = None if frames.rest_shape is not None else frames.betas
             posed = model(
-                _on_joints(pose[rows], model),
+                formats.on_joints(pose[rows], model, kind),
                 None if betas is None else betas[rows, : model.num_betas],
                 None if frames.transl is None else frames.transl[rows],
             )
@@ -137,7 +134,8 @@ class Models:
     def _found(self, kind: str, gender: str) -> Path | None:
         if self.folder is None:
             return None
-        stems = [f"{kind}_{gender}", *([_DOWNLOADED[gender]] if kind == "smpl" else [])]
+        downloaded = formats.FORMATS[kind].downloaded if kind in formats.FORMATS else {}
+        stems = [f"{kind}_{gender}", *([downloaded[gender]] if gender in downloaded else [])]
         files = sorted(path for path in self.folder.rglob("*") if path.suffix.lower() in _ENDINGS)
         return next((path for stem in stems for path in files if path.stem.lower().startswith(stem)), None)
 
@@ -154,17 +152,3 @@ def _stem(kind: str, gender: str) -> str:
 def _genders(frames: Frames) -> list[str]:
     """Of the people, each once."""
     return ["neutral"] if frames.genders is None or not len(frames) else np.unique(frames.genders).tolist()
-
-
-def _on_joints(pose: NDArray[Any], model: BodyModel) -> NDArray[Any]:
-    """A pose (F, j, 3) on the joints of a model: those that it lacks at the end (hands, face) are at rest."""
-    given, wanted = pose.shape[1], model.num_joints
-    if given == wanted:
-        return pose
-    if not _BODY_JOINTS <= given < wanted:
-        raise ValueError(f"pose: has {given} joints, but the body {model.name} has {wanted}; is the right body named?")
-    # Of SMPL's 24 joints the last two are the hands, which other models have as fingers, or not at all.
-    kept = given if given != 24 else _BODY_JOINTS
-    filled = np.zeros((len(pose), wanted, 3), pose.dtype)
-    filled[:, :kept] = pose[:, :kept]
-    return filled

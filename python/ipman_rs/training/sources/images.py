@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ipman_rs.body import BodyModel, rotations
-from ipman_rs.body.embedded import kind_of
 from ipman_rs.data import DataSet, Frames
 from ipman_rs.files import regular
 
@@ -162,7 +161,7 @@ class Images:
 
     def _is_own(self, name: str | None) -> bool:
         """Whether parameters of the body `name` are those of this model."""
-        return name == kind_of(self.body)
+        return name == self.body.kind
 
     def _image(self, frame: Frames, row: int) -> Any:
         """A PIL image: the data set's own, or the file that the frame names."""
