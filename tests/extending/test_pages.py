@@ -28,7 +28,7 @@ def test_a_body_model(tmp_path):
     run(copy, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/body/test_formats.py", "-k", "mannequin")
     (_, script), (_, command) = page.tries
     margin = float(run(copy, "-c", script))
-    # anny-lite stands 0.06 m inside its base of support; the rigid one has its joints and its pose.
+    # m: the centre of mass of a person who stands lies over the middle of the feet.
     assert 0.03 < margin < 0.1
     ipman(copy, f"{command.strip()} -o out")
     report = json.loads((copy / "out" / "report.json").read_text())
