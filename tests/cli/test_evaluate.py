@@ -96,6 +96,7 @@ def test_every_table_is_printed(table, run, folder, own, tmp_path):
             assert f" {value:.{FIGURES[name].digits}f} |" in page
 
 
+@pytest.mark.slow
 def test_the_table_of_the_centre_of_mass(run, folder, own, tmp_path):
     """The paper's figures beside ours, one row a formulation."""
     run("evaluate", folder / "near.npz", "--table", "com", *own, "-o", tmp_path / "out")

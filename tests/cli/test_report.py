@@ -171,6 +171,7 @@ def test_json_of_all_presets_is_strict(run, tmp_path, lite_body, standing):
         assert record["ipman_rs"] == ip.__version__
 
 
+@pytest.mark.slow
 def test_help_needs_no_heavy_imports():
     script = "import sys\ntry:\n import ipman_rs.cli as c; c.main(['{}'])\nexcept SystemExit: pass\n"
     script += "print([m for m in ('matplotlib', 'trimesh', 'scipy', 'rich', 'jinja2', 'torch') if m in sys.modules])"

@@ -18,6 +18,8 @@ from ipman_rs.validation import run as validation_run
 from tests.helpers import laboratory_files
 from tests.helpers.laboratory_files import FRAMES, MASS, OFF, G, mot, moved, trc
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def run():

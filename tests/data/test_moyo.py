@@ -457,6 +457,7 @@ def test_small_hostile_pickles_that_are_read_tolerantly(tmp_path, data_):
     tracemalloc.stop()
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(cuts=st.lists(st.tuples(st.integers(0, 3000), st.binary(max_size=6)), min_size=1, max_size=4))
 def test_damaged_bytes_are_read_or_refused(tmp_path, cuts):

@@ -103,6 +103,7 @@ def test_the_authors_list(sessions, tmp_path):
     ]
 
 
+@pytest.mark.slow
 def test_only_frames_that_a_camera_shows(sessions, tmp_path):
     miniature.cameras(sessions / miniature.HANDS, "220923")
     miniature.images(sessions / miniature.HANDS, FIRST + BOAT, range(3, 8), "val")
@@ -224,6 +225,7 @@ def test_templates_that_cannot_be(sessions, bodies, her, tmp_path):
         Models(bodies).posed(frames)
 
 
+@pytest.mark.slow
 def test_the_table_of_the_paper_by_its_list_and_template(sessions, bodies, her, tmp_path):
     """The command line; the files go into what the figures are made of by their content, not their place."""
     file = ply(tmp_path / "mesh.ply", her, ip.load_body("anny-lite").faces)

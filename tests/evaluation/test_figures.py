@@ -28,6 +28,7 @@ def bodies(true, guessed):
     return [model(each["pose"], each["betas"], each["transl"]) for each in (true, guessed)]
 
 
+@pytest.mark.slow
 def test_means_are_those_of_plain_loops(record, bodies):
     """Float32 bodies measured in float64: only the order of sums differs, so 1e-12."""
     truth, guess = bodies

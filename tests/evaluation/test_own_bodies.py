@@ -207,6 +207,7 @@ def test_poses_that_are_known_nowhere_are_no_bodies(bodies, regressors, tmp_path
     assert found["methods"]["guess"]["figures"]["mpjpe"]["frames"] == 12
 
 
+@pytest.mark.slow
 def test_one_camera_of_rich(bodies, tmp_path):
     folder = make("rich-o-star", tmp_path / "data", bodies, None)
     where = "--path", folder, "--models", bodies, "-o", tmp_path / "out"

@@ -117,6 +117,7 @@ def written_out(body, ground, there, truth, center, alpha, gamma):
     return max(ious), error, np.abs(image - truth).mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["paper", "released"])
 def test_moyo_by_the_protocol_written_out(mode):
     frames = 4

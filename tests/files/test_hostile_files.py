@@ -115,6 +115,7 @@ DAMAGED_YAML = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", DAMAGED_YAML)
 def test_damaged_yaml_is_refused(tmp_path, damage):
     with pytest.raises(ValueError):  # noqa: PT011  (its kinds are many, all of them ValueError itself)
@@ -280,6 +281,7 @@ def test_names_of_inputs_that_no_file_can_have(tmp_path):
         assert isinstance(done.exception, SystemExit), repr(done.exception)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="names are bytes on Linux alone")
 def test_names_that_are_no_text(tmp_path):
     """A name of bytes that are no UTF-8 is read, and the report about it written."""

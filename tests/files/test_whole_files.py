@@ -82,6 +82,7 @@ def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path):
     assert names(tmp_path) == ["frames.parquet"]
 
 
+@pytest.mark.slow
 def test_two_writers_at_once_both_end_well(tmp_path):
     script = textwrap.dedent("""
         import sys
