@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,18 +32,26 @@ _MODEL_BETAS = 10  # that a model file is asked for at least
 
 
 class _Npz:
-    """Arrays of a file by name; nothing in it is executed. `used`: those that were read."""
+    """Arrays of a file by name; nothing in it is executed. `arrays`: what the file holds, where that is in memory;
+    `used`: the names of those that were read."""
 
-    def __init__(self, path: Path) -> None:
-        self.path, self.names = path, safe_npz.names(path)
+    def __init__(self, path: Path, arrays: Mapping[str, np.ndarray] | None = None) -> None:
+        self.path, self.arrays = path, arrays
+        self.names = safe_npz.names(path) if arrays is None else {*arrays}
         self.used: set[str] = set()
+
+    def read(self, name: str) -> np.ndarray:
+        return safe_npz.read(self.path, name) if self.arrays is None else self.arrays[name]
+
+    def shape_of(self, name: str) -> tuple[int, ...]:
+        return safe_npz.shape_of(self.path, name) if self.arrays is None else self.arrays[name].shape
 
     def first(self, *names: str) -> np.ndarray | None:
         """The first of these that is there, as numbers."""
         name = self.name(*names)
         if name is None:
             return None
-        array = safe_npz.read(self.path, name)
+        array = self.read(name)
         if array.dtype.kind not in "fiu":
             raise FileError(self.path, f"{name} holds {array.dtype}, not numbers; save plain numbers")
         self.used.add(name)
@@ -58,7 +66,7 @@ class _Npz:
         if name not in self.names:
             return ""
         self.used.add(name)
-        value = safe_npz.read(self.path, name).reshape(-1)
+        value = self.read(name).reshape(-1)
         if value.dtype.kind not in "US" or len(value) != 1:
             return ""
         return value[0].decode("latin1") if value.dtype.kind == "S" else str(value[0])
@@ -75,14 +83,21 @@ class _Npz:
 
 
 def read_npz(
-    path: Path, model: str | None, *, unit: float = 1.0, degrees: bool = False, rate: float | None = None
+    path: Path,
+    model: str | None,
+    *,
+    unit: float = 1.0,
+    degrees: bool = False,
+    rate: float | None = None,
+    arrays: Mapping[str, np.ndarray] | None = None,
 ) -> Recording:
     """The bodies of an .npz file; `model` None: of the body that the file names, or anny. Raises FileError.
 
     unit: metres in one of the file's lengths. degrees: rotation vectors are degrees. rate: Hz, instead of the file's.
+    arrays: what the file holds, by a caller that has just written it.
     """
     try:
-        stored = _Npz(path)
+        stored = _Npz(path, arrays)
         model = model or stored.model()
         has_pose = bool(stored.names & {*pose_arrays.NAMES})
         if stored.names & {*_VERTICES} and not (has_pose and _are_of_another_body(stored, model)):
@@ -100,7 +115,7 @@ def _no_bodies(stored: _Npz) -> str:
     """What is there instead."""
     for name in sorted(stored.names):
         try:
-            safe_npz.shape_of(stored.path, name)
+            stored.shape_of(name)
         except ValueError as error:
             if "Python objects" in str(error):
                 return f"{name} holds Python objects, which are not loaded; save what is in it as plain arrays"
@@ -113,7 +128,7 @@ def _are_of_another_body(stored: _Npz, model: str) -> bool:
 
     if stored.names & {"faces", "f"}:
         return False
-    shape = safe_npz.shape_of(stored.path, str(stored.name(*_VERTICES)))
+    shape = stored.shape_of(str(stored.name(*_VERTICES)))
     return len(shape) < 2 or shape[-2] != ip.load_body(model).num_vertices
 
 
@@ -193,7 +208,7 @@ def _body(stored: _Npz, model: str, amass: bool) -> Any:
     import ipman_rs as ip
 
     name = stored.name(*_BETAS)
-    width = () if name is None else safe_npz.shape_of(stored.path, name)[-1:]
+    width = () if name is None else stored.shape_of(name)[-1:]
     # AMASS stores absolute hand angles, the smplx package angles relative to the mean hand.
     return ip.load_body(model, num_betas=max((_MODEL_BETAS, *width)), flat_hand_mean=amass)
 
@@ -366,7 +381,7 @@ def _pass_over_repeated(stored: _Npz, pieces: Sequence[pose_arrays.Piece]) -> No
             if joints is None:
                 continue
             columns = [piece.joints.index(joint) for joint in joints]
-            array = safe_npz.read(stored.path, name)
+            array = stored.read(name)
             whole = piece.rotations[:, columns].reshape(len(piece.rotations), -1)
             if array.size == whole.size and np.allclose(array.reshape(whole.shape), whole, equal_nan=True):
                 stored.used.add(name)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..analysis import PIECE
 from ..body.sequence import pieces
-from ..files import being_written, write_whole
+from ..files import being_written, safe_names, write_whole
 from ..files.errors import FileError
 from ..ground import Ground
 from ..jsonable import jsonable
@@ -20,7 +20,6 @@ from ..status import Status, status_names
 from ..study import Study, study
 from ..study.study import evenly, marked
 from ..view.filmstrip import draw_filmstrip
-from ..view.report import safe_names
 from . import FALLEN, VERDICT, Simulation, TipTest, simulate, tip_test
 from .inputs import Bodies
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +25,8 @@ from ..io.parts import match_body, read_parts
 from ..io.recording import Recording
 from ..progress import Progress, silent
 from .study import Study, study
+
+Arrays = Mapping[str, np.ndarray]
 
 SAMPLED_VERTICES = 800_000  # of the bodies that are judged: 65 of the embedded one, a fraction of a second
 WEIGHED = 16  # bodies
@@ -49,15 +51,19 @@ class Request:
 _DEFAULT = Request()
 
 
-def analyze_file(path: Path, request: Request = _DEFAULT, progress: Progress = silent) -> Study:
+def analyze_file(
+    path: Path, request: Request = _DEFAULT, progress: Progress = silent, arrays: Arrays | None = None
+) -> Study:
     """The study of the bodies in one file; what is odd about them stands in its flags.
+
+    arrays: what an .npz file holds, by a caller that has just written it; then the file is not read.
 
     Raises:
         FileError: the file cannot be read, or what it holds cannot be a person (`Request.force` lets it in).
     """
     with odd_sizes() as found:
         try:
-            analysed = _analyzed(path, request, progress)
+            analysed = _analyzed(path, request, progress, arrays)
         except (ValueError, TypeError) as error:
             raise FileError(path, str(error)) from error
         except MemoryError as error:
@@ -82,8 +88,8 @@ def with_sizes(flags: Sequence[str], sizes: Sequence[str]) -> tuple[str, ...]:
     return (*flags, *([] if said else sizes[:1]))
 
 
-def _analyzed(path: Path, request: Request, progress: Progress) -> Study:
-    recording, template, ground, notes = on_ground(path, request, progress=progress)
+def _analyzed(path: Path, request: Request, progress: Progress, arrays: Arrays | None) -> Study:
+    recording, template, ground, notes = on_ground(path, request, progress=progress, arrays=arrays)
     if template.num_parts == 1:
         notes.append("one part: the centre of mass is the exact one of the volume, not the paper's part-wise pCoM")
     if not template.watertight:
@@ -101,12 +107,14 @@ def on_ground(
     own: ip.Ground | None = None,
     read_elsewhere: Collection[str] = (),
     progress: Progress = silent,
+    arrays: Arrays | None = None,
 ) -> tuple[Recording, Any, ip.Ground, list[str]]:
     """The bodies of a file, judged, their template and ground, and what was assumed. Raises FileError.
 
-    own: the ground that the file itself gives. read_elsewhere: arrays of the file that the caller reads.
+    own: the ground that the file itself gives. read_elsewhere: arrays of the file that the caller reads. arrays: as for
+    `analyze_file`.
     """
-    recording = read(path, request)
+    recording = read(path, request) if arrays is None else _parameters(path, request, arrays)
     admitted = judge.admit(path, recording.findings, request.force)
     template, notes = _template(recording, request)
     normal = request.up or recording.up if own is None else np.atleast_2d(own.normal)[0]
@@ -156,9 +164,13 @@ def read(path: Path, request: Request) -> Recording:
     if path.stat().st_size == 0:
         raise FileError(path, "is empty; export it again")
     if path.suffix.lower() == ".npz":
-        return read_npz(path, request.model, unit=request.units, degrees=request.degrees, rate=request.rate)
+        return _parameters(path, request)
     recording = read_mesh(path)
     return recording if request.units == 1.0 else replace(recording, vertices=recording.vertices[:] * request.units)
+
+
+def _parameters(path: Path, request: Request, arrays: Arrays | None = None) -> Recording:
+    return read_npz(path, request.model, unit=request.units, degrees=request.degrees, rate=request.rate, arrays=arrays)
 
 
 def _lowest(recording: Recording, normal: np.ndarray, progress: Progress) -> float:

@@ -17,12 +17,12 @@ from ..data.force_plates import ForcePlates
 from ..data.markers import own
 from ..data.markers.judged import of_tracks
 from ..data.tracks import Tracks
-from ..files import safe_npz, write_whole
+from ..files import write_whole
 from ..files.errors import FileError
 from ..fitting import config
+from ..fitting.jobs.options import FitOptions
 from ..fitting.jobs.outputs import npz
-from ..fitting.jobs.recordings import Pace, Recording, kept
-from ..fitting.jobs.run import Settings
+from ..fitting.jobs.recordings import FittedRecording, Pace, Recording, fit_recording
 from ..io.parameters import read_npz
 from ..progress import Progress, silent
 from . import Comparison, computed, figures, measured, pictures, report
@@ -44,7 +44,7 @@ class Plan:
     folder: Path
     output: Path
     trials: list[Trial]
-    settings: Settings
+    settings: FitOptions
     person: str
     pace: float
     resume: bool
@@ -96,7 +96,7 @@ def plan(
     force_up: tuple[float, float, float] | None = None,
     **of_markers: Any,
 ) -> Plan:
-    """`pace`: frames a second to fit; `of_markers`: what `Settings` has of marker files.
+    """`pace`: frames a second to fit; `of_markers`: what `FitOptions` has of marker files.
 
     ValueError for a folder without recordings to compare, a recording or body model that is not there.
     """
@@ -106,7 +106,7 @@ def plan(
     names = [trial.name for trial in trials]
     if person not in ("auto", "none", *names):
         raise ValueError(f"--person: expected auto, none or one of {', '.join(names)}, got {person!r}")
-    settings = Settings(config.load("markers"), model, **of_markers)
+    settings = FitOptions(config.load("markers"), model, **of_markers)
     body = ip.load_body(model)  # before anything is fitted
     if settings.markers is not None:
         own.read(settings.markers, body)
@@ -145,7 +145,7 @@ def _person(plan: Plan, recordings: list[Measured], told: Told, progress: Progre
             if name == chosen:
                 told.notes.append(f"{name} could not be compared: the others found their shapes themselves")
             continue
-        told.notes += [f"{name}: {note}" for note in fit["notes"] if note not in one.tracks.notes]
+        told.notes += [f"{name}: {note}" for note in fit.record["notes"] if note not in one.tracks.notes]
         if np.isnan(weight) and _weighs(records[-1]):
             weight = records[-1]["mass"]["plates"]
     return records
@@ -264,18 +264,18 @@ def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
     return found
 
 
-def _fitted(plan: Plan, one: Measured, person: str | None, progress: Progress) -> Record:
+def _fitted(plan: Plan, one: Measured, person: str | None, progress: Progress) -> FittedRecording:
     every = max(1, round((one.tracks.rate or 1.0) / plan.pace))
     recording = Recording(one.trial.name, str(one.trial.markers), [one.trial.markers])
-    return kept(recording, plan.settings, Pace(every), plan.output, plan.resume, person, progress)
+    return fit_recording(recording, plan.settings, Pace(every), plan.output, plan.resume, person, progress)
 
 
-def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told, progress: Progress) -> Record:
+def _compared(plan: Plan, one: Measured, fit: FittedRecording, weight: float, told: Told, progress: Progress) -> Record:
     """The figures of a fitted recording, whose person weighs `weight` kg; its series and pictures are written."""
     trial = one.trial
     folder = plan.output / trial.name
-    stored = read_npz(folder / f"{trial.name}.npz", plan.settings.model)
-    times = safe_npz.read(folder / f"{trial.name}.npz", "times")
+    stored = read_npz(fit.path, plan.settings.model, arrays=fit.arrays)
+    times = fit.arrays["times"]
     bodies, template = stored.vertices, stored.template
     plates = None if one.plates is None else one.plates.at(times)
     with progress(f"measuring {trial.name}", len(times)) as step:
@@ -299,9 +299,10 @@ def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told,
     files = _drawn(compared, stored, points, told, progress)
     for name, content in files.items():
         write_whole(folder / name, content)
-    fitted = {"shape_from": fit["shape_from"], "markers": fit["mean_marker_error_m"], "converged": fit["converged"]}
+    how = fit.record
+    fitted = {"shape_from": how["shape_from"], "markers": how["mean_marker_error_m"], "converged": how["converged"]}
     record = {**figures(compared), "body": plan.settings.model, "fit": fitted, "files": sorted(files)}
-    return {**record, "flags": [*dict.fromkeys([*one.flags, *fit["flags"], *record["flags"]])]}
+    return {**record, "flags": [*dict.fromkeys([*one.flags, *how["flags"], *record["flags"]])]}
 
 
 def _drawn(
