@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ipman_rs.evaluation import Accumulator, reasons
-from ipman_rs.evaluation.statistics.clusters import CLUSTERS, pooled
+from ipman_rs.evaluation.statistics.clusters import CLUSTERS, pooled_clusters
 from ipman_rs.evaluation.statistics.exact_sum import LARGEST, exact, limbs
 
 METRICS = ("mpjpe", "bose")
@@ -113,7 +113,7 @@ def test_pooled_clusters_are_those_of_the_hash():
     values, names, _ = data(count, 1)
     values["bose"] = np.arange(count) / 8  # exact
     found = of(values, names, names, np.arange(count)).clusters("bose")
-    which = pooled(names.tolist())
+    which = pooled_clusters(names.tolist())
     assert found.names == [str(cluster) for cluster in np.unique(which)]
     expected = np.bincount(which, values["bose"], CLUSTERS)
     np.testing.assert_array_equal(found.sums, expected[np.unique(which)])

@@ -11,7 +11,7 @@ import pytest
 
 import ipman_rs as ip
 from ipman_rs.evaluation.tables import read
-from ipman_rs.evaluation.tables.metrics import FIGURES
+from ipman_rs.evaluation.tables.metrics import METRICS
 from tests.helpers import evaluate_files as files
 
 
@@ -181,7 +181,7 @@ def test_a_frame_of_nan_touches_no_other(evaluated, tmp_path, true, guessed):
     assert found["bose"]["frames"] == 297
     bad = [5, 123, 200]
     good = np.setdiff1d(np.arange(300), bad)
-    for name in FIGURES:
+    for name in METRICS:
         pieces = [
             np.concatenate([p[name] for p in each.results()]) for each in (evaluated[1], job) if name in each.result(0)
         ]

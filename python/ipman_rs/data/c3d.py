@@ -14,8 +14,20 @@ from numpy.typing import NDArray
 from ipman_rs.files import read_bytes
 
 from . import c3d_format
-from .c3d_format import Parameters, several
-from .tracks import METRES, TO_Y_UP, Named, Tracks, and_more, letters, likely_unit, named, not_given, seen_of, tracks
+from .c3d_format import Parameters, parameter_values
+from .tracks import (
+    METRES,
+    TO_Y_UP,
+    MarkerColumns,
+    Tracks,
+    alphanumeric,
+    likely_unit,
+    list_names,
+    select_markers,
+    tracks,
+    unit_note,
+    visibility,
+)
 from .units import metres
 
 Array = NDArray[np.float64]
@@ -28,7 +40,7 @@ CENTER_OF_MASS = ("centreofmass", "centerofmass", "com", "wholebodycom")  # free
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class C3DFile:
     """What a file holds: P points in T samples, in the file's own unit and axes, and A analogue channels beside them.
 
     A point that was not seen is NaN. `outputs` and `markers` part the points into what a model computed and the rest.
@@ -67,7 +79,7 @@ class Recording:
 
     @cached_property
     def _computed(self) -> list[int]:
-        said = {name for group in GROUPS for name in several(self.parameters.get("POINT", {}), group)}
+        said = {name for group in GROUPS for name in parameter_values(self.parameters.get("POINT", {}), group)}
         bare = [name.rpartition(":")[2] for name in self.names]
         axes = {name[:3] for name in bare if all(name[:3] + end in bare for end in "OALP")}  # LFEO, LFEA, LFEL, LFEP
         return [
@@ -77,7 +89,7 @@ class Recording:
             or own in said
             or OUTPUTS.fullmatch(own)
             or (len(own) == 4 and own[:3] in axes and own[3] in "OALP")
-            or letters(own) in CENTER_OF_MASS
+            or alphanumeric(own) in CENTER_OF_MASS
         ]
 
     @cached_property
@@ -86,15 +98,15 @@ class Recording:
         computed = set(self._computed)
         return [column for column in range(len(self.names)) if column not in computed]
 
-    def markers(self, subject: str | None = None) -> Named:
-        """The points that are markers of the person, without the subject before a colon; see `tracks.named`.
+    def markers(self, subject: str | None = None) -> MarkerColumns:
+        """The points that are markers of the person, without the subject before a colon; see `tracks.select_markers`.
 
         ValueError for two people of whom none is chosen.
         """
         rest = self._measured
-        seen, _ = seen_of(self.points[:, rest], [self.names[column] for column in rest])
-        chosen = named([self.names[column] for column in rest], seen, self.source, subject)
-        return Named(chosen.names, [rest[column] for column in chosen.columns], chosen.notes)
+        seen, _ = visibility(self.points[:, rest], [self.names[column] for column in rest])
+        chosen = select_markers([self.names[column] for column in rest], seen, self.source, subject)
+        return MarkerColumns(chosen.names, [rest[column] for column in chosen.columns], chosen.notes)
 
     def center_of_mass(self, subject: str | None = None) -> Array | None:
         """The whole body's centre of mass (T, 3) m in the file's axes, as a model such as Plug-in Gait computed it.
@@ -103,7 +115,7 @@ class Recording:
         """
         for column in self._computed:
             person, _, name = self.names[column].rpartition(":")
-            if letters(name) in CENTER_OF_MASS and subject in (None, person):
+            if alphanumeric(name) in CENTER_OF_MASS and subject in (None, person):
                 points = self.points[:, column] * self.metres
                 return np.where((points == 0).all(axis=-1, keepdims=True), np.nan, points)
         return None
@@ -129,7 +141,7 @@ class Recording:
         return scale
 
 
-def read(path: str | os.PathLike[str]) -> Recording:
+def read(path: str | os.PathLike[str]) -> C3DFile:
     """The content of a C3D file. ValueError, naming the file, if it is missing, damaged or shorter than it says."""
     data = read_bytes(path, MAX_BYTES)
     try:
@@ -138,12 +150,12 @@ def read(path: str | os.PathLike[str]) -> Recording:
         said = str(error)
         raise ValueError(f"{path}: {said}" if said.endswith("?") else f"{path}: {said}; {AGAIN}") from None
     about, count = content.parameters["POINT"], content.points.shape[1]
-    names = [str(name) for name in several(about, "LABELS")][:count]
+    names = [str(name) for name in parameter_values(about, "LABELS")][:count]
     names += [""] * (count - len(names))
     rate = _number(about, "RATE")
     screen = "".join(str(value) for value in about.get("Y_SCREEN", []))
     axis = screen.strip()[-1:].lower()
-    found = Recording(
+    found = C3DFile(
         names=tuple(names),
         points=content.points,
         times=(content.first + np.arange(len(content.points))) / (rate if rate > 0 else 1.0),
@@ -161,13 +173,13 @@ def read(path: str | os.PathLike[str]) -> Recording:
     if str(found.unit).strip():
         return found
     unit = _likely_unit(found)
-    return replace(found, unit=unit, notes=(*found.notes, not_given(unit)))
+    return replace(found, unit=unit, notes=(*found.notes, unit_note(unit)))
 
 
-def _likely_unit(found: Recording) -> str:
+def _likely_unit(found: C3DFile) -> str:
     """The unit of a file that does not say it: the one in which its markers, or else its plates, are not too large."""
     rest = found._measured
-    seen, _ = seen_of(found.points[:, rest], [found.names[column] for column in rest])
+    seen, _ = visibility(found.points[:, rest], [found.names[column] for column in rest])
     corners = [each for each in found.values("FORCE_PLATFORM", "CORNERS") if isinstance(each, (int, float))]
     places = found.points[:, rest][seen] if seen.any() else np.array(corners[: len(corners) // 3 * 3]).reshape(-1, 3)
     return likely_unit(places) if len(places) else "mm"
@@ -189,9 +201,9 @@ def markers(
     if not found.names and "ROTATION" in found.parameters:
         raise ValueError(f"{path}: expected markers, it has rotations of segments only, as Theia writes them")
     rest = found._measured
-    notes = [note for note in found.notes if unit is None or note != not_given(found.unit)]
+    notes = [note for note in found.notes if unit is None or note != unit_note(found.unit)]
     if found._computed:
-        notes.append(f"{len(found._computed)} outputs of a model are no markers: {and_more(list(found.outputs), 4)}")
+        notes.append(f"{len(found._computed)} outputs of a model are no markers: {list_names(list(found.outputs), 4)}")
     names = [found.names[column] for column in rest]
     said, up = found.unit if unit is None else unit, up or found.up
     times = found.times if rate is None else np.arange(len(found.points)) / rate

@@ -355,12 +355,12 @@ def _analogs(
 
 def _each(about: dict[str, list[Any]], name: str, channels: int, lacking: float) -> Array:
     """A number of each channel; a parameter holds up to 255 of them, the next has a 2 behind its name."""
-    values = several(about, name)
+    values = parameter_values(about, name)
     numbers = [float(value) for value in values[:channels] if isinstance(value, (int, float))]
     return np.array(numbers + [lacking] * (channels - len(numbers)))
 
 
-def several(about: dict[str, list[Any]], name: str) -> list[Any]:
+def parameter_values(about: dict[str, list[Any]], name: str) -> list[Any]:
     """The values of a parameter and of those that go on with it: LABELS, LABELS2, LABELS3, …"""
     values, more = list(about.get(name, [])), 2
     while f"{name}{more}" in about:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import c3d
-from .c3d_format import several
+from .c3d_format import parameter_values
 from .check import size_of_body
-from .tracks import not_given, seen_of
+from .tracks import unit_note, visibility
 from .units import metres, newton_metres, newtons
 
 Array = NDArray[np.float64]
@@ -32,11 +32,11 @@ OTHER_TYPES = {  # what they are, for whoever has one
 }
 
 
-def usable(found: c3d.Recording, used: int) -> tuple[list[Plate], tuple[str, ...]]:
+def usable_plates(found: c3d.C3DFile, used: int) -> tuple[list[Plate], tuple[str, ...]]:
     """The plates that can be computed, and what is wrong with the others. ValueError if it is something with each."""
     plates, wrong = [], []
     scale, notes = _plates_unit(found)
-    notes = (*(note for note in found.notes if note == not_given(found.unit)), *notes)
+    notes = (*(note for note in found.notes if note == unit_note(found.unit)), *notes)
     for index in range(min(used, MOST)):
         try:
             plate = Plate.of(found, index, scale)
@@ -50,7 +50,7 @@ def usable(found: c3d.Recording, used: int) -> tuple[list[Plate], tuple[str, ...
     return plates, (*notes, *(f"{what.removeprefix(f'{found.source}: ')}; left out" for what in wrong))
 
 
-def _plates_unit(found: c3d.Recording) -> tuple[float, tuple[str, ...]]:
+def _plates_unit(found: c3d.C3DFile) -> tuple[float, tuple[str, ...]]:
     """Metres in the unit of corners and origins: the points', unless only the points, a person's, can be in it."""
     scale = found.metres
     values = [value for value in found.values("FORCE_PLATFORM", "CORNERS") if isinstance(value, (int, float))]
@@ -60,7 +60,7 @@ def _plates_unit(found: c3d.Recording) -> tuple[float, tuple[str, ...]]:
     if not len(sides) or np.median(sides) * scale <= LONGEST or not SHORTEST < np.median(sides) * 1e-3 <= LONGEST:
         return scale, ()
     own = found.markers(next(iter(found.subjects), None))
-    seen, _ = seen_of(found.points[:, own.columns], own.names)
+    seen, _ = visibility(found.points[:, own.columns], own.names)
     points = np.where(seen[..., None], found.places(own.columns), np.nan)
     if not seen.any() or size_of_body("points", points)[0].level != "ok":
         return scale, ()  # all are in another unit than the file says
@@ -79,7 +79,7 @@ class Plate:
     unit: str  # of its moments, of type 1 of its centres of pressure, as the file says; "" if it does not
 
     @classmethod
-    def of(cls, found: c3d.Recording, index: int, scale: float) -> Plate:
+    def of(cls, found: c3d.C3DFile, index: int, scale: float) -> Plate:
         """`scale`: metres in the unit of its corners and origin."""
         place = f"{found.source}: force plate {index + 1}"
         kind = _type(found, index, place)
@@ -148,7 +148,7 @@ class Plate:
         return np.stack([x, np.cross(z, x), z], axis=1).astype(np.float64)
 
 
-def _type(found: c3d.Recording, index: int, place: str) -> int:
+def _type(found: c3d.C3DFile, index: int, place: str) -> int:
     """Which of the types that can be computed."""
     kind = next(iter(whole_numbers(found, "TYPE")[index : index + 1]), None)
     if kind in CHANNELS:
@@ -162,13 +162,13 @@ def _type(found: c3d.Recording, index: int, place: str) -> int:
     )
 
 
-def whole_numbers(found: c3d.Recording, name: str) -> list[int]:
+def whole_numbers(found: c3d.C3DFile, name: str) -> list[int]:
     """The numbers of a parameter of counts; 0 for what is none."""
     values = found.values("FORCE_PLATFORM", name)
     return [int(value) if isinstance(value, (int, float)) and np.isfinite(value) else 0 for value in values]
 
 
-def _numbers_of_plate(found: c3d.Recording, name: str, index: int, size: int, place: str) -> Array:
+def _numbers_of_plate(found: c3d.C3DFile, name: str, index: int, size: int, place: str) -> Array:
     """The numbers of one plate of a parameter whose last dimension is the plates. ValueError if some are missing."""
     values = found.values("FORCE_PLATFORM", name)[index * size : (index + 1) * size]
     got = np.array([value for value in values if isinstance(value, (int, float))], float)
@@ -177,7 +177,7 @@ def _numbers_of_plate(found: c3d.Recording, name: str, index: int, size: int, pl
     return got
 
 
-def _channels(found: c3d.Recording, index: int, kind: int, place: str) -> list[int]:
+def _channels(found: c3d.C3DFile, index: int, kind: int, place: str) -> list[int]:
     """The columns of its signals. ValueError if they are too few, or not there."""
     count = CHANNELS[kind]
     stored = whole_numbers(found, "CHANNEL")
@@ -191,13 +191,13 @@ def _channels(found: c3d.Recording, index: int, kind: int, place: str) -> list[i
     return channels
 
 
-def _units(found: c3d.Recording, channels: Sequence[int]) -> list[str]:
+def _units(found: c3d.C3DFile, channels: Sequence[int]) -> list[str]:
     """As the file says; "" where it does not."""
-    units = [str(unit) for unit in several(found.parameters.get("ANALOG", {}), "UNITS")]
+    units = [str(unit) for unit in parameter_values(found.parameters.get("ANALOG", {}), "UNITS")]
     return ["" if channel >= len(units) else units[channel] for channel in channels]
 
 
-def _signals(found: c3d.Recording, index: int, kind: int, channels: Sequence[int], length: float, place: str) -> Array:
+def _signals(found: c3d.C3DFile, index: int, kind: int, channels: Sequence[int], length: float, place: str) -> Array:
     """(T, 6 or 8) forces in N and moments in N m, or forces alone, in the plate's axes."""
     signals, units = found.analogs[:, channels], _units(found, channels)
     matrix = found.values("FORCE_PLATFORM", "CAL_MATRIX")

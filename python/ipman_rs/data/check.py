@@ -1,7 +1,7 @@
 """Whether frames of people can be right: units, axes, ground and cameras, judged by the size and the stance of a body.
 
-Every function takes the rows it judges (a few hundred are enough) and gives findings; `of_frames` is all of them for
-the common form. `demand` makes an error of what is wrong.
+Every function takes the rows that it judges (a few hundred are enough) and returns findings. `check_frames` makes all
+checks of the common form; `raise_if_wrong` raises an error for what is wrong.
 """
 
 from __future__ import annotations
@@ -16,8 +16,11 @@ from numpy.typing import NDArray
 
 from ipman_rs.body.rotations import from_axis_angle
 from ipman_rs.ground import Ground
+from ipman_rs.renamed import old_names
 
 from .frames import Cameras, DataSet, Frames
+
+__getattr__ = old_names(__name__, {"demanded": "require_plausible", "of_frames": "check_frames"})
 
 SAMPLE = 256  # frames that are looked at
 UNITS = (
@@ -50,16 +53,16 @@ class Finding:
     option: str = ""
 
 
-def demand(path: str | os.PathLike[str], findings: Iterable[Finding]) -> None:
+def raise_if_wrong(path: str | os.PathLike[str], findings: Iterable[Finding]) -> None:
     """ValueError with the file's name and all that is wrong; what is merely missing passes."""
     wrong = [f"{each.what}; {each.advice}" if each.advice else each.what for each in findings if each.level == "wrong"]
     if wrong:
         raise ValueError(f"{path}: {'. '.join(wrong)}")
 
 
-def demanded(path: str | os.PathLike[str], data: DS) -> DS:
+def require_plausible(path: str | os.PathLike[str], data: DS) -> DS:
     """`data`, if a sample of its frames has plausible units, axes, ground and cameras; else ValueError."""
-    demand(path, of_frames(sample(data)))
+    raise_if_wrong(path, check_frames(sample(data)))
     return data
 
 
@@ -73,7 +76,7 @@ def evenly(count: int, most: int = SAMPLE) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
 
 
-def of_frames(frames: Frames) -> list[Finding]:
+def check_frames(frames: Frames) -> list[Finding]:
     """All that can be told from the frames alone: whatever they have is judged, whatever they lack is passed over."""
     if not len(frames):
         return [Finding("wrong", "no frame at all", "the file is empty: is the download complete?")]
@@ -105,7 +108,7 @@ def _lengths(frames: Frames) -> list[Finding]:
         if points is not None:
             found += finite_points(what, points) + size_of_body(what, points)
     if frames.transl is not None:
-        found += finite("transl", frames.transl) + place("transl", frames.transl)
+        found += finite("transl", frames.transl) + near_origin("transl", frames.transl)
     return found
 
 
@@ -180,7 +183,7 @@ def units_of(extent: float) -> list[tuple[str, str, float]]:
     return sorted(fits, key=lambda each: abs(np.log(extent * each[2] / TALL)))[:2]
 
 
-def some(names: Sequence[str], most: int = 8) -> str:
+def first_names(names: Sequence[str], most: int = 8) -> str:
     """The first of the names, and an ellipsis for more."""
     return ", ".join(names[:most]) + (", …" if len(names) > most else "")
 
@@ -191,7 +194,7 @@ def _norms(vectors: NDArray[Any]) -> NDArray[np.float64]:
     return np.linalg.norm(np.where(np.isfinite(numbers), np.clip(numbers, -1e100, 1e100), np.nan), axis=-1)
 
 
-def place(what: str, positions: NDArray[Any]) -> list[Finding]:
+def near_origin(what: str, positions: NDArray[Any]) -> list[Finding]:
     """Whether positions (F, 3) of bodies or cameras can be metres in a world of people."""
     distance = _norms(positions)
     distance = distance[np.isfinite(distance)]
@@ -269,7 +272,7 @@ def heights(what: str, lowest: NDArray[Any], allowed: tuple[float, float] = (-0.
 
 def cameras(given: Cameras) -> list[Finding]:
     """Rotations that are rotations, intrinsics of pinholes in pixels, positions in metres."""
-    found = finite("cameras.rotation", given.rotation) + place("cameras.translation", given.translation)
+    found = finite("cameras.rotation", given.rotation) + near_origin("cameras.translation", given.translation)
     rotation = np.asarray(given.rotation, np.float64)
     rotation = rotation[np.isfinite(rotation).all(axis=(1, 2))]
     off = np.abs(rotation @ rotation.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2), initial=0) > 1e-3

@@ -53,7 +53,7 @@ def read(path: str | os.PathLike[str]) -> ExternalLoads | None:
     return ExternalLoads(PureWindowsPath(datafile).name, tuple(loads), str(Path(path)))
 
 
-def beside(files: Iterable[Path]) -> tuple[dict[Path, ExternalLoads], dict[Path, Path], list[str]]:
+def find(files: Iterable[Path]) -> tuple[dict[Path, ExternalLoads], dict[Path, Path], list[str]]:
     """By files of forces: what the ExternalLoads among `files` say of them, and the XML files that do.
 
     And what is wrong with those XML files that cannot be read, or whose forces are not there."""

@@ -27,11 +27,11 @@ from numpy.typing import ArrayLike, NDArray
 from ipman_rs.ground import Ground
 
 from . import c3d, sequences
-from .c3d_plates import LOADED, usable, whole_numbers
-from .check import Finding, demanded
+from .c3d_plates import LOADED, usable_plates, whole_numbers
+from .check import Finding, require_plausible
 from .frames import DataSet, Frames
 from .joined import Joined
-from .tracks import TO_Y_UP, seen_of
+from .tracks import TO_Y_UP, visibility
 
 NAME = "force-plates"
 
@@ -85,12 +85,12 @@ class ForcePlates:
         """
         wanted = np.asarray(times, float)
         loads = np.where((self.loads > least) & np.isfinite(self.points).all(axis=-1), self.loads, 0.0)
-        carried = between(self.times, loads[..., None], wanted)
+        carried = interpolate(self.times, loads[..., None], wanted)
         pressed = np.where(loads[..., None] > 0, loads[..., None] * self.points, 0.0)
-        weighted = between(self.times, pressed, wanted)
+        weighted = interpolate(self.times, pressed, wanted)
         with np.errstate(invalid="ignore"):
             points = np.where(carried > 0, weighted / carried, np.nan)
-        forces, moments = (between(self.times, values, wanted) for values in (self.forces, self.moments))
+        forces, moments = (interpolate(self.times, values, wanted) for values in (self.forces, self.moments))
         return replace(self, times=wanted, forces=forces, points=points, moments=moments)
 
     def turned(self, rotation: ArrayLike) -> ForcePlates:
@@ -102,7 +102,7 @@ class ForcePlates:
         )  # fmt: skip
 
 
-def recorded(found: ForcePlates) -> ForcePlates:
+def drop_unreadable_plates(found: ForcePlates) -> ForcePlates:
     """Without the plates of which no force is a number; notes name them, those that lack some samples, and a load that
     is nobody's."""
     known = np.asarray(np.isfinite(found.forces).all(axis=-1))  # (T, P)
@@ -122,7 +122,7 @@ def recorded(found: ForcePlates) -> ForcePlates:
     return replace(found, **parts, corners=corners, notes=(*found.notes, *notes))
 
 
-def between(times: Array, values: Array, wanted: ArrayLike) -> Array:
+def interpolate(times: Array, values: Array, wanted: ArrayLike) -> Array:
     """Values (T, ...) at other times (n,), on straight lines between the samples: (n, ...).
 
     NaN more than half a sample outside the recording: files round their times.
@@ -142,10 +142,10 @@ def read(path: str | os.PathLike[str], up: str | None = None) -> ForcePlates:
     surface, the plane of its corners. A baseline (FORCE_PLATFORM:ZERO) is not subtracted. A plate that cannot be
     computed is left out, `notes` say why. ValueError, naming the file, if it is damaged or no plate can be computed.
     """
-    return of_recording(c3d.read(Path(path)), up)
+    return from_c3d(c3d.read(Path(path)), up)
 
 
-def of_recording(found: c3d.Recording, up: str | None = None) -> ForcePlates:
+def from_c3d(found: c3d.C3DFile, up: str | None = None) -> ForcePlates:
     """As `read`."""
     used = (whole_numbers(found, "USED") or [0])[0]
     if used < 1:
@@ -156,7 +156,7 @@ def of_recording(found: c3d.Recording, up: str | None = None) -> ForcePlates:
     count = len(found.analogs) // max(len(found.times), 1)
     if count == 0:
         raise ValueError(f"{found.source}: expected samples of the force plates, it has none")
-    plates, notes = usable(found, used)
+    plates, notes = usable_plates(found, used)
     normals = np.abs([plate.axes[:, 2] for plate in plates])
     if (normals @ np.abs(vertical)).max() < LEVEL:
         axis = "xyz"[int(normals[0].argmax())]
@@ -169,7 +169,7 @@ def of_recording(found: c3d.Recording, up: str | None = None) -> ForcePlates:
     rate = found.rate * count if found.rate > 0 else float(count)
     times = found.times[0] + np.arange(len(found.analogs)) / rate
     corners = np.stack([plate.corners for plate in plates])
-    return recorded(ForcePlates(times, forces, points, moments, vertical, found.source, corners, notes))
+    return drop_unreadable_plates(ForcePlates(times, forces, points, moments, vertical, found.source, corners, notes))
 
 
 def open(
@@ -185,12 +185,14 @@ def open(
     files = sequences.recordings(path, ".c3d")
     recordings = [c3d.read(file) for file in files]
     names = list(dict.fromkeys(name for found in recordings for name in found.markers(subject).names))
-    parts = [of_file(found, file.stem, names, up, subject) for file, found in zip(files, recordings, strict=True)]
-    return demanded(Path(path), Joined(sequences.measured_alike(parts)))
+    parts = [
+        frames_from_c3d(found, file.stem, names, up, subject) for file, found in zip(files, recordings, strict=True)
+    ]
+    return require_plausible(Path(path), Joined(sequences.fill_missing(parts)))
 
 
-def of_file(
-    found: c3d.Recording, name: str, markers: Sequence[str], up: str | None = None, subject: str | None = None
+def frames_from_c3d(
+    found: c3d.C3DFile, name: str, markers: Sequence[str], up: str | None = None, subject: str | None = None
 ) -> Frames:
     """The frames of a recording, with these markers (NaN where it has none of the name)."""
     axis = up or found.up
@@ -200,20 +202,20 @@ def of_file(
     own = found.markers(subject)
     if own.names:
         column = {marker: index for index, marker in enumerate(markers)}
-        seen, _ = seen_of(found.points[:, own.columns], own.names)
+        seen, _ = visibility(found.points[:, own.columns], own.names)
         places = np.where(seen[..., None], found.places(own.columns), np.nan)
         joints[:, [column[marker] for marker in own.names]] = places
-    plates = of_recording(found, up) if found.has_plates else None
+    plates = from_c3d(found, up) if found.has_plates else None
     return _frames(name, found, joints, list(markers), plates, UP[axis])
 
 
 def _frames(
-    name: str, found: c3d.Recording, joints: Array, markers: list[str], plates: ForcePlates | None, up: Array
+    name: str, found: c3d.C3DFile, joints: Array, markers: list[str], plates: ForcePlates | None, up: Array
 ) -> Frames:
     at = None if plates is None else plates.at(found.times)
     height = 0.0 if plates is None or plates.corners is None else float((plates.corners @ up).mean())
     return Frames(
-        names=sequences.numbered(name, len(found.times)),
+        names=sequences.frame_names(name, len(found.times)),
         sequences=np.full(len(found.times), name),
         ground=Ground(up, height),
         frame_rate=found.rate or None,
@@ -235,18 +237,18 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         try:
             content = c3d.read(file)
             own = content.markers()
-            seen, said = seen_of(content.points[:, own.columns], own.names)
-            found += standing(file.name, content.places(own.columns), seen, content.up)
+            seen, said = visibility(content.points[:, own.columns], own.names)
+            found += check_longest_axis(file.name, content.places(own.columns), seen, content.up)
             found += [Finding("odd", f"{file.name}: {note}") for note in (*content.notes, *own.notes, *said)]
             found += _outputs(file, content)
-            found += sequences.told(file.name, open(file)[:])
+            found += sequences.check_recording(file.name, open(file)[:])
             found += _loads(file, content.notes)
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
     return found
 
 
-def _outputs(file: Path, content: c3d.Recording) -> list[Finding]:
+def _outputs(file: Path, content: c3d.C3DFile) -> list[Finding]:
     """What a model has computed, which is not taken as markers."""
     count = len(content.outputs)
     if not count:
@@ -255,7 +257,7 @@ def _outputs(file: Path, content: c3d.Recording) -> list[Finding]:
     return [Finding("ok", f"{file.name}: {count} outputs of a model are no markers{com}")]
 
 
-def standing(what: str, markers: Array, seen: NDArray[np.bool_], up: str) -> list[Finding]:
+def check_longest_axis(what: str, markers: Array, seen: NDArray[np.bool_], up: str) -> list[Finding]:
     """Whether the way in which markers (T, M, 3) m of a person are longest, and begin at a floor, is `up`.
 
     Nothing is wrong in somebody who lies; so this is told, and is no error.

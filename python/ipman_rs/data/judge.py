@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 
-from .check import AXES, BODY, WORLD, Finding, size_of_body, some, upright
+from .check import AXES, BODY, WORLD, Finding, first_names, size_of_body, upright
 
 MASS = (1.0, 650.0)  # kg: the heaviest person known weighed 635
 USUAL_MASS = (1.8, 250.0)  # kg
@@ -256,7 +256,7 @@ def known_markers(known: Sequence[str], unknown: Sequence[str], fewest: int = 6)
     count = len(known) + len(unknown)
     if not unknown:
         return []
-    said = f"{len(unknown)} of {count} markers have names without a known place: {some(unknown)}"
+    said = f"{len(unknown)} of {count} markers have names without a known place: {first_names(unknown)}"
     wrong = len(known) < fewest or 3 * len(known) < count
     return [Finding("wrong" if wrong else "odd", said, "--markers FILE says where they are")]
 

@@ -30,7 +30,7 @@ BODY = 22  # joints, without face and fingers
 MAX_BYTES = 1 << 20  # of a list
 
 
-def stillest(frames: Frames) -> int:
+def stillest_frame(frames: Frames) -> int:
     """The still frame of one sequence: of its middle half, the even frame about which the body turns least.
 
     The measure is the angle by which root and joints turn from frame to frame, mean over them and over half a second.
@@ -51,7 +51,7 @@ def stillest(frames: Frames) -> int:
     return int(middle[np.argmin(motion[middle].round(9))])
 
 
-class Chosen:
+class FrameList:
     """A list of the chosen images: of each pose, or of each pose in recordings with and without "nexus" in their names.
 
     ValueError, naming the file, for one that is missing, damaged, or no list of images. Nothing in it is executed.
@@ -106,9 +106,9 @@ def _check(where: str, images: Any) -> None:
         raise ValueError(f'{where}: expected {{"pose": number of its image, …}}, whole numbers from 0')
 
 
-def selected(wanted: str, sequence: Frames, chosen: Chosen | None) -> NDArray[np.int64]:
+def select_frames(wanted: str, sequence: Frames, chosen: FrameList | None) -> NDArray[np.int64]:
     """The numbers of the frames of one sequence that are wanted: "all", "selected" by our rule, or of a list."""
     if wanted == "all":
         return np.arange(len(sequence))
-    frame = stillest(sequence) if chosen is None else chosen.frame(str(sequence.sequences[0]), len(sequence))
+    frame = stillest_frame(sequence) if chosen is None else chosen.frame(str(sequence.sequences[0]), len(sequence))
     return np.array([] if frame is None else [frame], np.int64)

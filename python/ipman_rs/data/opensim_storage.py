@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import text_file
-from .check import some
+from .check import first_names
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,9 @@ class Storage:
         """(T, 3) of three columns. ValueError for one that is missing."""
         missing = [name for name in names if name not in self.columns]
         if missing:
-            raise ValueError(f"{self.source}: no column {missing[0]!r}; it has {some([*self.columns]) or 'none'}")
+            raise ValueError(
+                f"{self.source}: no column {missing[0]!r}; it has {first_names([*self.columns]) or 'none'}"
+            )
         return np.stack([self.columns[name] for name in names], axis=1)
 
 

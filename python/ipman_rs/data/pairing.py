@@ -25,20 +25,20 @@ STILL = ("static", "stand", "neutral", "calib", "t-pose", "tpose")
 Words = tuple[str, ...]
 
 
-def words(name: str) -> Words:
+def distinctive_words(name: str) -> Words:
     """What of a file's or a folder's name says whose it is: "grf_walk-2" is ("walk", "2")."""
     parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
     found = tuple(re.findall(r"[^\W_]+", parted.lower()))
     return () if name.lower() in KINDS else tuple(word for word in found if word not in KINDS)
 
 
-def still(name: str) -> bool:
+def is_static(name: str) -> bool:
     """Whether a name says that somebody stands still."""
     return any(word in name.lower() for word in STILL)
 
 
 @dataclass(frozen=True)
-class Place:
+class ParsedPath:
     """Where a file is below `root`: `owner`, the folders that say whose it is, and the `words` of its own name, or of
     its folder's where its own has none."""
 
@@ -47,27 +47,27 @@ class Place:
     words: Words
 
     @classmethod
-    def of(cls, path: Path, root: Path) -> Place:
-        folders = [part for part in path.parent.relative_to(root).parts if words(part)]
-        own = words(path.stem)
+    def of(cls, path: Path, root: Path) -> ParsedPath:
+        folders = [part for part in path.parent.relative_to(root).parts if distinctive_words(part)]
+        own = distinctive_words(path.stem)
         if not own and folders:
-            own = words(folders.pop())
+            own = distinctive_words(folders.pop())
         return cls(path, tuple(folders), own)
 
-    def rank(self, other: Place) -> int | None:
+    def rank(self, other: ParsedPath) -> int | None:
         """How well another file's name says that it belongs to this recording, 0 best; None: it does not say so."""
         if self.words == other.words and (self.words or self.path.parent == other.path.parent):
             return 0
         if self.words and other.words and _inside(self.words, other.words):
             return 1
         stem = self.path.stem.lower()
-        if words(stem):
+        if distinctive_words(stem):
             begin = r"(?<!\d)" if stem[0].isdigit() else ""
             if re.search(rf"{begin}{re.escape(stem)}(?!\d)", other.path.stem.lower()):
                 return 2
         return 3 if other.words and _inside(other.words, self.words) else None
 
-    def akin(self, other: Place) -> bool:
+    def akin(self, other: ParsedPath) -> bool:
         """Whether their folders can be of one person."""
         shared = min(len(self.owner), len(other.owner))
         return self.owner[:shared] == other.owner[:shared]
@@ -97,27 +97,27 @@ def pair(
     `given`: recordings that bring their own forces. `aliases`: a file whose name counts for a table, too.
     """
     found = Pairs(forces={path: path for path in given})
-    recordings = [Place.of(path, root) for path in markers]
+    recordings = [ParsedPath.of(path, root) for path in markers]
     for kind, paired in (("forces", found.forces), ("com", found.com)):
-        places = [Place.of(path, root) for path, what in tables.items() if what == kind]
+        places = [ParsedPath.of(path, root) for path, what in tables.items() if what == kind]
         strangers = _by_name(places, recordings, paired, found, aliases or {}, root)
         _by_number(kind, strangers, places, recordings, found, root)
     return found
 
 
 def _by_name(
-    tables: list[Place],
-    recordings: list[Place],
+    tables: list[ParsedPath],
+    recordings: list[ParsedPath],
     paired: dict[Path, Path],
     found: Pairs,
     aliases: Mapping[Path, Path],
     root: Path,
-) -> list[Place]:
+) -> list[ParsedPath]:
     """Those tables of which no name says whose they are."""
-    strangers: list[Place] = []
+    strangers: list[ParsedPath] = []
     claims: dict[Path, list[tuple[tuple[int, int, int], Path]]] = {}
     for table in tables:
-        names = [table, *([Place.of(aliases[table.path], root)] if table.path in aliases else [])]
+        names = [table, *([ParsedPath.of(aliases[table.path], root)] if table.path in aliases else [])]
         able = sorted(
             ((rank, _steps(one.path, table.path), -len(one.path.stem)), one.path)
             for one in recordings
@@ -128,7 +128,7 @@ def _by_name(
         if not able:
             strangers.append(table)
         elif len(able) > 1 and able[0][0] == able[1][0]:
-            which = " and ".join(_under(path, root) for score, path in able if score == able[0][0])
+            which = " and ".join(_relative(path, root) for score, path in able if score == able[0][0])
             found.left[table.path] = f"it can belong to {which}; give it the name of one of them"
         else:
             claims.setdefault(able[0][1], []).append((able[0][0], table.path))
@@ -136,7 +136,7 @@ def _by_name(
         for _, path in sorted(claimed):
             if recording in paired:
                 found.left[path] = (
-                    f"{_under(recording, root)} has {_what(paired, found)} {_from(recording, paired, root)}"
+                    f"{_relative(recording, root)} has {_what(paired, found)} {_source(recording, paired, root)}"
                 )
                 found.rivals[path] = recording
             else:
@@ -145,13 +145,18 @@ def _by_name(
 
 
 def _by_number(
-    kind: str, strangers: list[Place], tables: list[Place], recordings: list[Place], found: Pairs, root: Path
+    kind: str,
+    strangers: list[ParsedPath],
+    tables: list[ParsedPath],
+    recordings: list[ParsedPath],
+    found: Pairs,
+    root: Path,
 ) -> None:
     """Gives those tables to a recording which are the only ones of their kind, in a folder or of a person."""
     paired = found.forces if kind == "forces" else found.com
     what = "forces" if kind == "forces" else "centre of mass"
     for table in strangers:
-        owner, why = _only(table, tables, recordings, paired, None if kind == "forces" else found.forces)
+        owner, why = _only_candidate(table, tables, recordings, paired, None if kind == "forces" else found.forces)
         if owner is None:
             found.left[table.path] = (
                 "its name has no recording's name in it; expected such as "
@@ -160,18 +165,18 @@ def _by_number(
         else:
             paired[owner.path] = table.path
             found.notes.append(
-                f"{_under(table.path, root)}: taken as the {what} of {_under(owner.path, root)}, the only recording "
-                f"{why}"
+                f"{_relative(table.path, root)}: taken as the {what} of {_relative(owner.path, root)}, "
+                f"the only recording {why}"
             )
 
 
-def _only(
-    table: Place,
-    tables: list[Place],
-    recordings: list[Place],
+def _only_candidate(
+    table: ParsedPath,
+    tables: list[ParsedPath],
+    recordings: list[ParsedPath],
     paired: dict[Path, Path],
     forces: dict[Path, Path] | None,
-) -> tuple[Place | None, str]:
+) -> tuple[ParsedPath | None, str]:
     """The one recording that a table can belong to: in its folder, or else among those of one person; and in words
     which one that is."""
     for near, where in (
@@ -181,7 +186,7 @@ def _only(
         able = [one for one in recordings if near(one)]
         if sum(map(near, tables)) > 1 or not able:
             continue
-        move = [one for one in able if not still(one.path.stem) and not still(" ".join(one.words))]
+        move = [one for one in able if not is_static(one.path.stem) and not is_static(" ".join(one.words))]
         loaded = [] if forces is None else [one for one in able if one.path in forces]
         for some, why in ((able, where), (loaded, "with forces"), (move, "in which nobody stands still")):
             if len(some) == 1 and some[0].path not in paired:
@@ -193,9 +198,9 @@ def _what(paired: dict[Path, Path], found: Pairs) -> str:
     return "forces" if paired is found.forces else "a centre of mass"
 
 
-def _from(recording: Path, paired: dict[Path, Path], root: Path) -> str:
+def _source(recording: Path, paired: dict[Path, Path], root: Path) -> str:
     own = paired[recording] == recording
-    return "of its own" if own else f"from {_under(paired[recording], root)}"
+    return "of its own" if own else f"from {_relative(paired[recording], root)}"
 
 
 def _inside(few: Words, many: Words) -> bool:
@@ -209,16 +214,18 @@ def _steps(one: Path, other: Path) -> int:
     return len(a) + len(b) - 2 * shared
 
 
-def _under(path: Path, root: Path) -> str:
+def _relative(path: Path, root: Path) -> str:
     return path.relative_to(root).as_posix()
 
 
 def names(markers: Sequence[Path], root: Path) -> list[str]:
     """Names of recordings that tell them apart and can be those of folders: the file's, or its folder's where the
     file's says nothing, with folders before it where several have the same."""
-    places = [Place.of(path, root) for path in markers]
+    places = [ParsedPath.of(path, root) for path in markers]
     short = [
-        place.path.parent.name if not words(place.path.stem) and place.path.parent != root else place.path.stem
+        place.path.parent.name
+        if not distinctive_words(place.path.stem) and place.path.parent != root
+        else place.path.stem
         for place in places
     ]
     longer = ["_".join([*place.owner, name]) for place, name in zip(places, short, strict=True)]

@@ -21,7 +21,7 @@ TILT = 30.0  # degrees: more than that from the scan's z is no ground
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class RichScene:
     """What belongs to a place: its ground in camera 0's axes, and its cameras' rotation, translation, intrinsics."""
 
     ground: Ground | None
@@ -51,9 +51,9 @@ def scene_files(root: Path, folder: Path) -> tuple[Path | None, Path, Path]:
     return ground_mesh_file(root, folder), to_world_file(root, folder), calibration_folder(root, folder)
 
 
-def read_scene(mesh: Path | None, to_world: Path, calibration: Path) -> Scene:
+def read_scene(mesh: Path | None, to_world: Path, calibration: Path) -> RichScene:
     files = sorted(file for file in calibration.glob("*.xml") if file.stem.isdigit())
-    return Scene(
+    return RichScene(
         ground=None if mesh is None else ground(mesh, to_world),
         cameras={int(file.stem): camera(file) for file in files},
     )

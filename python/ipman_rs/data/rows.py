@@ -86,7 +86,7 @@ class RowFile:
         arrays: dict[str, NDArray[Any]] = {}
         unpacked = 0
         for name in names:
-            arrays[name] = safe_npz.mapped(self.path, name)
+            arrays[name] = safe_npz.memory_map(self.path, name)
             unpacked += 0 if isinstance(arrays[name], np.memmap) else arrays[name].nbytes
             if unpacked > UNPACKED:
                 advice = "save it again with numpy.savez, which need not be unpacked"

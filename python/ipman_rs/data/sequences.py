@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from . import check
 from .frames import Frames, Rows
-from .joined import Joined, concatenated
+from .joined import Joined, concatenate
 
 KEPT = 4  # sequences that stay in memory: rows are mostly asked for one after the other
 SAMPLED = 16  # sequences, and frames of each, that are looked at
@@ -60,7 +60,7 @@ def sequences(lengths: Sequence[int], read: Callable[[int], Frames], source: str
     return Joined([OnDemand(length, partial(kept, index)) for index, length in enumerate(lengths)])
 
 
-def measured_alike(parts: Sequence[Frames]) -> list[Frames]:
+def fill_missing(parts: Sequence[Frames]) -> list[Frames]:
     """With NaN for what only others of the parts have measured, and as many force plates in each."""
     plates = max((part.forces.shape[1] for part in parts if part.forces is not None), default=0)
     return [_with_nothing(part, parts, plates) for part in parts]
@@ -80,21 +80,23 @@ def _with_nothing(part: Frames, parts: Sequence[Frames], plates: int) -> Frames:
     return replace(part, **lacking)
 
 
-def demanded(path: str | os.PathLike[str], data: Joined) -> Joined:
+def require_plausible(path: str | os.PathLike[str], data: Joined) -> Joined:
     """`data`, if a sample of it has plausible units and, where it has enough sequences to tell, axes and ground."""
     chosen = [data.parts[index] for index in check.evenly(len(data.parts), SAMPLED) if len(data.parts[index])]
-    frames = concatenated([part[check.evenly(len(part), SAMPLED)] for part in chosen])
-    check.demand(Path(path), check.of_frames(frames if len(chosen) >= ENOUGH else replace(frames, ground=None)))
+    frames = concatenate([part[check.evenly(len(part), SAMPLED)] for part in chosen])
+    check.raise_if_wrong(
+        Path(path), check.check_frames(frames if len(chosen) >= ENOUGH else replace(frames, ground=None))
+    )
     return data
 
 
-def plausible(file: Path, frames: Frames) -> Frames:
+def require_plausible_units(file: Path, frames: Frames) -> Frames:
     """The frames of one sequence, if their units can be right. Its axes do not tell: its person may lie throughout."""
-    check.demand(file, check.of_frames(replace(check.sample(frames), ground=None)))
+    check.raise_if_wrong(file, check.check_frames(replace(check.sample(frames), ground=None)))
     return frames
 
 
-def judged(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Finding]:
+def check_sequences(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Finding]:
     """What can be told of sequences that are read one after the other: what is not right in each, and of all, by a
     sample."""
     found, some = [], []
@@ -105,23 +107,23 @@ def judged(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Find
             found.append(check.Finding("wrong", str(error)))
             continue
         few = frames[check.evenly(len(frames), check.SAMPLE)]
-        for each in check.of_frames(replace(few, ground=None)):
+        for each in check.check_frames(replace(few, ground=None)):
             if each.level != "ok":
                 found.append(check.Finding(each.level, f"{name}: {each.what}", each.advice))
         if index in check.evenly(len(parts), SAMPLED**2):
             some.append(frames[check.evenly(len(frames), SAMPLED)])
     try:
-        return found + (check.of_frames(concatenated(some)) if some else [])
+        return found + (check.check_frames(concatenate(some)) if some else [])
     except ValueError as error:  # they have other joints, or only some have a ground
         return [*found, check.Finding("missing", str(error))]
 
 
-def told(name: str, frames: Frames) -> list[check.Finding]:
+def check_recording(name: str, frames: Frames) -> list[check.Finding]:
     """What can be told of one recording, under its name."""
-    found = check.of_frames(check.sample(frames))
+    found = check.check_frames(check.sample(frames))
     return [check.Finding(each.level, f"{name}: {each.what}", each.advice) for each in found]
 
 
-def numbered(name: str, count: int) -> NDArray[np.str_]:
+def frame_names(name: str, count: int) -> NDArray[np.str_]:
     """Names of the frames of a sequence: "name/00000", "name/00001", ..."""
     return np.array([f"{name}/{number:05d}" for number in range(count)], np.str_)

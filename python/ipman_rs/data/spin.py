@@ -33,7 +33,7 @@ from ipman_rs.data.keypoints.openpose import BODY_25
 from ipman_rs.ground import Ground
 
 from . import naming
-from .check import Finding, demand, of_frames, sample, stance
+from .check import Finding, check_frames, raise_if_wrong, sample, stance
 from .frames import Array, Cameras, Frames, Rows
 from .rows import TEXT, RowFile
 
@@ -90,7 +90,7 @@ class Form:
         """
         file = _file(self, Path(path), split)
         data = Spin(RowFile(file, SHAPES, REQUIRED), self, frame, height)
-        demand(file, _plausible(data))
+        raise_if_wrong(file, _check_rows(data))
         return data
 
     def check(self, path: str | os.PathLike[str]) -> list[Finding]:
@@ -238,9 +238,9 @@ def genders(file: RowFile, rows: Rows) -> NDArray[np.str_]:
 def _check_file(form: Form, file: Path) -> list[Finding]:
     try:
         data = Spin(RowFile(file, SHAPES, REQUIRED), form)
-        found = [Finding("ok", f"{len(data)} rows with {', '.join(data.file)}"), *_plausible(data)]
+        found = [Finding("ok", f"{len(data)} rows with {', '.join(data.file)}"), *_check_rows(data)]
         if data.world and "S" in data.file:
-            seen = _plausible(Spin(data.file, form, "camera"))
+            seen = _check_rows(Spin(data.file, form, "camera"))
             found += [Finding(each.level, f"in the camera's axes: {each.what}", each.advice) for each in seen]
         found += data.file.scan()
     except ValueError as error:
@@ -251,11 +251,11 @@ def _check_file(form: Form, file: Path) -> list[Finding]:
     return [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in [*found, *lacking]]
 
 
-def _plausible(data: Spin) -> list[Finding]:
+def _check_rows(data: Spin) -> list[Finding]:
     """Axes are judged where there is no floor, too. Cameras are held upright: up is -y in their axes."""
     frames = sample(data)
     up = data.form.up if data.world else (0.0, -1.0, 0.0)
-    return of_frames(frames) + (stance(frames, Ground(up)) if frames.ground is None and up is not None else [])
+    return check_frames(frames) + (stance(frames, Ground(up)) if frames.ground is None and up is not None else [])
 
 
 def _file(form: Form, path: Path, split: str | None) -> Path:

@@ -30,9 +30,9 @@ from ipman_rs.body import joints
 from ipman_rs.files import safe_pickle
 
 from . import naming, spin
-from .check import Finding, demanded, of_frames
+from .check import Finding, check_frames, require_plausible
 from .frames import Array, Cameras, Frames
-from .joined import concatenated
+from .joined import concatenate
 
 NAME = "3dpw"
 SPLITS = ("test", "validation", "train")
@@ -78,7 +78,7 @@ def open(path: str | os.PathLike[str], split: str | None = None) -> Frames | spi
         return FORM.open(place, split)
     if not files:
         raise ValueError(f"{place}: no sequenceFiles/{split or 'test'}/*.pkl and no 3dpw_test.npz in it")
-    return demanded(place, concatenated([person for file in files for person in _people(file)]))
+    return require_plausible(place, concatenate([person for file in files for person in _people(file)]))
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
@@ -106,12 +106,12 @@ def _check_files(files: list[Path]) -> list[Finding]:
     found: list[Finding] = []
     for file in files:
         try:
-            frames = concatenated(_people(file))
+            frames = concatenate(_people(file))
         except ValueError as error:
             found.append(Finding("wrong", str(error)))
             continue
         told = [Finding("ok", f"{len(frames)} frames of {len(set(frames.sequences))} people")]
-        told += of_frames(frames)
+        told += check_frames(frames)
         found += [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in told]
     return found
 

@@ -9,9 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.renamed import old_names
+
 from .units import METRES, metres
 
-__all__ = ["METRES", "TO_Y_UP", "Named", "Tracks", "named", "rate_of", "tracks"]
+__all__ = ["METRES", "TO_Y_UP", "MarkerColumns", "Tracks", "rate_of", "select_markers", "tracks"]
+
+__getattr__ = old_names(__name__, {"Named": "MarkerColumns", "named": "select_markers"})
 
 Array = NDArray[np.float64]
 
@@ -35,7 +39,7 @@ FEWEST_OF_A_PERSON = 6  # markers of one name before the colon: a ball, a bat or
 NAMELESS = re.compile(r"\*\d*|(?:unlabell?ed|unnamed|uname)[ _*-]*\d*", re.IGNORECASE)
 
 
-NOBODY = '"" (without a name before a colon)'
+NO_SUBJECT = '"" (without a name before a colon)'
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +106,8 @@ def tracks(
 ) -> Tracks:
     """From a file's own numbers: NaN, exactly the origin, or a number that stands for it is a marker that was not seen.
 
-    `unit`: its name, or metres in one; "" is guessed. Names as `named` has them. ValueError for an unknown unit, axis
-    or subject, for no marker or sample, for two people, if nothing was seen, and for infinite coordinates.
+    `unit`: its name, or metres in one; "" is guessed. Names as `select_markers` has them. ValueError for an unknown
+    unit, axis or subject, for no marker or sample, for two people, if nothing was seen, and for infinite coordinates.
     """
     if up not in TO_Y_UP:
         raise ValueError(f"{source}: up: expected x, y or z, got {up!r}")
@@ -112,8 +116,8 @@ def tracks(
     if np.isinf(points).any():
         sample, marker, _ = np.argwhere(np.isinf(points))[0]
         raise ValueError(f"{source}: sample {sample}, marker {names[marker]!r}: expected numbers, got infinity")
-    seen, said = seen_of(points, names)
-    chosen = named(names, seen, source, subject)
+    seen, said = visibility(points, names)
+    chosen = select_markers(names, seen, source, subject)
     if not chosen.names:
         raise ValueError(f"{source}: expected markers with names, none of its {len(names)} points has one: label them")
     points, seen = points[:, chosen.columns], seen[:, chosen.columns]
@@ -121,7 +125,7 @@ def tracks(
         raise ValueError(f"{source}: expected coordinates, all are missing")
     scale = _scale(unit, points[seen], source)
     turned = np.where(seen[..., None], points, 0.0) * scale @ TO_Y_UP[up].T
-    guessed = [not_given(likely_unit(points[seen]))] if unit == "" else []
+    guessed = [unit_note(likely_unit(points[seen]))] if unit == "" else []
     told = (*notes, *said, *chosen.notes, *guessed, *_gaps(times))
     return Tracks(chosen.names, turned, seen.astype(float), np.asarray(times, float), source, told, up, scale)
 
@@ -132,10 +136,10 @@ def _gaps(times: Array) -> list[str]:
     if not places:
         return []
     what = "a gap" if len(places) == 1 else f"{len(places)} gaps"
-    return [f"its times have {what}, at {and_more(places, 3)}: the frames before and after are taken as neighbours"]
+    return [f"its times have {what}, at {list_names(places, 3)}: the frames before and after are taken as neighbours"]
 
 
-def turned(tracks: Tracks, normal: Sequence[float]) -> Tracks:
+def turn_up(tracks: Tracks, normal: Sequence[float]) -> Tracks:
     """The tracks with this direction of theirs, (3,), turned to +y by the shortest way."""
     up = np.asarray(normal, float) / np.linalg.norm(normal)
     if up[1] < -1 + 1e-12:
@@ -146,7 +150,7 @@ def turned(tracks: Tracks, normal: Sequence[float]) -> Tracks:
     return replace(tracks, points=tracks.points @ rotation.T)
 
 
-def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], list[str]]:
+def visibility(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], list[str]]:
     """Where markers (T, M, 3) were seen (T, M); and in words which numbers stand for one that was not."""
     origin = (points == 0).all(-1)
     there = ~np.isnan(points).any(-1) & ~origin
@@ -173,7 +177,7 @@ def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], lis
 
 def _not_seen(value: str, where: NDArray[np.bool_], names: Sequence[str]) -> str:
     which = [names[int(column)] or "one without a name" for column in np.flatnonzero(where.any(axis=0)).tolist()]
-    return f"{value} is taken as not seen ({and_more(which)})"
+    return f"{value} is taken as not seen ({list_names(which)})"
 
 
 def _repeated(points: Array, seen: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Array | None]:
@@ -208,7 +212,7 @@ def _is_nowhere(
 
 
 @dataclass(frozen=True)
-class Named:
+class MarkerColumns:
     """Which of a file's points are markers of the person, and what they are called."""
 
     names: tuple[str, ...]
@@ -216,7 +220,9 @@ class Named:
     notes: tuple[str, ...]
 
 
-def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: str | None = None) -> Named:
+def select_markers(
+    names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: str | None = None
+) -> MarkerColumns:
     """The markers by name, without the subject that stands before a colon ("S01:LASI").
 
     Left out, and named: points without a name, the shorter of two markers of one name, other people than `subject`.
@@ -233,7 +239,9 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     chosen = _person([*people], split, seen, source, subject)
     joined = [*dict.fromkeys(w for c, (who, _, _) in split.items() if (w := who.strip()) and seen[:, c].any())]
     if chosen is None and len(joined) > 1:
-        notes.append(f"the markers of {and_more(joined)} are taken as one person's (subject, --subject: those of one)")
+        notes.append(
+            f"the markers of {list_names(joined)} are taken as one person's (subject, --subject: those of one)"
+        )
     if chosen is not None:
         own = {split[column][2].strip() for column in known if split[column][0].strip() == chosen}
         nobodys = {split[column][2].strip() for column in known if not split[column][0].strip()}
@@ -241,8 +249,8 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
         others = [column for column in known if split[column][0].strip() not in with_him]
         known = [column for column in known if split[column][0].strip() in with_him]
         if others:
-            of = ", ".join(dict.fromkeys(split[column][0].strip() or NOBODY for column in others))
-            notes.append(f"the markers of {chosen or NOBODY} are taken, those of {of} left out ({len(others)})")
+            of = ", ".join(dict.fromkeys(split[column][0].strip() or NO_SUBJECT for column in others))
+            notes.append(f"the markers of {chosen or NO_SUBJECT} are taken, those of {of} left out ({len(others)})")
     best: dict[str, int] = {}
     twice = []
     for column in known:
@@ -252,9 +260,9 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
         if name not in best or seen[:, column].sum() > seen[:, best[name]].sum():
             best[name] = column
     if twice:
-        of = and_more([*dict.fromkeys(twice)])
+        of = list_names([*dict.fromkeys(twice)])
         notes.append(f"more than one marker is called {of}: of each the one that was seen the longest is taken")
-    return Named(tuple(best), list(best.values()), tuple(notes))
+    return MarkerColumns(tuple(best), list(best.values()), tuple(notes))
 
 
 def _nameless(name: str) -> bool:
@@ -269,7 +277,7 @@ def _person(
         known = {person.lower(): person for person in people}
         wanted = subject.strip().rstrip(":").lower()
         if wanted not in known or not any(people):
-            have = [person or NOBODY for person in people]
+            have = [person or NO_SUBJECT for person in people]
             expected = f"one of {', '.join(have)}" if any(people) else "none, for no marker has one"
             raise ValueError(f"{source}: subject: expected {expected}, got {subject!r}")
         return known[wanted]
@@ -291,7 +299,7 @@ def _person(
         hidden = {person for each in of_marker.values() if not all(map(shown.get, each)) for person in each}
         return next((person for person in people if person and shown[person] and person in hidden), None)
     first, *more = [person for person in people if person in rivals]
-    of = [f"{person or NOBODY} ({_count(len(markers[person]), 'marker')})" for person in [first, *more]]
+    of = [f"{person or NO_SUBJECT} ({_count(len(markers[person]), 'marker')})" for person in [first, *more]]
     one = first or more[0]
     raise ValueError(f"{source}: two people in it, {_and(of)}: say which one (subject={one!r}, --subject {one})")
 
@@ -317,7 +325,7 @@ def likely_unit(points: Array) -> str:
     return "mm" if np.ptp(points, axis=0).max() > LARGEST else "m"
 
 
-def not_given(unit: str | float) -> str:
+def unit_note(unit: str | float) -> str:
     """The note on a unit that a file does not say."""
     return f"its unit of length is not given: taken as {unit} (--units)"
 
@@ -326,11 +334,11 @@ def _count(number: int, what: str) -> str:
     return f"{number} {what}" + ("" if number == 1 else "s")
 
 
-def and_more(names: Sequence[str], most: int = 6) -> str:
+def list_names(names: Sequence[str], most: int = 6) -> str:
     """The first of the names, and how many more there are."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
-def letters(name: str) -> str:
+def alphanumeric(name: str) -> str:
     """The letters and digits of a name alone, lower case."""
     return re.sub(r"[\W_]", "", name).lower()

@@ -17,14 +17,14 @@ from ipman_rs.quantities import Method
 from ipman_rs.support import support_margin
 from ipman_rs.template import BodyTemplate
 
-from .numpy_or_torch import AnyGround, alike
+from .numpy_or_torch import AnyGround, numpy_or_torch
 
 BoseMode = Literal["paper", "released", "strict"]
 
 THRESHOLDS = {"paper": 0.1, "released": 0.1, "strict": 0.025}  # τ, m
 
 
-@alike
+@numpy_or_torch
 def bose(
     vertices: ArrayLike,
     template: BodyTemplate,

@@ -6,11 +6,11 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from .numpy_or_torch import alike
+from .numpy_or_torch import numpy_or_torch
 from .points import norm, vectors
 
 
-@alike
+@numpy_or_torch
 def com_error(estimated: ArrayLike, true: ArrayLike) -> Any:
     """Distance in space of two centres of mass, (..., 3) -> (...) m; NaN where one is not finite. ValueError where the
     shapes differ."""

@@ -6,11 +6,11 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from .numpy_or_torch import AnyGround, alike
+from .numpy_or_torch import AnyGround, numpy_or_torch
 from .points import norm, vectors
 
 
-@alike
+@numpy_or_torch
 def cop_error(estimated: ArrayLike, true: ArrayLike, ground: AnyGround) -> Any:
     """Distance along the ground of two centres of pressure, (..., 3) -> (...) m; NaN where one is not finite.
 

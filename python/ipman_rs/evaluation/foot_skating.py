@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 
 from ipman_rs.checks import positive
 
-from .numpy_or_torch import AnyGround, alike
+from .numpy_or_torch import AnyGround, numpy_or_torch
 from .points import finite, norm, points
 
 
-@alike
+@numpy_or_torch
 def foot_skating(feet: ArrayLike, ground: AnyGround, sequences: ArrayLike, threshold: float = 0.005) -> Any:
     """Way along the ground from the frame before, mean over the points that touch it in both frames: (F, N, 3) -> (F,)
     m a frame. Times the frame rate it is a speed.

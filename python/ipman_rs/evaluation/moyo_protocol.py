@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.checks import number
 
-from .numpy_or_torch import AnyGround, alike, as_array
+from .numpy_or_torch import AnyGround, as_array, numpy_or_torch
 from .points import Array, norm, points, vector
-from .pressure_iou import PressureMode, as_measured, best_iou
-from .pressure_map import Mat, cells_of, normalised
+from .pressure_iou import PressureMode, best_iou, scaled_measurement
+from .pressure_map import Mat, cell_numbers, normalised
 
 ALPHAS = np.linspace(10.0, 200.0, 10)  # 1/m
 GAMMAS = np.linspace(10.0, 5000.0, 15)  # 1/m
@@ -41,7 +41,7 @@ class MoyoFigures(NamedTuple):
     fixed: PressureFigures
 
 
-@alike
+@numpy_or_torch
 def moyo(
     samples: ArrayLike,
     ground: AnyGround,
@@ -77,9 +77,9 @@ def moyo(
     heights = ground.signed_height(bodies)
     normals = np.broadcast_to(ground.normal, (len(bodies), 3))
     found = np.full((len(bodies), 4, 5), np.nan)
-    for frame, truth in enumerate(as_measured(measured, pressure_mode)):
+    for frame, truth in enumerate(scaled_measurement(measured, pressure_mode)):
         if np.isfinite(bodies[frame]).all():
-            cells = cells_of(bodies[frame], mat, frame)
+            cells = cell_numbers(bodies[frame], mat, frame)
             frame_of = _Frame(bodies[frame], heights[frame], normals[frame], cells, truth, centers[frame])
             grid = frame_of.figures(ALPHAS, GAMMAS)
             fixed = frame_of.figures(np.array(own[:1]), np.array(own[1:]))

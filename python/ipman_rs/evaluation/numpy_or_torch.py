@@ -19,7 +19,7 @@ Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
 
-def alike(metric: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+def numpy_or_torch(metric: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """The metric for arrays and for tensors; a ground may be that of `ipman_rs` or of `ipman_rs.torch`."""
 
     @functools.wraps(metric)

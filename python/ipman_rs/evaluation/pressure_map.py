@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.checks import real_array
 
-from .numpy_or_torch import alike
+from .numpy_or_torch import numpy_or_torch
 from .points import Array, points
 
 
@@ -29,7 +29,7 @@ class Mat(Protocol):
     def cell(self) -> float: ...  # m
 
 
-@alike
+@numpy_or_torch
 def pressure_map(samples: ArrayLike, pressure: ArrayLike, mat: Mat) -> Any:
     """What each cell carries: samples (..., S, 3) m and their pressure (..., S) -> (..., H, W), in the pressure's unit.
 
@@ -44,13 +44,13 @@ def pressure_map(samples: ArrayLike, pressure: ArrayLike, mat: Mat) -> Any:
     maps = np.full((len(bodies[0]), height * width), np.nan)
     for number, (found, body, weight) in enumerate(zip(maps, *bodies, strict=True)):
         if np.isfinite(body).all():
-            cells = cells_of(body, mat, number)
+            cells = cell_numbers(body, mat, number)
             on = cells >= 0
             found[:] = np.bincount(cells[on], weight[on], height * width)
     return maps.reshape(*where.shape[:-2], height, width)
 
 
-def cells_of(samples: Array, mat: Mat, body: int) -> NDArray[np.int64]:
+def cell_numbers(samples: Array, mat: Mat, body: int) -> NDArray[np.int64]:
     """The number i · W + j of the cell under each sample (S, 3) of the body of this number; −1 off the mat."""
     height, width = mat.values.shape[-2:]
     origin, e1, e2 = (place[body] if place.ndim == 2 else place for place in (mat.origin, mat.e1, mat.e2))

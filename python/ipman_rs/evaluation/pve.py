@@ -6,11 +6,11 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from .numpy_or_torch import alike
+from .numpy_or_torch import numpy_or_torch
 from .points import norm, pair, vector
 
 
-@alike
+@numpy_or_torch
 def pve(
     estimated: ArrayLike, true: ArrayLike, root: ArrayLike | None = None, true_root: ArrayLike | None = None
 ) -> Any:

@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike
 from ipman_rs.checks import real_array
 from ipman_rs.ground import Ground
 
-from .numpy_or_torch import AnyGround, alike
+from .numpy_or_torch import AnyGround, numpy_or_torch
 from .points import Array, finite, norm, pair
 from .procrustes import similarity
 
 PELVIS = (0, 1, 2, 3)  # of SMPL, SMPL-H and SMPL-X: what turns with the root alone (pelvis, hips, first of the spine)
 
 
-@alike
+@numpy_or_torch
 def tilt(
     estimated: ArrayLike,
     true: ArrayLike,
@@ -47,7 +47,7 @@ def tilt(
     return _between(_up(ground), (rotation @ _up(true_ground or ground)[..., None])[..., 0])
 
 
-@alike
+@numpy_or_torch
 def root_tilt(estimated: ArrayLike, true: ArrayLike, ground: AnyGround, true_ground: AnyGround | None = None) -> Any:
     """`tilt` from the rotations (..., 3, 3) of the roots, from the rest pose to each one's world, where a body model
     gives them. ValueError where the shapes differ."""

@@ -17,10 +17,10 @@ except ImportError:  # Windows, which deletes no file that is open
 _PART = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{12}\.part")
 
 
-class being_written:
+class atomic_write:
     """A file that appears under its name when it is whole: a process that dies leaves the old one, or none.
 
-    with being_written(path) as file: file.write(...)
+    with atomic_write(path) as file: file.write(...)
 
     It is written beside its place, under a name of its own, and then moved; a failure removes it. What a killed process
     left of the same file is removed by the next that writes it: a living writer holds a lock.
@@ -52,7 +52,7 @@ class being_written:
 
 def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
     """Write a file, text as UTF-8, so that it is there whole or not at all. Raises OSError."""
-    with being_written(path) as file:
+    with atomic_write(path) as file:
         file.write(content.encode(errors="replace") if isinstance(content, str) else content)  # names need not be text
 
 

@@ -14,8 +14,8 @@ from ipman_rs.ground import Ground
 
 from ..data.force_plates import ForcePlates
 from .acceleration import CUTOFF, accelerations
-from .computed import Computed, carried
-from .movement import LOW, SLOW, Movement, smoothed
+from .computed import Computed, plate_loads
+from .movement import LOW, SLOW, Movement, smooth
 from .zero_moment_point import along_force, zero_moment_point, zero_moment_point_of_parts
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ ANYWHERE = 0.5  # m: a reference farther from the body is in other units or axes
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class MeasuredComparison:
     """T frames at `times`; `plates`, y up, and `reference`, a centre of mass (T, 3) m, at these times.
 
     NaN where nothing was measured. `seen` (T,): where enough markers were seen to say where the body is. `judge`: whose
@@ -83,7 +83,7 @@ class Comparison:
         """(3,) N: the median of all plates' force in the frames in which none carries a load; 0 if there are none."""
         if self.plates is None:
             return np.zeros(3)
-        empty = (carried(self.plates) == 0).all(axis=1) & np.isfinite(self.plates.forces).all(axis=(1, 2))
+        empty = (plate_loads(self.plates) == 0).all(axis=1) & np.isfinite(self.plates.forces).all(axis=(1, 2))
         return np.median(self.plates.forces.sum(axis=1)[empty], axis=0) if empty.any() else np.zeros(3)
 
     @cached_property
@@ -111,7 +111,7 @@ class Comparison:
     @cached_property
     def forward(self) -> Array:
         """(T, 3): the level unit vectors along which the pelvis faces, on average over a second."""
-        return smoothed(self.computed.forward, round(self.rate))
+        return smooth(self.computed.forward, round(self.rate))
 
     def of_person(self, vectors: Array) -> Array:
         """Vectors (T, 3) by their components forward, left and up, as the person faces."""
@@ -166,7 +166,7 @@ class Comparison:
             return {}
         if self.kind != "walking":
             return {"all": self.complete}
-        count = (carried(self.plates) > 0).sum(axis=1)
+        count = (plate_loads(self.plates) > 0).sum(axis=1)
         return {"single support": self.complete & (count == 1), "double support": self.complete & (count == 2)}
 
     @cached_property
@@ -208,7 +208,7 @@ def beside_centers(computed: Computed, rate: float, floor: Ground, plates: Force
 
     A plate that carries both feet at other times, its centre under both or between them, says nothing of that.
     """
-    loaded = carried(plates) > 0
+    loaded = plate_loads(plates) > 0
     soles = [computed.soles[:, side] for side in (computed.left, ~computed.left)]
     if len(loaded) < 2:
         return np.zeros(len(loaded), bool)

@@ -61,7 +61,7 @@ def computed(
     for vertices in pieces(bodies, PIECE):
         part = slice(done, done + len(vertices))
         rows.append(
-            _piece(vertices, template, None if plates is None else (carried(plates)[part], plates.points[part]))
+            _piece(vertices, template, None if plates is None else (plate_loads(plates)[part], plates.points[part]))
         )
         done += len(vertices)
         progress(done)
@@ -94,11 +94,11 @@ def _piece(vertices: NDArray[np.floating], template: ip.BodyTemplate, plates: tu
         shares = first_shares(np.asarray(ip.sample_surface(vertices, template), float), rho, *plates)
     sole = sole_vertices(template, SOLE)
     left = np.isin(sole, _of_part(template, "left_lower_leg"))
-    soles, forward = np.asarray(vertices[:, sole], float), facing(vertices, template)
+    soles, forward = np.asarray(vertices[:, sole], float), facing_directions(vertices, template)
     return Computed(mass, masses, centers, ground.height, com, cop, soles, left, forward, shares)
 
 
-def facing(vertices: NDArray[np.floating], template: ip.BodyTemplate) -> Array:
+def facing_directions(vertices: NDArray[np.floating], template: ip.BodyTemplate) -> Array:
     """The level unit vectors (T, 3) along which the pelvis of bodies (T, V, 3), y up, faces.
 
     The pelvis is the lower half of the trunk, turned as a whole from the resting pose, which faces z. Square to its
@@ -124,7 +124,7 @@ def _of_part(template: ip.BodyTemplate, name: str) -> NDArray[np.int64]:
     return np.unique(template.faces[template.face_parts == template.part_names.index(name)])
 
 
-def carried(plates: ForcePlates) -> Array:
+def plate_loads(plates: ForcePlates) -> Array:
     """(T, P) N upwards; 0 for plates that carry no more than `LOADED`, of whose centres nothing is known."""
     return np.where(plates.loads > LOADED, plates.loads, 0.0)
 

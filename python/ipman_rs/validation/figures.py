@@ -12,8 +12,8 @@ from ipman_rs.gravity import GRAVITY
 from ipman_rs.jsonable import jsonable
 
 from .acceleration import CUTOFF
-from .comparison import Comparison, distances
-from .computed import METHODS, carried
+from .comparison import MeasuredComparison, distances
+from .computed import METHODS, plate_loads
 from .zero_moment_point import along_force
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ APART = 0.03  # of the weight: more is not the same
 AXES = ("forward", "left", "up")
 
 
-def figures(one: Comparison) -> dict[str, Any]:
+def figures(one: MeasuredComparison) -> dict[str, Any]:
     """All that `report` prints of a recording."""
     mass = one.computed.mass if one.seen is None else one.computed.mass[one.seen]
     return jsonable(
@@ -55,7 +55,7 @@ def figures(one: Comparison) -> dict[str, Any]:
     )
 
 
-def flags(one: Comparison) -> list[str]:
+def flags(one: MeasuredComparison) -> list[str]:
     """What is odd about the plates: forces that are no numbers, no weight, one that changes, or is not that of standing
     still, a foot beside them, and a force that the movement does not explain."""
     said = [
@@ -64,7 +64,7 @@ def flags(one: Comparison) -> list[str]:
         if count
     ]
     if one.plates is not None:
-        said += _unknown(one)
+        said += _missing_reasons(one)
     spread, loaded = _std(one.weights), int(one.beside.sum() + one.complete.sum())
     if one.beside.any():
         which = f"{one.beside.sum()} of {loaded} loaded frames"
@@ -88,7 +88,7 @@ def flags(one: Comparison) -> list[str]:
     return said
 
 
-def _unknown(one: Comparison) -> list[str]:
+def _missing_reasons(one: MeasuredComparison) -> list[str]:
     """Why there is no acceleration, or no weight by the plates."""
     said = []
     if one.rate < 4 * CUTOFF:
@@ -110,7 +110,7 @@ def _std(values: Array) -> float | None:
     return float(np.nanstd(values)) if np.isfinite(values).any() else None
 
 
-def _force(one: Comparison) -> dict[str, Any] | None:
+def _force(one: MeasuredComparison) -> dict[str, Any] | None:
     """The upward force that the fitted body's acceleration asks for, m (g + a), against the plates', N and as a share
     of the weight; `at_rest`: the weight itself against the plates'."""
     if one.plates is None:
@@ -128,7 +128,7 @@ def _force(one: Comparison) -> dict[str, Any] | None:
     }
 
 
-def _against_reference(one: Comparison) -> dict[str, Any] | None:
+def _against_reference(one: MeasuredComparison) -> dict[str, Any] | None:
     """Of each formulation: mean and rms difference forward, left and up of the person, and the mean distance, m."""
     if one.reference is None:
         return None
@@ -149,7 +149,7 @@ def _against_reference(one: Comparison) -> dict[str, Any] | None:
     return {"judge": one.judge, "frames": int(used.sum()), "seconds": seconds, "axes": AXES, "methods": found}
 
 
-def _standing(one: Comparison) -> dict[str, Any] | None:
+def _standing(one: MeasuredComparison) -> dict[str, Any] | None:
     """Quiet standing: the mean of CoM − CoP forward and left, its length, their distance over time, and sways, rms."""
     if one.kind != "quiet standing" or one.measured is None or not one.complete.any():
         return None
@@ -164,7 +164,7 @@ def _standing(one: Comparison) -> dict[str, Any] | None:
     }
 
 
-def _centers(one: Comparison, mask: Mask) -> dict[str, Any]:
+def _centers(one: MeasuredComparison, mask: Mask) -> dict[str, Any]:
     """Mean distance on the floor, m, from the measured centre of pressure to each computed one, on the same frames."""
     assert one.plates is not None
     assert one.measured is not None
@@ -188,11 +188,11 @@ def _centers(one: Comparison, mask: Mask) -> dict[str, Any]:
     return found
 
 
-def _shares(one: Comparison) -> dict[str, Any] | None:
+def _shares(one: MeasuredComparison) -> dict[str, Any] | None:
     """The first of two loaded plates' part of the load: measured, by the paper's pressure, and how far they differ."""
     if one.plates is None:
         return None
-    loads = carried(one.plates)
+    loads = plate_loads(one.plates)
     used = one.complete & np.isfinite(one.computed.shares)
     if not used.any():
         return None

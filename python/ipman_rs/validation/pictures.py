@@ -15,8 +15,8 @@ from ..body.sequence import PosedSequence
 from ..body.soles import sole_vertices
 from ..gravity import GRAVITY
 from ..view import colors
-from .comparison import Comparison
-from .computed import ALPHA, GAMMA, SOLE, carried
+from .comparison import MeasuredComparison
+from .computed import ALPHA, GAMMA, SOLE, plate_loads
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +30,7 @@ MARGIN = 0.12  # m around the feet
 OURS, REFERENCE = "#1f77b4", "#9aa1ad"
 
 
-def moments(one: Comparison) -> dict[str, int]:
+def moments(one: MeasuredComparison) -> dict[str, int]:
     """The frames that are worth a picture: the middle of each phase's longest run, or where the body is lowest."""
     found = {}
     for phase, mask in one.phases.items():
@@ -44,7 +44,7 @@ def moments(one: Comparison) -> dict[str, int]:
     return found or {"all": len(one.times) // 2}
 
 
-def pressure_map(one: Comparison, bodies: Bodies, template: ip.BodyTemplate) -> bytes:
+def pressure_map(one: MeasuredComparison, bodies: Bodies, template: ip.BodyTemplate) -> bytes:
     """A PNG of the engine's pressure on the floor, seen from above with the person's front at the top, with the plates
     and all centres."""
     chosen = moments(one)
@@ -58,7 +58,7 @@ def pressure_map(one: Comparison, bodies: Bodies, template: ip.BodyTemplate) -> 
         title = "" if phase == "all" else f"{phase}, "
         axis.set_title(f"{one.name}, {title}{one.times[frame]:.2f} s", fontsize=10)
     axes[0][0].set_ylabel("forward, m")
-    if one.plates is not None and (carried(one.plates)[list(chosen.values())] > 0).any():
+    if one.plates is not None and (plate_loads(one.plates)[list(chosen.values())] > 0).any():
         axes[0][0].plot([], [], "^", color="black", ms=6, mfc="white", label="CoP of a plate, with its load")
     told = {name: mark for axis in axes[0] for mark, name in zip(*axis.get_legend_handles_labels(), strict=True)}
     figure.legend(list(told.values()), list(told), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
@@ -73,7 +73,7 @@ class Floor:
     forward: Array  # (3,)
 
     @classmethod
-    def under(cls, one: Comparison, vertices: Array, template: ip.BodyTemplate, frame: int) -> Floor:
+    def under(cls, one: MeasuredComparison, vertices: Array, template: ip.BodyTemplate, frame: int) -> Floor:
         return cls(vertices[sole_vertices(template, SOLE)].mean(axis=0), one.forward[frame])
 
     def __call__(self, points: Array) -> Array:
@@ -82,7 +82,7 @@ class Floor:
 
 
 def _limits(
-    one: Comparison, vertices: Array, template: ip.BodyTemplate, frame: int, floor: Floor
+    one: MeasuredComparison, vertices: Array, template: ip.BodyTemplate, frame: int, floor: Floor
 ) -> tuple[Array, Array]:
     """Corners of the map: around the soles and all centres."""
     centers = floor(np.array([place[frame] for _, place, _ in _places(one)]))
@@ -92,7 +92,7 @@ def _limits(
 
 def _draw_map(
     axis: Axes,
-    one: Comparison,
+    one: MeasuredComparison,
     vertices: Array,
     template: ip.BodyTemplate,
     frame: int,
@@ -118,7 +118,7 @@ def _draw_map(
     axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="right, m", aspect="equal")
 
 
-def _places(one: Comparison) -> list[tuple[str, Array, tuple[str, str, float]]]:
+def _places(one: MeasuredComparison) -> list[tuple[str, Array, tuple[str, str, float]]]:
     found = [
         ("CoM on the floor", one.com, ("o", colors.COM, 11)),
         ("the paper's CoP, γ = 10", one.computed.cop[10], ("o", colors.COP, 9)),
@@ -131,13 +131,13 @@ def _places(one: Comparison) -> list[tuple[str, Array, tuple[str, str, float]]]:
     return found  # type: ignore[return-value]
 
 
-def _draw_plates(axis: Axes, one: Comparison, frame: int, floor: Floor) -> None:
+def _draw_plates(axis: Axes, one: MeasuredComparison, frame: int, floor: Floor) -> None:
     """Each plate's outline, as far as it is known, its centre of pressure and its load."""
     plates = one.plates
     assert plates is not None
     for outline in () if plates.corners is None else plates.corners:
         axis.plot(*floor(np.vstack([outline, outline[:1]])).T, color=colors.INK, lw=1, ls="--", zorder=2)
-    for plate in np.flatnonzero(carried(plates)[frame] > 0):
+    for plate in np.flatnonzero(plate_loads(plates)[frame] > 0):
         place, told = floor(plates.points[frame, plate]), f"{plates.loads[frame, plate]:.0f} N"
         axis.plot(*place, "^", color="black", ms=6, mfc="white", zorder=4)
         box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1}
@@ -147,7 +147,7 @@ def _draw_plates(axis: Axes, one: Comparison, frame: int, floor: Floor) -> None:
         )  # fmt: skip
 
 
-def over_time(one: Comparison) -> bytes:
+def over_time(one: MeasuredComparison) -> bytes:
     """A PNG of the CoM's height, the centres on the floor along the way that the person faces on average and to the
     left of it, and the load, over time; only what is known."""
     pushed = one.plates is not None and bool(np.isfinite(one.plates.forces[..., 1]).any())
@@ -171,14 +171,14 @@ def over_time(one: Comparison) -> bytes:
     return _png(figure)
 
 
-def _span(one: Comparison) -> tuple[float, float]:
+def _span(one: MeasuredComparison) -> tuple[float, float]:
     """The times of which there are measurements, and a little more."""
     known = one.complete if one.reference is None else one.complete | np.isfinite(one.reference[:, 0])
     times = one.times[known] if known.any() else one.times
     return max(one.times[0], times[0] - 0.3), min(one.times[-1], times[-1] + 0.3)
 
 
-def _draw_centers(axis: Axes, one: Comparison, way: Array) -> None:
+def _draw_centers(axis: Axes, one: MeasuredComparison, way: Array) -> None:
     """How far along a way (3,) all centres are, from where the centre of mass is on average."""
     shown = [
         ("CoM", one.com, {"color": colors.COM, "lw": 1.2}),
@@ -204,10 +204,10 @@ def _draw_centers(axis: Axes, one: Comparison, way: Array) -> None:
         axis.set_ylim(float(known.min()) - room, float(known.max()) + room)
 
 
-def _draw_loads(axis: Axes, one: Comparison) -> None:
+def _draw_loads(axis: Axes, one: MeasuredComparison) -> None:
     assert one.plates is not None
     for plate in range(one.plates.forces.shape[1]):
-        if carried(one.plates)[:, plate].any():
+        if plate_loads(one.plates)[:, plate].any():
             axis.plot(
                 one.times, one.plates.forces[:, plate, 1], lw=1, color=f"C{1 + plate}", label=f"plate {plate + 1}"
             )
@@ -224,7 +224,7 @@ def _draw_loads(axis: Axes, one: Comparison) -> None:
     axis.legend(frameon=False, fontsize=7, ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1))
 
 
-def people(one: Comparison, bodies: Bodies, faces: NDArray[np.int64], markers: Array) -> bytes:
+def people(one: MeasuredComparison, bodies: Bodies, faces: NDArray[np.int64], markers: Array) -> bytes:
     """A PNG of three fitted bodies with their markers (T, M, 3), seen from their right, and one from its front."""
     usable = np.flatnonzero(one.complete) if one.complete.any() else np.arange(len(one.times))
     spread = usable[np.linspace(0, len(usable) - 1, 5).round().astype(int)[[1, 2, 3]]]
@@ -241,7 +241,13 @@ def people(one: Comparison, bodies: Bodies, faces: NDArray[np.int64], markers: A
 
 
 def _draw_body(
-    axis: Axes, one: Comparison, vertices: Array, faces: NDArray[np.int64], markers: Array, frame: int, side: str
+    axis: Axes,
+    one: MeasuredComparison,
+    vertices: Array,
+    faces: NDArray[np.int64],
+    markers: Array,
+    frame: int,
+    side: str,
 ) -> None:
     """A body seen from its right or its front."""
     from matplotlib.collections import PolyCollection

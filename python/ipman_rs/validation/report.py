@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .comparison import Comparison
-from .computed import GAMMAS, METHODS, carried
+from .comparison import MeasuredComparison
+from .computed import GAMMAS, METHODS, plate_loads
 
 Record = dict[str, Any]
 
@@ -81,7 +81,7 @@ def weighed(one: Record) -> float | None:
 def centers_of_mass(records: Iterable[Record]) -> Iterator[str]:
     yield "| recording | against | body | shape from | frames | forward, rms (mean) | left | up | distance, mean |"
     yield "|---|---|---|---|---|---|---|---|---|"
-    for one in _with(records, "com"):
+    for one in _records_with(records, "com"):
         exact = one["com"]["methods"]["exact"]
         axes = [f"{1e3 * rms:.1f} ({1e3 * mean:+.1f})" for rms, mean in zip(exact["rms"], exact["mean"], strict=True)]
         yield (
@@ -92,7 +92,7 @@ def centers_of_mass(records: Iterable[Record]) -> Iterator[str]:
 
 def formulations(records: Iterable[Record]) -> Iterator[str]:
     """A row a formulation, a column a recording, and the paper's figures."""
-    compared = list(_with(records, "com"))
+    compared = list(_records_with(records, "com"))
     if not compared:
         return
     titles = [
@@ -113,7 +113,7 @@ def standing(records: Iterable[Record]) -> Iterator[str]:
         "| sway of CoP |"
     )
     yield "|---|---|---|---|---|---|---|---|"
-    for one in _with(records, "standing"):
+    for one in _records_with(records, "standing"):
         found = one["standing"]
         forward, left = (1e3 * value for value in found["offset"])
         rest = (found[name] for name in ("offset_length", "distance", "sway_com", "sway_cop"))
@@ -163,7 +163,7 @@ def references(records: Iterable[Record]) -> Iterator[str]:
 def shares(records: Iterable[Record]) -> Iterator[str]:
     yield "| recording | body | shape from | frames | measured | computed | apart, mean |"
     yield "|---|---|---|---|---|---|---|"
-    for one in _with(records, "shares"):
+    for one in _records_with(records, "shares"):
         found = one["shares"]
         told = (f"{found[name]:.1%}" for name in ("measured", "computed", "difference"))
         yield f"| {one['name']} | {one['body']} | {one['fit']['shape_from']} | {found['frames']} | {' | '.join(told)} |"
@@ -213,7 +213,7 @@ TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...]
 )
 
 
-def series(one: Comparison) -> dict[str, NDArray[Any]]:
+def series(one: MeasuredComparison) -> dict[str, NDArray[Any]]:
     """Everything over time, by name: columns (T,), and vectors (T, 3), metres, newtons, seconds."""
     found: dict[str, NDArray[Any]] = {"time_s": one.times, "volume_mass_kg": one.computed.mass}
     found |= {f"com_{method}_m": points for method, points in one.computed.com.items()}
@@ -225,7 +225,7 @@ def series(one: Comparison) -> dict[str, NDArray[Any]]:
     if one.plates is not None:
         assert one.measured is not None
         found |= {"force_N": one.force, "cop_measured_m": one.measured, "complete": one.complete, "beside": one.beside}
-        found |= {"loads_N": carried(one.plates), "first_share_computed": one.computed.shares}
+        found |= {"loads_N": plate_loads(one.plates), "first_share_computed": one.computed.shares}
         names = ("zmp_com_m", "zmp_parts_m", "com_along_force_m")
         found |= {name: one.centers[model] for name, model in zip(names, MODELS[1:], strict=True)}
     return found
@@ -252,7 +252,7 @@ def _axes(name: str, count: int) -> Sequence[str]:
     return [f"plate{number}" for number in range(1, count + 1)] if name == "loads_N" else "xyz"
 
 
-def _with(records: Iterable[Record], key: str) -> Iterator[Record]:
+def _records_with(records: Iterable[Record], key: str) -> Iterator[Record]:
     return (one for one in records if one[key])
 
 

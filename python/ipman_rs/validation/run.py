@@ -15,7 +15,7 @@ from ..body.sites import FEWEST_POINTS
 from ..data import check, judge, markers, opensim
 from ..data.force_plates import ForcePlates
 from ..data.markers import own
-from ..data.markers.judged import of_tracks
+from ..data.markers.judged import check_tracks
 from ..data.tracks import Tracks
 from ..files import safe_npz, write_whole
 from ..files.errors import FileError
@@ -25,9 +25,9 @@ from ..fitting.jobs.recordings import Pace, Recording, kept
 from ..fitting.jobs.run import Settings
 from ..io.parameters import read_npz
 from ..progress import Progress, silent
-from . import Comparison, computed, figures, measured, pictures, report
+from . import MeasuredComparison, computed, figures, measured, pictures, report
 from .figures import SPREAD
-from .folder import Kinds, Trial, find
+from .folder import Kinds, Trial, find_trials
 
 Record = dict[str, Any]
 
@@ -55,7 +55,7 @@ class Plan:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredTrial:
     """A recording as it was measured: plates at their own times, the reference (T, 3) m at the markers'.
 
     `idle`: what was measured beside the markers is of no use; the recording can only give its shape to others.
@@ -78,7 +78,7 @@ class Measured:
 
 
 @dataclass
-class Told:
+class RunLog:
     """What is said beside the figures: notes, and the files that failed."""
 
     notes: list[str] = field(default_factory=list)
@@ -102,7 +102,7 @@ def plan(
     """
     import ipman_rs as ip
 
-    trials, notes, unreadable = find(folder, KINDS, output)
+    trials, notes, unreadable = find_trials(folder, KINDS, output)
     names = [trial.name for trial in trials]
     if person not in ("auto", "none", *names):
         raise ValueError(f"--person: expected auto, none or one of {', '.join(names)}, got {person!r}")
@@ -115,17 +115,17 @@ def plan(
 
 def run(plan: Plan, progress: Progress = silent) -> tuple[list[Record], list[str], list[FileError]]:
     """The figures of every recording that could be compared, what was assumed, and those that failed."""
-    told = Told([*plan.notes], [FileError(path, what) for path, what in plan.unreadable.items()])
+    told = RunLog([*plan.notes], [FileError(path, what) for path, what in plan.unreadable.items()])
     ready = [one for trial in plan.trials for one in [_read(plan, trial, told)] if one is not None]
     records: list[Record] = []
     for owner in dict.fromkeys(one.trial.owner for one in ready):
-        records += _person(plan, [one for one in ready if one.trial.owner == owner], told, progress)
+        records += _run_person(plan, [one for one in ready if one.trial.owner == owner], told, progress)
     return records, told.notes, told.failures
 
 
-def _person(plan: Plan, recordings: list[Measured], told: Told, progress: Progress) -> list[Record]:
+def _run_person(plan: Plan, recordings: list[MeasuredTrial], told: RunLog, progress: Progress) -> list[Record]:
     """The figures of all recordings of one person, that of standing still first: its shape and weight are needed."""
-    chosen = _chosen(plan, recordings, told)
+    chosen = _trial_of_shape(plan, recordings, told)
     if all(one.plates is None and one.reference is None for one in recordings):
         return []
     recordings = [one for one in recordings if not one.idle or one.trial.name == chosen]
@@ -134,10 +134,10 @@ def _person(plan: Plan, recordings: list[Measured], told: Told, progress: Progre
     for one in sorted(recordings, key=lambda one: (one.trial.name != chosen, not (one.trial.still or one.still))):
         name = one.trial.name
         try:
-            fit = _fitted(plan, one, shape, progress)
+            fit = _fit(plan, one, shape, progress)
             if name == chosen:
                 shape = name
-            records.append(_compared(plan, one, fit, weight, told, progress))
+            records.append(_compare(plan, one, fit, weight, told, progress))
         except OSError:
             raise  # the output, which is that of all recordings, cannot be written
         except Exception as error:  # whatever it is, the other recordings were not the cause
@@ -146,7 +146,7 @@ def _person(plan: Plan, recordings: list[Measured], told: Told, progress: Progre
                 told.notes.append(f"{name} could not be compared: the others found their shapes themselves")
             continue
         told.notes += [f"{name}: {note}" for note in fit["notes"] if note not in one.tracks.notes]
-        if np.isnan(weight) and _weighs(records[-1]):
+        if np.isnan(weight) and _gives_weight(records[-1]):
             weight = records[-1]["mass"]["plates"]
     return records
 
@@ -156,7 +156,7 @@ def _failure(trial: Trial, error: Exception) -> FileError:
     return FileError(trial.markers, f"cannot be compared: {type(error).__name__}{f': {error}' if str(error) else ''}")
 
 
-def _chosen(plan: Plan, recordings: list[Measured], told: Told) -> str | None:
+def _trial_of_shape(plan: Plan, recordings: list[MeasuredTrial], told: RunLog) -> str | None:
     """The recording whose shape is kept: by its name, or because its markers hardly move."""
     names = [one.trial.name for one in recordings]
     if plan.person != "auto":
@@ -171,18 +171,18 @@ def _chosen(plan: Plan, recordings: list[Measured], told: Told) -> str | None:
     return still[0]
 
 
-def _weighs(record: Record) -> bool:
+def _gives_weight(record: Record) -> bool:
     """Whether a recording says what the person weighs: all of it was on plates, and nothing moved."""
     mass = record["mass"]
     quiet = record["kind"] == "quiet standing" and mass["plates"] is not None
     return quiet and mass["plates_std"] < SPREAD * mass["plates"] and not record["frames_beside_plates"]
 
 
-def _read(plan: Plan, trial: Trial, told: Told) -> Measured | None:
+def _read(plan: Plan, trial: Trial, told: RunLog) -> MeasuredTrial | None:
     """A recording's files, judged before anything is fitted; None, and a failure, if its markers cannot be used."""
     try:
         tracks = _tracks(plan, trial)
-        flags = [*_admitted(trial.markers, _of_markers(plan, tracks), plan.settings.force)]
+        flags = [*_flags(trial.markers, _marker_findings(plan, tracks), plan.settings.force)]
         told.notes += [f"{trial.name}: {note}" for note in tracks.notes]
     except FileError as error:
         told.failures.append(error)
@@ -203,7 +203,7 @@ def _read(plan: Plan, trial: Trial, told: Told) -> Measured | None:
     except FileError as error:
         told.failures.append(error)
     idle = plates is None and reference is None and len(told.failures) > failed
-    return Measured(trial, tracks, plates, reference, flags, idle)
+    return MeasuredTrial(trial, tracks, plates, reference, flags, idle)
 
 
 def _tracks(plan: Plan, trial: Trial) -> Tracks:
@@ -214,17 +214,17 @@ def _tracks(plan: Plan, trial: Trial) -> Tracks:
         raise FileError(trial.markers, str(error)) from error
 
 
-def _of_markers(plan: Plan, tracks: Tracks) -> list[check.Finding]:
+def _marker_findings(plan: Plan, tracks: Tracks) -> list[check.Finding]:
     """What the judge says of the markers before they are fitted; here --rate is another one."""
     import ipman_rs as ip
 
     said = plan.settings
     names = None if said.markers is None else own.read(said.markers, ip.load_body(said.model))
-    found = of_tracks(tracks, names, said.up is not None)
+    found = check_tracks(tracks, names, said.up is not None)
     return [replace(each, option=each.option.replace("--rate", "--recorded-rate")) for each in found]
 
 
-def _admitted(path: Path, findings: Iterable[check.Finding], force: bool) -> tuple[str, ...]:
+def _flags(path: Path, findings: Iterable[check.Finding], force: bool) -> tuple[str, ...]:
     """What is odd. Raises FileError for what cannot be."""
     try:
         return judge.admit(path, findings, force)
@@ -243,7 +243,9 @@ def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
     except (ValueError, ImportError) as error:
         raise FileError(trial.forces, str(error)) from error
     centers = found.at(tracks.times).center()
-    for each in opensim.loaded(found, tracks.times) or opensim.among(centers, tracks, "centre of pressure"):
+    for each in opensim.check_loads(found, tracks.times) or opensim.check_near_markers(
+        centers, tracks, "centre of pressure"
+    ):
         raise FileError(trial.forces, f"{each.what}; {each.advice}")
     return found
 
@@ -259,18 +261,18 @@ def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
         first, last = tracks.times[0], tracks.times[-1]
         what = f"no centre of mass while the markers were recorded, t {first:.2f} to {last:.2f} s"
         raise FileError(trial.com, f"{what}; are both of one recording, with one clock?")
-    for each in opensim.among(found, tracks, "centre of mass"):
+    for each in opensim.check_near_markers(found, tracks, "centre of mass"):
         raise FileError(trial.com, f"{each.what}; {each.advice}")
     return found
 
 
-def _fitted(plan: Plan, one: Measured, person: str | None, progress: Progress) -> Record:
+def _fit(plan: Plan, one: MeasuredTrial, person: str | None, progress: Progress) -> Record:
     every = max(1, round((one.tracks.rate or 1.0) / plan.pace))
     recording = Recording(one.trial.name, str(one.trial.markers), [one.trial.markers])
     return kept(recording, plan.settings, Pace(every), plan.output, plan.resume, person, progress)
 
 
-def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told, progress: Progress) -> Record:
+def _compare(plan: Plan, one: MeasuredTrial, fit: Record, weight: float, told: RunLog, progress: Progress) -> Record:
     """The figures of a fitted recording, whose person weighs `weight` kg; its series and pictures are written."""
     trial = one.trial
     folder = plan.output / trial.name
@@ -283,7 +285,7 @@ def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told,
     rows = np.abs(one.tracks.times[:, None] - times).argmin(axis=0)
     confidence = one.tracks.confidence[rows]
     try:
-        compared = Comparison(
+        compared = MeasuredComparison(
             trial.name,
             times,
             found,
@@ -296,7 +298,7 @@ def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told,
     except ValueError as error:
         raise FileError(trial.com or trial.forces or trial.markers, str(error)) from error
     points = np.where(confidence[..., None] > 0, one.tracks.points[rows], np.nan)
-    files = _drawn(compared, stored, points, told, progress)
+    files = _draw(compared, stored, points, told, progress)
     for name, content in files.items():
         write_whole(folder / name, content)
     fitted = {"shape_from": fit["shape_from"], "markers": fit["mean_marker_error_m"], "converged": fit["converged"]}
@@ -304,8 +306,8 @@ def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told,
     return {**record, "flags": [*dict.fromkeys([*one.flags, *fit["flags"], *record["flags"]])]}
 
 
-def _drawn(
-    compared: Comparison, stored: Any, points: NDArray[np.float64], told: Told, progress: Progress
+def _draw(
+    compared: MeasuredComparison, stored: Any, points: NDArray[np.float64], told: RunLog, progress: Progress
 ) -> dict[str, bytes]:
     """The series and the pictures, by file name; of pictures of which there is nothing to draw, a note."""
     series = report.series(compared)

@@ -50,7 +50,7 @@ class Image:
         return {index: each for index, each in enumerate(self.people) if isinstance(each, Person)}
 
 
-def each(entries: Sequence[Any], person: Callable[[Any, str], Person], place: str) -> list[Person | str]:
+def read_people(entries: Sequence[Any], person: Callable[[Any, str], Person], place: str) -> list[Person | str]:
     """The people of these entries, each read on its own: what is wrong with one says nothing about the others."""
     found: list[Person | str] = []
     for index, entry in enumerate(entries):
@@ -77,20 +77,20 @@ def numbers(value: Any, rows: int, columns: int, place: str) -> Array:
     found = array(value, place)
     if found.shape not in ((rows * columns,), (rows, columns)):
         raise ValueError(f"{place}: expected {rows} points of {columns} numbers, got {_shape(found)}")
-    return finite(found.reshape(rows, columns), place)
+    return finite_points(found.reshape(rows, columns), place)
 
 
 def _shape(found: Array) -> str:
     return "none" if found.size == 0 else f"shape {found.shape}"
 
 
-def counts(layouts: Mapping[int, tuple[str, Layout]]) -> str:
+def expected_counts(layouts: Mapping[int, tuple[str, Layout]]) -> str:
     """How many points a person may have, for errors."""
     said = [f"{count} ({name})" for count, (name, _) in layouts.items()]
     return f"{', '.join(said[:-1])} or {said[-1]}"
 
 
-def finite(points: Array, place: str) -> Array:
+def finite_points(points: Array, place: str) -> Array:
     """Points (K, C) of finite numbers, or of none at all: without x and y a point is NaN. ValueError for others."""
     missing = np.isnan(points[:, 0]) & np.isnan(points[:, 1])
     wrong = np.argwhere(~np.isfinite(points) & ~missing[:, None])
@@ -104,7 +104,7 @@ def finite(points: Array, place: str) -> Array:
     return points
 
 
-def not_found(points: Array, places: Sequence[float] = NOWHERE) -> tuple[Array, tuple[str, ...]]:
+def mark_not_found(points: Array, places: Sequence[float] = NOWHERE) -> tuple[Array, tuple[str, ...]]:
     """Points (K, 3), those with the score 0 that lie exactly where programs put what they did not find; and a note of
     each such place."""
     points, notes = points.copy(), []
@@ -116,7 +116,7 @@ def not_found(points: Array, places: Sequence[float] = NOWHERE) -> tuple[Array, 
     return points, tuple(notes)
 
 
-def scored(points: Array, place: str) -> Array:
+def check_scores(points: Array, place: str) -> Array:
     """Points (K, 3) whose third number can be a score. ValueError for others."""
     scores = points[~np.isnan(points[:, 2]), 2]
     if not len(scores):
@@ -158,7 +158,7 @@ def width_height(value: Any, place: str) -> tuple[float, float]:
     return width, height
 
 
-def plain(value: Any) -> str:
+def short_label(value: Any) -> str:
     """What a file says, for labels and errors: lists and objects, which may be deep, only by what they are."""
     return str(value)[:80] if isinstance(value, (str, int, float)) else type(value).__name__
 

@@ -71,7 +71,7 @@ def _without_side(name: str) -> str:
     return name.removeprefix("left_").removeprefix("right_")
 
 
-def of_tracks(
+def check_tracks(
     tracks: Tracks,
     own: Mapping[str, Meaning | None] | None = None,
     up_is_said: bool = False,
@@ -82,13 +82,13 @@ def of_tracks(
     seen, _ = seen_names(tracks)
     meant = meanings_of(seen, own)
     unknown = [name for name in seen if name not in meant]
-    found = judge.known_markers([*meant], unknown, FEWEST_POINTS) + of_rate(tracks)
+    found = judge.known_markers([*meant], unknown, FEWEST_POINTS) + check_rate(tracks)
     if not meant:
         return found
-    placed = of_points(tracks, meant, up_is_said)
+    placed = check_points(tracks, meant, up_is_said)
     if ground is not None and not any(each.level == "wrong" for each in placed):
-        placed += of_floor(tracks, meant, ground)
-    return found + coverage([*meant], meant) + placed
+        placed += check_floor(tracks, meant, ground)
+    return found + check_coverage([*meant], meant) + placed
 
 
 def seen_names(tracks: Tracks) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -97,28 +97,28 @@ def seen_names(tracks: Tracks) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(np.array(tracks.names)[seen].tolist()), tuple(np.array(tracks.names)[~seen].tolist())
 
 
-def of_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool = False) -> list[Finding]:
+def check_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool = False) -> list[Finding]:
     """Size, place and stance of the markers whose places are known; `up_is_said`: by the user, who knows.
 
     Axes are the file's own: option `--up` names them.
     """
     known = tracks.select([name for name in tracks.names if name in meanings])
-    rows = rows_to_judge(known)
+    rows = sampled_rows(known)
     points = np.where(known.confidence[rows, :, None] > 0, known.points[rows], np.nan)
     if not len(points):
         return []
-    found = of_size(points, known.unit)
+    found = check_size(points, known.unit)
     if any(each.level == "wrong" for each in found):
         return found
     with np.errstate(invalid="ignore"):
         found += judge.far("markers", points[np.isfinite(points).all(axis=-1)])
     rotation = TO_Y_UP[tracks.up]
-    up = ways(points @ rotation, known, meanings)
-    found += sides(points, known, meanings)
+    up = feet_to_head(points @ rotation, known, meanings)
+    found += check_sides(points, known, meanings)
     return found + ([] if up_is_said else check.upright("markers", up, Ground(rotation[1])))
 
 
-def of_size(points: Array, unit: float) -> list[Finding]:
+def check_size(points: Array, unit: float) -> list[Finding]:
     """Whether points (T, M, 3) m of a person can be, that were given in units of so many metres."""
     found = check.size_of_body("markers", points)
     if not any(each.level == "wrong" for each in found):
@@ -131,10 +131,10 @@ def of_size(points: Array, unit: float) -> list[Finding]:
     return [Finding("wrong", f"markers: {said}, if the file's unit is right", option=option)]
 
 
-def of_floor(tracks: Tracks, meanings: Mapping[str, Meaning], ground: float = 0.0) -> list[Finding]:
+def check_floor(tracks: Tracks, meanings: Mapping[str, Meaning], ground: float = 0.0) -> list[Finding]:
     """Whether the lowest marker of each frame is not below a floor at y = `ground` m."""
     known = tracks.select([name for name in tracks.names if name in meanings])
-    rows = rows_to_judge(known)
+    rows = sampled_rows(known)
     if not len(rows):
         return []
     heights = np.where(known.confidence[rows] > 0, known.points[rows, :, 1], np.inf).min(axis=1) - ground
@@ -146,17 +146,17 @@ def of_floor(tracks: Tracks, meanings: Mapping[str, Meaning], ground: float = 0.
     return [Finding("odd", said, option="--ground HEIGHT")]
 
 
-def of_rate(tracks: Tracks) -> list[Finding]:
+def check_rate(tracks: Tracks) -> list[Finding]:
     return judge.rate(tracks.rate) if len(tracks) > 1 else []
 
 
-def rows_to_judge(tracks: Tracks) -> NDArray[np.int64]:
+def sampled_rows(tracks: Tracks) -> NDArray[np.int64]:
     """Frames in which something was seen, a few hundred of them."""
     seen = np.flatnonzero(tracks.confidence.any(axis=1))
     return seen[check.evenly(len(seen))]
 
 
-def ways(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> Array:
+def feet_to_head(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> Array:
     """From the feet, or the legs, to the head, the trunk or the pelvis: (T, 3), NaN where neither was seen."""
     places = [meanings[name] for name in tracks.names]
     regions = np.array([region(place) for place in places])
@@ -169,13 +169,13 @@ def ways(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> Arra
     return _mean(points[:, upper]) - _mean(points[:, lower])
 
 
-def sides(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> list[Finding]:
+def check_sides(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> list[Finding]:
     """Whether what is called left in points (T, M, 3) is on the left of those who face as their front and back say.
 
     In their own axes, so whichever way they stand or lie.
     """
     places = [place if isinstance(place, str) else "" for place in (meanings[name] for name in tracks.names)]
-    up = ways(points, tracks, meanings)
+    up = feet_to_head(points, tracks, meanings)
     turned = {part: _handedness(points, places, up, *words) for part, words in FACING.items()}
     known = {part: sign for part, sign in turned.items() if sign}
     swapped = [part for part, sign in known.items() if sign < 0]
@@ -208,7 +208,7 @@ def _mean(points: Array) -> Array:
         return np.where(known, points, 0).sum(axis=1) / known.sum(axis=1)
 
 
-def coverage(known: Sequence[str], meanings: Mapping[str, Meaning]) -> list[Finding]:
+def check_coverage(known: Sequence[str], meanings: Mapping[str, Meaning]) -> list[Finding]:
     """What the markers that were seen do not say of the body."""
     seen = {region(meanings[name]) for name in known}
     if not seen & {"head", "trunk", "arms"}:
@@ -223,7 +223,7 @@ def coverage(known: Sequence[str], meanings: Mapping[str, Meaning]) -> list[Find
     return [Finding("odd", f"no marker on {parts} was ever seen: there the body's mean is shown")]
 
 
-def of_skin(distances: Mapping[str, float]) -> list[Finding]:
+def check_skin(distances: Mapping[str, float]) -> list[Finding]:
     """Markers that are not on the skin of the fitted body: distances in metres, by name."""
     off = {name: away for name, away in distances.items() if not SKIN[0] <= away <= SKIN[1]}
     if not off:

@@ -10,7 +10,7 @@ SUFFIX = "_stageii.pkl"
 
 
 @dataclass(frozen=True)
-class Recorded:
+class SequenceFiles:
     """The files of a sequence, of which only the body's must be there."""
 
     session: Path
@@ -37,14 +37,14 @@ class Recorded:
         return self.session / "images" / self.split / self.name / f"YOGI_Cam_{camera:02d}"
 
 
-def recorded_sequences(root: Path, split: str | None) -> list[Recorded]:
+def find_sequences(root: Path, split: str | None) -> list[SequenceFiles]:
     if split is not None and split not in SPLITS:
         raise ValueError(f"split: expected one of {', '.join(SPLITS)}, got {split!r}")
     if not root.is_dir():
         raise ValueError(f"{root}: expected a folder with mosh/train/*{SUFFIX} in it, {_what(root)}")
     sessions = [root] if (root / "mosh").is_dir() else sorted(each.parent for each in root.glob("*/mosh"))
     found = [
-        Recorded(session, part, file.name.removesuffix(SUFFIX))
+        SequenceFiles(session, part, file.name.removesuffix(SUFFIX))
         for session in sessions
         for part in (SPLITS if split is None else (split,))
         for file in sorted((session / "mosh" / part).glob(f"*{SUFFIX}"))

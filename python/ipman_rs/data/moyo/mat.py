@@ -12,13 +12,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files import regular, safe_pickle
+from ipman_rs.files import regular_file, safe_pickle
 
 from ...files import safe_xml
 from .. import c3d
 from ..check import Finding
 from ..frames import PressureMaps
-from .files import Recorded
+from .files import SequenceFiles
 
 Array = NDArray[np.float64]
 
@@ -117,7 +117,7 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
 
     ValueError, naming the file, for what is missing, damaged, with gaps, or at another rate than 60 Hz.
     """
-    regular(path)
+    regular_file(path)
     try:
         with Path(path).open(encoding="utf-8-sig", errors="replace", newline="") as stream:
             lines = [row for row in csv.reader(stream) if any(field.strip() for field in row)]
@@ -189,7 +189,7 @@ def corners(path: str | os.PathLike[str]) -> Array:
     return found[[int(each[0]) for each in order]]
 
 
-def in_the_world(mat: Mat, outline: Array, path: Path) -> PressureMaps:
+def place_maps(mat: Mat, outline: Array, path: Path) -> PressureMaps:
     """The maps in the world: the cells are centred in the rectangle of the corner markers, which lie on the rim."""
     first, second, third, fourth = outline
     rows, columns = (second + third - first - fourth) / 2, (third + fourth - first - second) / 2
@@ -205,7 +205,7 @@ def in_the_world(mat: Mat, outline: Array, path: Path) -> PressureMaps:
     return PressureMaps(mat.maps, origin, e1, e2, mat.cell)
 
 
-def loads_agree(files: Recorded) -> list[Finding]:
+def check_loads(files: SequenceFiles) -> list[Finding]:
     """Whether maps and centres of pressure agree on force and place."""
     try:
         mat, trace = read_maps(files.mat[0]), read_trace(files.mat[1])

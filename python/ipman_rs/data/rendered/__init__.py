@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..check import SAMPLE, Finding, of_frames
+from ..check import SAMPLE, Finding, check_frames
 from .layout import SPLITS
 from .reader import BadSample, Labels, Rendered
 
@@ -58,4 +58,4 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
     if len(data.bad) > 10:
         found.append(Finding("wrong", f"{len(data.bad)} bad samples in all"))
     good = np.flatnonzero(~np.isin(data.names, list(data.bad)))
-    return found + (of_frames(data[good[:: -(-len(good) // SAMPLE)]]) if len(good) else [])
+    return found + (check_frames(data[good[:: -(-len(good) // SAMPLE)]]) if len(good) else [])

@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ipman_rs.files import being_written, parse_json, safe_npz
+from ipman_rs.files import atomic_write, parse_json, safe_npz
 
 from ..numpy_or_torch import as_array
 from .bootstrap import Interval, bootstrap
-from .clusters import CLUSTERS, fingerprints, pooled
+from .clusters import CLUSTERS, fingerprints, pooled_clusters
 from .exact_sum import exact
-from .metric_sums import Column, Summary
+from .metric_sums import MetricSums, Summary
 
 FORMAT = "ipman_rs accumulator 1"
 ARRAYS = ("sums", "counts", "prints", "squares", "edges")
@@ -45,7 +45,7 @@ class Accumulator:
 
     def __init__(self) -> None:
         self._rows: dict[str, int] | None = {}  # of each sequence; None once they are pooled
-        self._columns: dict[str, Column] = {}
+        self._columns: dict[str, MetricSums] = {}
 
     def add(
         self,
@@ -73,7 +73,7 @@ class Accumulator:
         words = {metric: _words(metric, why, len(frames)) for metric in figures}
         rows, prints = self._rows_of(groups), fingerprints(frames)
         for metric, value in values.items():
-            self._columns.setdefault(metric, Column()).add(value, rows, prints, words[metric])
+            self._columns.setdefault(metric, MetricSums()).add(value, rows, prints, words[metric])
 
     def merge(self, other: Accumulator) -> None:
         """The frames of another accumulator, which stays as it is and must hold none that are here already."""
@@ -83,7 +83,7 @@ class Accumulator:
         else:
             rows = self._rows_of(list(other._rows))
         for metric, column in other._columns.items():
-            self._columns.setdefault(metric, Column()).merge(column, rows)
+            self._columns.setdefault(metric, MetricSums()).merge(column, rows)
 
     def summary(self) -> dict[str, Summary]:
         """By metric, in the order of their names."""
@@ -132,7 +132,7 @@ class Accumulator:
         rows = np.fromiter(order.values(), np.int64)
         arrays = [column.arrays(rows) for column in columns.values()]
         stacked: dict[str, Any] = {name: np.array([each[name] for each in arrays]) for name in ARRAYS} if arrays else {}
-        with being_written(target) as file:
+        with atomic_write(target) as file:
             np.savez(file, head=np.frombuffer(json.dumps(head).encode(), np.uint8), **stacked)
 
     @classmethod
@@ -160,7 +160,7 @@ class Accumulator:
         arrays = {name: safe_npz.read(path, name) for name in ARRAYS} if metrics else {}
         columns = [dict(zip(arrays, row, strict=True)) for row in zip(*arrays.values(), strict=True)]
         for metric, column, counts in zip(metrics, columns, missing, strict=True):
-            found._columns[str(metric)] = Column.of(column, size, counts)
+            found._columns[str(metric)] = MetricSums.of(column, size, counts)
         return found
 
     def _rows_of(self, sequences: Sequence[str]) -> NDArray[np.int64]:
@@ -172,15 +172,15 @@ class Accumulator:
             else:
                 self._rows = {name: row for row, name in enumerate(every)}
         if self._rows is None:
-            return pooled(sequences)
+            return pooled_clusters(sequences)
         return np.array([self._rows[name] for name in sequences], np.int64)
 
     def _pool(self) -> None:
         """From a row a sequence to clusters of sequences."""
         if self._rows is not None:
-            rows = pooled(list(self._rows))
+            rows = pooled_clusters(list(self._rows))
             for metric, apart in self._columns.items():
-                self._columns[metric] = Column()
+                self._columns[metric] = MetricSums()
                 self._columns[metric].merge(apart, rows)
         self._rows = None
 

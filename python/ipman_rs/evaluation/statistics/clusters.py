@@ -20,7 +20,7 @@ def fingerprints(names: Sequence[str]) -> NDArray[np.uint64]:
     return np.frombuffer(packed, "<u8").astype(np.uint64)
 
 
-def pooled(names: Sequence[str]) -> NDArray[np.int64]:
+def pooled_clusters(names: Sequence[str]) -> NDArray[np.int64]:
     """The cluster, 0 … CLUSTERS − 1 of each name where there are too many names: chance, but the same everywhere."""
     return (fingerprints(names) % np.uint64(CLUSTERS)).astype(np.int64)
 
@@ -44,5 +44,5 @@ def differences(
     labels = np.arange(len(difference)).astype(str) if names is None else names[known].astype(str)
     found, rows = np.unique(labels, return_inverse=True)
     if len(found) > CLUSTERS:
-        rows = np.unique(pooled(found.tolist())[rows], return_inverse=True)[1]
+        rows = np.unique(pooled_clusters(found.tolist())[rows], return_inverse=True)[1]
     return difference, np.bincount(rows, difference), np.bincount(rows).astype(np.float64)

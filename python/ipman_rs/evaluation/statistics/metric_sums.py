@@ -26,7 +26,7 @@ class Summary(NamedTuple):
     missing: dict[str, int]  # frames without, by reason
 
 
-class Column:
+class MetricSums:
     """Rows are clusters; all that is here adds up in any order."""
 
     def __init__(self) -> None:
@@ -54,7 +54,7 @@ class Column:
         self.squares += limbs(values**2).sum(axis=0)
         self.least, self.largest = min(self.least, float(values.min())), max(self.largest, float(values.max()))
 
-    def merge(self, other: Column, rows: NDArray[np.int64]) -> None:
+    def merge(self, other: MetricSums, rows: NDArray[np.int64]) -> None:
         """Another column whose row i is our row rows[i]."""
         number = len(rows)
         np.add.at(self.sums, rows, other.sums[:number])
@@ -75,7 +75,7 @@ class Column:
         }
 
     @classmethod
-    def of(cls, arrays: Mapping[str, NDArray[Any]], size: int, missing: Mapping[str, int]) -> Column:
+    def of(cls, arrays: Mapping[str, NDArray[Any]], size: int, missing: Mapping[str, int]) -> MetricSums:
         """From `arrays` of `size` rows. ValueError where they are not what that gives."""
         found = cls()
         for name, expected in found.arrays(np.arange(size)).items():

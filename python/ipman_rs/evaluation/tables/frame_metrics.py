@@ -18,8 +18,8 @@ from ipman_rs.data.frames import Frames
 from ipman_rs.ground import Ground
 
 from .. import bose, com_error, cop_error, foot_skating, hover, moyo, mpjpe, pa_mpjpe, penetration, pve, reasons, tilt
-from .joints import compared
-from .models import Bodies
+from .joints import paired_joints
+from .models import FrameBodies
 
 if TYPE_CHECKING:
     from .job import Job
@@ -32,19 +32,19 @@ _PELVIS = ("pelvis", "left_hip", "right_hip", "spine1")  # one rigid piece
 _METHODS = ("exact", "vertex_mean", "sample_mean", "face_area")  # beside pCoM
 
 
-def columns(job: Job, start: int, stop: int) -> Columns:
+def piece_metrics(job: Job, start: int, stop: int) -> Columns:
     """`names`, `sequences` and the figures of the frames from `start` to `stop` of a job's data set, each (n,)."""
     parts = []
     for first in range(start, stop, AT_ONCE):
         last = min(first + AT_ONCE, stop)
         true, estimated, kept = job.pair(slice(max(first - 1, 0), last))  # skating: from the frame before
-        found = figures(true, estimated, job)
+        found = pair_metrics(true, estimated, job)
         own = slice(int(len(kept) > 0 and kept[0] < first), None)
         parts.append({name: value[own] for name, value in found.items()})
-    return joined(parts)
+    return join_pieces(parts)
 
 
-def joined(parts: list[Columns]) -> Columns:
+def join_pieces(parts: list[Columns]) -> Columns:
     """One after the other; NaN where a part lacks a figure that another has."""
     known = list(dict.fromkeys(name for part in parts for name in part))
     lengths = [len(part["names"]) for part in parts]
@@ -54,7 +54,7 @@ def joined(parts: list[Columns]) -> Columns:
     }
 
 
-def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
+def pair_metrics(true: Frames, estimated: Frames, job: Job) -> Columns:
     """Of frames that belong together row by row. ValueError where a body model is missing or shapes do not fit."""
     truth, guess = job.bodies.posed(true), job.bodies.posed(estimated)
     ground = true.ground if estimated.ground is None else estimated.ground
@@ -72,7 +72,7 @@ def figures(true: Frames, estimated: Frames, job: Job) -> Columns:
     return found
 
 
-def _finite(bodies: Bodies, count: int) -> NDArray[np.bool_]:
+def _finite(bodies: FrameBodies, count: int) -> NDArray[np.bool_]:
     """Of vertices all; of joints some, for a data set may know a few of those that it names."""
     if bodies.vertices is not None:
         return np.asarray(np.isfinite(bodies.vertices).all(axis=(1, 2)))
@@ -82,12 +82,12 @@ def _finite(bodies: Bodies, count: int) -> NDArray[np.bool_]:
     return np.asarray(np.logical_or.reduce(known, axis=1))
 
 
-def _points(truth: Bodies, guess: Bodies, job: Job) -> Columns:
+def _points(truth: FrameBodies, guess: FrameBodies, job: Job) -> Columns:
     """Errors of joints and vertices."""
     found: Columns = {}
     joints = None
     if job.definition is not None:
-        joints = compared(truth, guess, job.definition, job.joint_regressors)
+        joints = paired_joints(truth, guess, job.definition, job.joint_regressors)
         found["mpjpe"] = pve(joints.estimated, joints.true, joints.root, joints.true_root)
         found["pa_mpjpe"] = pa_mpjpe(joints.estimated, joints.true)
         found["mpjpe_world"] = mpjpe(joints.estimated, joints.true, root=None)
@@ -98,13 +98,13 @@ def _points(truth: Bodies, guess: Bodies, job: Job) -> Columns:
     return found
 
 
-def _tilt(truth: Bodies, guess: Bodies, ground: Ground, true_ground: Ground) -> Columns:
+def _tilt(truth: FrameBodies, guess: FrameBodies, ground: Ground, true_ground: Ground) -> Columns:
     if not {*_PELVIS} <= {*truth.joint_names} & {*guess.joint_names}:
         return {}
     return {"tilt": tilt(_pelvis(guess), _pelvis(truth), ground, true_ground)}
 
 
-def _pelvis(bodies: Bodies) -> NDArray[Any]:
+def _pelvis(bodies: FrameBodies) -> NDArray[Any]:
     return np.asarray(bodies.joints)[:, [bodies.joint_names.index(name) for name in _PELVIS]]
 
 

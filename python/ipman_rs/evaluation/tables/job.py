@@ -26,15 +26,15 @@ from ipman_rs.volume import mass_properties
 
 from ..procrustes import similarity
 from . import predictions as predicted
-from .frame_metrics import Columns, columns
-from .joints import Definition, Regressors, compared, define
+from .frame_metrics import Columns, piece_metrics
+from .joints import Definition, Regressors, define, paired_joints
 from .models import Models
 from .resumable import Resumable
 
 PIECE = 4096  # frames: some seconds of work, and small in memory
-WEIGHED = 16  # bodies
-TURNED = 60.0  # degrees: a smaller turn is an error of the estimate
-ALIKE = 30.0  # degrees of single people's turns about their mean
+SAMPLED_BODIES = 16  # bodies
+LARGE_TURN = 60.0  # degrees: a smaller turn is an error of the estimate
+COMMON_TURN = 30.0  # degrees of single people's turns about their mean
 OWN = "own"  # the data set of the user's own files, in the form of predictions
 TRUTH = "truth"  # instead of a file of predictions: the data set's own bodies
 
@@ -124,7 +124,9 @@ class Job(Resumable):
 
     @cached_property
     def estimates(self) -> predicted.Predictions:
-        return predicted.read(self.predictions, self.unpacked, predicted.Reading(self.unit, self.degrees, self.force))
+        return predicted.read(
+            self.predictions, self.unpacked, predicted.ReadOptions(self.unit, self.degrees, self.force)
+        )
 
     @cached_property
     def bodies(self) -> Models:
@@ -196,7 +198,7 @@ class Job(Resumable):
 
     def _masses(self) -> list[check.Finding]:
         """Of a few estimated bodies."""
-        bodies = self.bodies.posed(self.estimates[check.evenly(len(self.estimates), WEIGHED)])
+        bodies = self.bodies.posed(self.estimates[check.evenly(len(self.estimates), SAMPLED_BODIES)])
         if bodies.vertices is None or bodies.model is None:
             return []
         masses = mass_properties(bodies.vertices, bodies.model.template).mass
@@ -223,31 +225,31 @@ class Job(Resumable):
             return []
         normal = ground.normal if ground.normal.ndim == 1 else ground.normal[0]
         standing = replace(some, joints=bodies.joints, joint_names=bodies.joint_names, ground=Ground(normal))
-        found = [each for each in check.of_frames(standing) if each.what.startswith("joints: looks like")]
+        found = [each for each in check.check_frames(standing) if each.what.startswith("joints: looks like")]
         return [replace(each, advice=self._other_axes, option="") for each in found]
 
     def _turned(self) -> list[check.Finding]:
         """Whether the estimated people fit the true ones only when they are turned, as from a camera's axes."""
         from scipy.spatial.transform import Rotation
 
-        true = self._truth(check.evenly(len(self.data), WEIGHED))
+        true = self._truth(check.evenly(len(self.data), SAMPLED_BODIES))
         where = self.estimates.index.find(true.names)
         there = np.flatnonzero(where >= 0)
         if self.definition is None or not len(there):
             return []
         truth, guess = self.bodies.posed(true[there]), self.bodies.posed(self.estimates[where[there]])
-        joints = compared(truth, guess, self.definition, self.joint_regressors)
+        joints = paired_joints(truth, guess, self.definition, self.joint_regressors)
         _, matrices, _ = similarity(joints.true, joints.estimated)
         matrices = matrices[np.isfinite(matrices).all(axis=(1, 2))]
         if not len(matrices):
             return []
         turns = Rotation.from_matrix(matrices)
         angle = float(np.degrees(np.median(turns.magnitude())))
-        if angle <= TURNED:
+        if angle <= LARGE_TURN:
             return []
         said = f"predicted people are the true ones turned by {angle:.0f} degrees in the median"
         mean = turns.mean()
-        if np.degrees(np.median((mean.inv() * turns).magnitude())) < ALIKE:
+        if np.degrees(np.median((mean.inv() * turns).magnitude())) < COMMON_TURN:
             axis = mean.as_rotvec() / mean.magnitude()
             axis *= np.sign(axis[np.abs(axis).argmax()]) if angle > 179 else 1.0  # either way about it is the same
             said += f", about ({', '.join(f'{number + 0.0:.2g}' for number in axis.round(2))})"
@@ -302,7 +304,7 @@ class Job(Resumable):
     def measure(self, number: int) -> None:
         """Does a piece. ValueError where frames have no prediction or something does not fit."""
         start = number * self.piece
-        self.save(number, columns(self, start, start + self.frames(number)))
+        self.save(number, piece_metrics(self, start, start + self.frames(number)))
 
     def damaged(self) -> list[int]:
         """Pieces that are there, but not whole or not of this evaluation: `run` does them again."""
@@ -352,7 +354,7 @@ def _content(frames: Frames) -> str:
     return digest.hexdigest()
 
 
-def methods(files: Sequence[Path]) -> list[str]:
+def method_names(files: Sequence[Path]) -> list[str]:
     """A name for each file of predictions, its own where no other has it."""
     found: list[str] = []
     for path in files:

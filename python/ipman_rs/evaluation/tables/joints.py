@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ipman_rs.body import joint_regressors
 from ipman_rs.body.joint_regressors import HUMAN36M, JointRegressor
 
-from .models import Bodies
+from .models import FrameBodies
 
 Points = NDArray[Any]
 Maker = Literal["given", "own", "extra", "h36m"]
@@ -78,7 +78,7 @@ class Definition:
 
 
 @dataclass(frozen=True)
-class Compared:
+class PairedJoints:
     """Joints (F, K, 3) of the same names, and the root (F, 3) of each."""
 
     true: Points
@@ -88,7 +88,7 @@ class Compared:
 
 
 def define(
-    truth: Bodies, estimate: Bodies, measured: frozenset[str], regressors: Regressors, data: str
+    truth: FrameBodies, estimate: FrameBodies, measured: frozenset[str], regressors: Regressors, data: str
 ) -> Definition | None:
     """How these two are compared; None where they share fewer than three joints, or no pelvis and no hips.
 
@@ -115,11 +115,13 @@ def define(
     return Definition(names, roots, *makers, same, _words(truth, estimate, makers, same, names, roots))
 
 
-def compared(truth: Bodies, estimate: Bodies, definition: Definition, regressors: Regressors) -> Compared:
+def paired_joints(
+    truth: FrameBodies, estimate: FrameBodies, definition: Definition, regressors: Regressors
+) -> PairedJoints:
     """The joints of a definition."""
     true = _by_name(truth, definition.truth, regressors)
     guess = _by_name(estimate, definition.estimate, regressors)
-    return Compared(
+    return PairedJoints(
         _stacked(true, definition.names),
         _stacked(guess, definition.names),
         _stacked(true, definition.roots).mean(axis=1),
@@ -127,7 +129,7 @@ def compared(truth: Bodies, estimate: Bodies, definition: Definition, regressors
     )
 
 
-def _by_name(bodies: Bodies, maker: Maker, regressors: Regressors) -> dict[str, Points]:
+def _by_name(bodies: FrameBodies, maker: Maker, regressors: Regressors) -> dict[str, Points]:
     points = np.moveaxis(_points(bodies, maker, regressors), 1, 0)
     return dict(zip(_names(bodies, maker, regressors), points, strict=True))
 
@@ -136,20 +138,20 @@ def _stacked(points: dict[str, Points], names: Sequence[str]) -> Points:
     return np.stack([points[name] for name in names], axis=1)
 
 
-def _makers(truth: Bodies, estimate: Bodies, regressors: Regressors, data: str) -> tuple[Maker, Maker] | None:
+def _makers(truth: FrameBodies, estimate: FrameBodies, regressors: Regressors, data: str) -> tuple[Maker, Maker] | None:
     """What makes the joints of the truth and of the estimate; None where one has neither joints nor a body."""
     true: Maker | None = None
     guess: Maker | None = None
     if truth.vertices is not None and estimate.vertices is not None:
-        true, guess = _of_body(truth, regressors), _of_body(estimate, regressors)
+        true, guess = _maker_of_body(truth, regressors), _maker_of_body(estimate, regressors)
     elif estimate.given is not None:
-        true, guess = "given" if truth.given is not None else _of_body(truth, regressors), "given"
+        true, guess = "given" if truth.given is not None else _maker_of_body(truth, regressors), "given"
     elif truth.given is not None and estimate.vertices is not None:
-        true, guess = "given", _as_measured(estimate, regressors, data)
+        true, guess = "given", _maker_as_measured(estimate, regressors, data)
     return None if true is None or guess is None else (true, guess)
 
 
-def _of_body(bodies: Bodies, regressors: Regressors) -> Maker | None:
+def _maker_of_body(bodies: FrameBodies, regressors: Regressors) -> Maker | None:
     if bodies.vertices is not None and regressors.human36m is not None:
         return "h36m"
     if bodies.vertices is not None and regressors.extra is not None:
@@ -157,10 +159,10 @@ def _of_body(bodies: Bodies, regressors: Regressors) -> Maker | None:
     return "own" if bodies.own is not None else "given" if bodies.given is not None else None
 
 
-def _as_measured(estimate: Bodies, regressors: Regressors, data: str) -> Maker | None:
+def _maker_as_measured(estimate: FrameBodies, regressors: Regressors, data: str) -> Maker | None:
     """What gives a body the joints that a data set measured. ValueError where that takes a regressor."""
     if data not in MEASURED:
-        return _of_body(estimate, regressors)
+        return _maker_of_body(estimate, regressors)
     maker, file = MEASURED[data]
     if (regressors.human36m if maker == "h36m" else regressors.extra) is None:
         raise ValueError(
@@ -171,7 +173,7 @@ def _as_measured(estimate: Bodies, regressors: Regressors, data: str) -> Maker |
     return maker
 
 
-def _names(bodies: Bodies, maker: Maker, regressors: Regressors) -> tuple[str, ...]:
+def _names(bodies: FrameBodies, maker: Maker, regressors: Regressors) -> tuple[str, ...]:
     if maker == "given":
         return bodies.given_names
     if maker == "own":
@@ -182,43 +184,46 @@ def _names(bodies: Bodies, maker: Maker, regressors: Regressors) -> tuple[str, .
     return (*extra, *(name for name in bodies.own_names if name not in extra))
 
 
-def _points(bodies: Bodies, maker: Maker, regressors: Regressors) -> Points:
+def _points(bodies: FrameBodies, maker: Maker, regressors: Regressors) -> Points:
     """Joints (F, K, 3) of `_names`."""
     if maker == "given":
-        return _there(bodies.given)
+        return _required(bodies.given)
     if maker == "own":
-        return _there(bodies.own)
+        return _required(bodies.own)
     if maker == "h36m" and regressors.human36m is not None:
-        return regressors.human36m.joints(_there(bodies.vertices))
+        return regressors.human36m.joints(_required(bodies.vertices))
     if regressors.extra is None:
         raise ValueError("joints: expected a regressor")
-    points = [regressors.extra.joints(_there(bodies.vertices))]
+    points = [regressors.extra.joints(_required(bodies.vertices))]
     if bodies.own is not None:
         points.append(bodies.own[:, [name not in regressors.extra.names for name in bodies.own_names]])
     return np.concatenate(points, axis=1)
 
 
-def _there(points: Points | None) -> Points:
+def _required(points: Points | None) -> Points:
     if points is None:
         raise ValueError("joints: some frames have none, others have them")
     return points
 
 
-def _same(truth: Bodies, estimate: Bodies, makers: tuple[Maker, Maker]) -> bool:
+def _same(truth: FrameBodies, estimate: FrameBodies, makers: tuple[Maker, Maker]) -> bool:
     if makers == ("h36m", "h36m"):
         return True
     return makers[0] == makers[1] != "given" and truth.kind == estimate.kind
 
 
 def _words(
-    truth: Bodies,
-    estimate: Bodies,
+    truth: FrameBodies,
+    estimate: FrameBodies,
     makers: tuple[Maker, Maker],
     same: bool,
     names: tuple[str, ...],
     roots: tuple[str, ...],
 ) -> str:
-    true, guess = _made(truth, makers[0], "the data set gives"), _made(estimate, makers[1], "the predictions give")
+    true, guess = (
+        _maker_words(truth, makers[0], "the data set gives"),
+        _maker_words(estimate, makers[1], "the predictions give"),
+    )
     by = f"truth and estimate by {true}" if same else f"truth by {true}, estimate by {guess}"
     listed = ", ".join(names) if len(names) <= LISTED else f"{names[0]} to {names[-1]}; evaluation.json names them"
     counted = f"{len(names)} joints ({listed})"
@@ -228,7 +233,7 @@ def _words(
     return f"{counted}; {by}; {aligned}. Only the names agree: where definitions differ, errors carry their distance"
 
 
-def _made(bodies: Bodies, maker: Maker, giver: str) -> str:
+def _maker_words(bodies: FrameBodies, maker: Maker, giver: str) -> str:
     """What makes the joints of one side, in words."""
     own = f"the joints of the body {bodies.kind}"
     words: dict[Maker, str] = {

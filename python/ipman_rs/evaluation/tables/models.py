@@ -22,7 +22,7 @@ _BODY_JOINTS = 22  # of every model of the family, in one order
 
 
 @dataclass(frozen=True, eq=False)
-class Bodies:
+class FrameBodies:
     """Posed bodies, or what the frames have of them; arrays (F, n, 3) m."""
 
     kind: str | None  # "smpl", "anny" …
@@ -95,7 +95,7 @@ class Models:
         found = [self._found(kind, gender) for gender in GENDERS]
         return sorted({path for path in found if path is not None})
 
-    def posed(self, frames: Frames) -> Bodies:
+    def posed(self, frames: Frames) -> FrameBodies:
         """Vertices and joints of the frames. ValueError where a pose does not fit its model, or where the pose is all
         that there is and its model is not."""
         vertices, own, kind = frames.vertices, None, frames.body
@@ -104,7 +104,7 @@ class Models:
         if frames.pose is not None and kind is not None and model is not None and vertices is None:
             vertices, own = self._skinned(frames, kind)
         lacking = file_of(frames) if frames.pose is not None and vertices is None else None
-        return Bodies(kind, model, vertices, own, frames.joints, tuple(frames.joint_names or ()), lacking)
+        return FrameBodies(kind, model, vertices, own, frames.joints, tuple(frames.joint_names or ()), lacking)
 
     def _skinned(self, frames: Frames, kind: str) -> tuple[NDArray[Any], NDArray[Any]]:
         pose = np.asarray(frames.pose)
@@ -117,7 +117,7 @@ class Models:
             model = self.get(kind, str(gender), width, frames.rest_shape)
             betas = None if frames.rest_shape is not None else frames.betas
             posed = model(
-                _on_joints(pose[rows], model),
+                _pad_joints(pose[rows], model),
                 None if betas is None else betas[rows, : model.num_betas],
                 None if frames.transl is None else frames.transl[rows],
             )
@@ -156,7 +156,7 @@ def _genders(frames: Frames) -> list[str]:
     return ["neutral"] if frames.genders is None or not len(frames) else np.unique(frames.genders).tolist()
 
 
-def _on_joints(pose: NDArray[Any], model: BodyModel) -> NDArray[Any]:
+def _pad_joints(pose: NDArray[Any], model: BodyModel) -> NDArray[Any]:
     """A pose (F, j, 3) on the joints of a model: those that it lacks at the end (hands, face) are at rest."""
     given, wanted = pose.shape[1], model.num_joints
     if given == wanted:

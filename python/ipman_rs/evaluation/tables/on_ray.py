@@ -41,11 +41,11 @@ def _run(ray: Any, jobs: list[Job], progress: Callable[[int], None]) -> None:
     tasks = ray.remote(num_cpus=1, max_retries=2)(_shard)
     workers = max(1, int(ray.cluster_resources().get("CPU", 1)))
     waiting = []
-    for job in map(_anywhere, jobs):
+    for job in map(_portable, jobs):
         # Several a worker: they end at about the same time although pieces differ.
         count = max(1, min(4 * workers, job.pieces))
         waiting += [tasks.remote(job, Shard(index + 1, count)) for index in range(count)]
-    before = _there(jobs)
+    before = _finished_frames(jobs)
     while waiting:
         done, _ = ray.wait(list(waiting), num_returns=1, timeout=1.0)
         for each in done:
@@ -54,12 +54,12 @@ def _run(ray: Any, jobs: list[Job], progress: Callable[[int], None]) -> None:
                 ray.get(each)
             except ray.exceptions.RayTaskError as error:
                 raise ValueError(str(error.cause)) from None
-        now = _there(jobs)
+        now = _finished_frames(jobs)
         progress(now - before)
         before = now
 
 
-def _anywhere(job: Job) -> Job:
+def _portable(job: Job) -> Job:
     """The same job in words that another process understands: nothing opened, and whole paths."""
 
     def whole(path: str | None) -> str | None:
@@ -80,7 +80,7 @@ def _anywhere(job: Job) -> Job:
     )
 
 
-def _there(jobs: list[Job]) -> int:
+def _finished_frames(jobs: list[Job]) -> int:
     """Frames whose piece is there, whichever task wrote it."""
     return sum(job.frames(number) for job in jobs for number in range(job.pieces) if job.file(number).exists())
 

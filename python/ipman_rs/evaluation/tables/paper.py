@@ -14,7 +14,7 @@ Printed = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Table:
-    """figures: the columns, by their names in `figures.FIGURES`; published: by method, then by figure, as printed.
+    """figures: the columns, by their names in `metrics.METRICS`; published: by method, then by figure, as printed.
 
     options: of the data set's reader, where the user gives no other. regressor: whether the paper compares the joints
     of J_regressor_h36m.npy. across: one row a figure and one column a method, instead of the other way round.

@@ -29,18 +29,18 @@ from numpy.typing import NDArray
 
 from ipman_rs.data import check, judge
 from ipman_rs.data.frames import Frames, Rows
-from ipman_rs.files import regular, safe_npz
+from ipman_rs.files import regular_file, safe_npz
 from ipman_rs.ground import Ground
 
 from . import parquet
 from .layout import FOR_ALL, LABELS, LENGTHS, NUMBERS, POINTS, TEXT
-from .rows import RowsOnDisk, of_npz
+from .rows import RowsOnDisk, open_npz
 
 LISTED = 12  # names of arrays
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadOptions:
     """How a file's numbers are to be read: metres in one of its lengths, and whether its rotations are degrees.
 
     force: what cannot be a person is let in, too."""
@@ -58,7 +58,7 @@ class Predictions:
     columns: dict[str, RowsOnDisk]
     common: dict[str, Any]  # what is one for all frames
     fingerprint: str  # of the file's bytes
-    reading: Reading = Reading()
+    reading: ReadOptions = ReadOptions()
     others: tuple[str, ...] = ()  # further arrays of the file, which nothing reads
 
     def __len__(self) -> int:
@@ -90,7 +90,7 @@ class Predictions:
     @cached_property
     def flags(self) -> tuple[str, ...]:
         """What is odd about a sample, in words. ValueError, naming the option that mends it, for what is wrong."""
-        found = [each for each in check.of_frames(check.sample(self)) if not each.what.startswith("lowest of")]
+        found = [each for each in check.check_frames(check.sample(self)) if not each.what.startswith("lowest of")]
         return judge.admit(self.path, [*found, *self.unused()], self.reading.force)
 
     def unused(self) -> list[check.Finding]:
@@ -101,15 +101,15 @@ class Predictions:
             what = f"vertices are compared, not the bodies of {', '.join(beside)} beside them"
             found.append(check.Finding("odd", what, "leave one of the two out"))
         if self.others:
-            found.append(check.Finding("odd", f"not used: {safe_npz.first(self.others, LISTED)}"))
+            found.append(check.Finding("odd", f"not used: {safe_npz.first_arrays(self.others, LISTED)}"))
         return found
 
     @cached_property
-    def index(self) -> Names:
-        return Names.of(self)
+    def index(self) -> NameIndex:
+        return NameIndex.of(self)
 
 
-def read(path: str | Path, unpacked: Path, reading: Reading | None = None) -> Predictions:
+def read(path: str | Path, unpacked: Path, reading: ReadOptions | None = None) -> Predictions:
     """The frames of an .npz or .parquet file (see above).
 
     `unpacked`: folder for what cannot be read row by row where it is (compressed, or Parquet). ValueError naming the
@@ -117,7 +117,7 @@ def read(path: str | Path, unpacked: Path, reading: Reading | None = None) -> Pr
     `reading`: as the options of a command say; errors name these.
     """
     path = Path(path)
-    regular(path)
+    regular_file(path)
     if path.suffix.lower() not in (".npz", ".parquet"):
         raise ValueError(f"{path}: expected predictions in .npz or .parquet, got {path.suffix or 'no ending'}")
     content = fingerprint(path)
@@ -125,41 +125,45 @@ def read(path: str | Path, unpacked: Path, reading: Reading | None = None) -> Pr
     if path.suffix.lower() == ".parquet":
         columns, common, names = parquet.read(path, unpacked)
     else:
-        columns, common, names = _npz(path, unpacked)
+        columns, common, names = _read_npz(path, unpacked)
     others = tuple(sorted(names - {*TEXT, *NUMBERS, *FOR_ALL}))
-    found = Predictions(path, *_checked(path, columns, common), content, reading or Reading(), others)
+    found = Predictions(path, *_check_arrays(path, columns, common), content, reading or ReadOptions(), others)
     if reading is not None:
         _ = found.flags
         return found
-    check.demand(path, [each for each in check.of_frames(check.sample(found)) if not each.what.startswith("lowest of")])
+    check.raise_if_wrong(
+        path, [each for each in check.check_frames(check.sample(found)) if not each.what.startswith("lowest of")]
+    )
     return found
 
 
 def fingerprint(path: Path) -> str:
     """Of a file's bytes: which predictions a result belongs to."""
     digest = hashlib.sha256()
-    with regular(path).open("rb") as file:
+    with regular_file(path).open("rb") as file:
         while chunk := file.read(1 << 20):
             digest.update(chunk)
     return digest.hexdigest()
 
 
-def _npz(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any], frozenset[str]]:
+def _read_npz(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any], frozenset[str]]:
     names = frozenset(safe_npz.names(path))
     known = names & {*TEXT, *NUMBERS, *FOR_ALL}
-    columns = {name: of_npz(path, name, unpacked) for name in sorted(known - {*FOR_ALL})}
+    columns = {name: open_npz(path, name, unpacked) for name in sorted(known - {*FOR_ALL})}
     common = {name: safe_npz.read(path, name) for name in sorted(known & {*FOR_ALL})}
     return columns, common, names
 
 
-def _checked(
+def _check_arrays(
     path: Path, columns: dict[str, RowsOnDisk], common: dict[str, Any]
 ) -> tuple[dict[str, RowsOnDisk], dict[str, Any]]:
     """Arrays whose lengths and shapes fit together, and what is one for all frames in its own type."""
     if "names" not in columns:
-        raise ValueError(f"{path}: expected names, the name of each frame in the data set; {_has(columns)}")
+        raise ValueError(f"{path}: expected names, the name of each frame in the data set; {_list_columns(columns)}")
     if not columns.keys() & {*POINTS}:
-        raise ValueError(f"{path}: expected pose (with betas, transl and body), vertices or joints; {_has(columns)}")
+        raise ValueError(
+            f"{path}: expected pose (with betas, transl and body), vertices or joints; {_list_columns(columns)}"
+        )
     if "pose" in columns and "body" not in common and "vertices" not in columns:
         raise ValueError(f"{path}: pose without body: add body, one of smpl, smplh, smplx, anny, anny-lite")
     frames = len(columns["names"])
@@ -199,12 +203,12 @@ def _ground(rows: NDArray[Any]) -> Ground:
     return Ground(rows[..., :3], rows[..., 3])
 
 
-def _has(columns: dict[str, RowsOnDisk]) -> str:
+def _list_columns(columns: dict[str, RowsOnDisk]) -> str:
     return f"it has {', '.join(sorted(columns)) or 'nothing of that'}"
 
 
 @dataclass(frozen=True, eq=False)
-class Names:
+class NameIndex:
     """Where each name stands in a file, in 16 bytes a name."""
 
     column: RowsOnDisk
@@ -212,7 +216,7 @@ class Names:
     rows: NDArray[np.int64]
 
     @classmethod
-    def of(cls, predictions: Predictions) -> Names:
+    def of(cls, predictions: Predictions) -> NameIndex:
         """ValueError where a name stands twice."""
         column = predictions.columns["names"]
         hashes = np.concatenate([_hashes(block) for block in column.blocks()] or [np.zeros(0, np.uint64)])

@@ -13,16 +13,16 @@ from typing import Any
 import numpy as np
 
 from ipman_rs import __version__
-from ipman_rs.files import being_written, cell, write_whole
+from ipman_rs.files import atomic_write, cell, write_whole
 from ipman_rs.files.page_templates import environment
 
 from ..statistics.bootstrap import Interval
 from . import parquet
 from .job import Job
 from .joints import COUNTED, Definition
-from .metrics import FIGURES, Figure
+from .metrics import METRICS, Metric
 from .paper import Table
-from .summary import EDGES, Difference, Measured, frames_of
+from .summary import EDGES, Difference, MethodSummary, pieces_by_method
 
 NAME = "evaluation"
 
@@ -33,7 +33,7 @@ class Report:
 
     title: str
     data: str
-    measured: Sequence[Measured]
+    measured: Sequence[MethodSummary]
     differences: Sequence[Difference]
     table: Table | None = None
     definitions: Mapping[str, Definition | None] = field(default_factory=dict)  # of the joints, by method
@@ -53,11 +53,11 @@ class Report:
         return lines
 
     @property
-    def figures(self) -> dict[str, Figure]:
+    def figures(self) -> dict[str, Metric]:
         """Those of the table, or all that some method has."""
         known = {name for each in self.measured for name in each.summary}
-        wanted = [name for name in FIGURES if name in known] if self.table is None else self.table.figures
-        return {name: FIGURES[name] for name in wanted}
+        wanted = [name for name in METRICS if name in known] if self.table is None else self.table.figures
+        return {name: METRICS[name] for name in wanted}
 
 
 def write(report: Report, folder: Path, jobs: list[Job], progress: Callable[[int], None]) -> list[Path]:
@@ -86,7 +86,7 @@ def markdown(report: Report) -> str:
     )  # fmt: skip
 
 
-def shown(figure: Figure, value: float | None) -> str:
+def shown(figure: Metric, value: float | None) -> str:
     """A number in the figure's unit; a dash where there is none."""
     if value is None or not np.isfinite(value):
         return "–"
@@ -98,7 +98,7 @@ def rows(report: Report) -> tuple[list[str], list[list[str]]]:
     figures = report.figures
     columns: list[tuple[str, dict[str, str]]] = []
     for method, printed in (report.table.published if report.table else {}).items():
-        told = {name: f"{value:.{FIGURES[name].digits}f}" for name, value in printed.items()}
+        told = {name: f"{value:.{METRICS[name].digits}f}" for name, value in printed.items()}
         columns.append((f"{method} (printed)", told))
     for each in report.measured:
         said = {}
@@ -113,13 +113,13 @@ def rows(report: Report) -> tuple[list[str], list[list[str]]]:
     return ["", *titles.values()], [[name, *(said.get(key, "–") for key in figures)] for name, said in columns]
 
 
-def _with_interval(figure: Figure, found: Interval) -> str:
+def _with_interval(figure: Metric, found: Interval) -> str:
     if not np.isfinite(found.low):
         return shown(figure, found.mean)
     return f"{shown(figure, found.mean)} [{shown(figure, found.low)}, {shown(figure, found.high)}]"
 
 
-def _interval(figure: Figure, found: Interval) -> str:
+def _interval(figure: Metric, found: Interval) -> str:
     mean, low, high = (
         f"{value * figure.factor:+.{figure.digits}f}".replace("-", "−") if np.isfinite(value) else "–"
         for value in found
@@ -127,7 +127,7 @@ def _interval(figure: Figure, found: Interval) -> str:
     return f"{mean} [{low}, {high}]"
 
 
-def _verdict(figure: Figure, found: Interval) -> str:
+def _verdict(figure: Metric, found: Interval) -> str:
     if not found.excludes_zero or not figure.better:
         return "no difference shown" if not found.excludes_zero else "differs"
     return "better" if found.mean * figure.better > 0 else "worse"
@@ -148,7 +148,7 @@ def _missing(report: Report) -> list[str]:
         if not any(name in each.summary for each in report.measured):
             lacking.setdefault(figure.needs, []).append(figure.title)
     return [f"{', '.join(titles)}: not to be had without {needs}" for needs, titles in lacking.items()] + [
-        f"{frames} frames have no {', '.join(FIGURES[name].title for name in names)}: {why}"
+        f"{frames} frames have no {', '.join(METRICS[name].title for name in names)}: {why}"
         for (frames, why), names in told.items()
     ]
 
@@ -167,7 +167,7 @@ def record(report: Report) -> dict[str, Any]:
             name: None if each is None else {**asdict(each), "names": list(each.names), "roots": list(each.roots)}
             for name, each in report.definitions.items()
         },
-        "units": {name: "shown in " + (f.unit or "1") + f", times {f.factor:g}" for name, f in FIGURES.items()},
+        "units": {name: "shown in " + (f.unit or "1") + f", times {f.factor:g}" for name, f in METRICS.items()},
         "printed": {} if report.table is None else {k: dict(v) for k, v in report.table.published.items()},
         "edges": EDGES.tolist(),
         "methods": {
@@ -214,17 +214,17 @@ def _csv(report: Report) -> str:
     lines.writerow(["method", "figure", "unit", "mean", "low", "high", "std", "frames", "sequences", "without"])
     for method, printed in (report.table.published if report.table else {}).items():
         for name, value in printed.items():
-            lines.writerow([cell(f"{method} (printed)"), FIGURES[name].title, FIGURES[name].unit, value, *[""] * 6])
+            lines.writerow([cell(f"{method} (printed)"), METRICS[name].title, METRICS[name].unit, value, *[""] * 6])
     for each in report.measured:
         for name, summary in each.summary.items():
-            figure, found = FIGURES[name], each.intervals[name]
+            figure, found = METRICS[name], each.intervals[name]
             numbers = [value * figure.factor for value in (summary.mean, found.low, found.high, summary.std)]
             told = [repr(float(value)) if np.isfinite(value) else "" for value in numbers]
             counts = [summary.frames, len(each.clusters[name].names), sum(summary.missing.values())]
             lines.writerow([cell(each.name), figure.title, figure.unit, *told, *counts])
     for each in report.differences:
         for name, found in each.intervals.items():
-            figure = FIGURES[name]
+            figure = METRICS[name]
             told = [
                 repr(float(v * figure.factor)) if np.isfinite(v) else "" for v in (found.mean, found.low, found.high)
             ]
@@ -240,7 +240,7 @@ def _sequences(report: Report) -> str:
     lines.writerow(["method", "sequence", "figure", "unit", "mean", "frames"])
     for each in report.measured:
         for name, found in each.clusters.items() if not each.pooled else ():
-            figure = FIGURES[name]
+            figure = METRICS[name]
             for sequence, total, count in zip(found.names, found.sums, found.counts, strict=True):
                 mean = repr(float(total / count * figure.factor))
                 lines.writerow([cell(each.name), cell(str(sequence)), figure.title, figure.unit, mean, int(count)])
@@ -250,13 +250,13 @@ def _sequences(report: Report) -> str:
 def _plot(report: Report) -> dict[str, bytes]:
     """Shares of frames below an error, a picture a figure, and the differences with their intervals."""
     import matplotlib
-    from matplotlib.figure import Figure as Picture
+    from matplotlib.figure import Figure
 
     known = [name for name in report.figures if any(name in each.below for each in report.measured)]
     panels = max(1, len(known) + len(report.differences))
     wide = min(3, panels)
     high = -(-panels // wide)
-    picture = Picture(figsize=(4.2 * wide, 3.2 * high), layout="constrained")
+    picture = Figure(figsize=(4.2 * wide, 3.2 * high), layout="constrained")
     axes = picture.subplots(high, wide, squeeze=False).ravel()
     for axis, name in zip(axes, known, strict=False):
         _shares(axis, name, [each for each in report.measured if name in each.below and each.summary[name].frames])
@@ -274,9 +274,9 @@ def _plot(report: Report) -> dict[str, bytes]:
     return {f"{NAME}.svg": svg.getvalue(), f"{NAME}.png": png.getvalue()}
 
 
-def _shares(axis: Any, name: str, methods: Sequence[Measured]) -> None:
+def _shares(axis: Any, name: str, methods: Sequence[MethodSummary]) -> None:
     """Of frames whose figure is under x, up to where all methods have almost all."""
-    figure, end = FIGURES[name], 1
+    figure, end = METRICS[name], 1
     for each in methods:
         share = 100 * each.below[name] / each.summary[name].frames
         axis.plot(EDGES * figure.factor, share, label=each.name)
@@ -293,11 +293,11 @@ def _differences(axis: Any, difference: Difference, means: Mapping[str, float]) 
     drawn = [name for name, mean in means.items() if mean and np.isfinite(difference.intervals[name].low)]
     for place, name in enumerate(drawn):
         found = difference.intervals[name]
-        color = {"better": "#2e7d32", "worse": "#c62828"}.get(_verdict(FIGURES[name], found), "#777777")
+        color = {"better": "#2e7d32", "worse": "#c62828"}.get(_verdict(METRICS[name], found), "#777777")
         mean, low, high = (100 * value / means[name] for value in found)
         axis.errorbar(mean, -place, xerr=[[mean - low], [high - mean]], fmt="o", markersize=4, capsize=3, color=color)
     axis.axvline(0, color="#999999", linewidth=0.8)
-    axis.set_yticks([-place for place in range(len(drawn))], [FIGURES[name].title for name in drawn])
+    axis.set_yticks([-place for place in range(len(drawn))], [METRICS[name].title for name in drawn])
     axis.set_title(f"{difference.name} − {difference.baseline} (green: better)", fontsize=9)
     axis.set_xlabel(f"% of {difference.baseline}'s mean", fontsize=9)
     axis.tick_params(labelsize=8)
@@ -306,14 +306,14 @@ def _differences(axis: Any, difference: Difference, means: Mapping[str, float]) 
 def write_frames(path: Path, report: Report, jobs: list[Job], progress: Callable[[int], None]) -> list[Path]:
     """Every frame's figures, method by method; nothing where pyarrow is missing."""
     try:
-        pyarrow, writer = parquet.needed()
+        pyarrow, writer = parquet.require_pyarrow()
     except ValueError:
         return []
-    names = [name for name in FIGURES if any(name in each.summary for each in report.measured)]
+    names = [name for name in METRICS if any(name in each.summary for each in report.measured)]
     text = ["method", "name", "sequence"]
     schema = pyarrow.schema([(name, pyarrow.string()) for name in text] + [(name, pyarrow.float64()) for name in names])
-    with being_written(path) as file, writer.ParquetWriter(file, schema, compression="zstd") as table:
-        for method, piece in frames_of(jobs):
+    with atomic_write(path) as file, writer.ParquetWriter(file, schema, compression="zstd") as table:
+        for method, piece in pieces_by_method(jobs):
             count = len(piece["names"])
             columns = {"method": [method] * count, "name": piece["names"], "sequence": piece["sequences"]}
             # Null where there is none: queries leave it out of means, which they do not with NaN.

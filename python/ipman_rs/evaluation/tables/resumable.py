@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files import being_written, read_json, safe_npz, write_whole
+from ipman_rs.files import atomic_write, read_json, safe_npz, write_whole
 
-MADE_OF = "made_of.json"
+MANIFEST = "made_of.json"
 
 
 class Resumable:
@@ -47,7 +47,7 @@ class Resumable:
             return False
 
     def save(self, number: int, arrays: Mapping[str, Any]) -> None:
-        with being_written(self.file(number)) as out:
+        with atomic_write(self.file(number)) as out:
             np.savez(out, allow_pickle=False, key=np.str_(self.key), **arrays)
 
     def result(self, number: int) -> dict[str, NDArray[Any]]:
@@ -57,9 +57,9 @@ class Resumable:
 
     def check_folder(self, folder: Path, what: str) -> None:
         """ValueError where the folder holds results that were made of something else; `what`: they are."""
-        if not (folder / MADE_OF).exists():
+        if not (folder / MANIFEST).exists():
             return
-        found = read_json(folder / MADE_OF)
+        found = read_json(folder / MANIFEST)
         stored = found if isinstance(found, dict) else {}
         names = {**stored, **self.made_of}
         other = [name for name in names if stored.get(name) != self.made_of.get(name)]
@@ -70,4 +70,4 @@ class Resumable:
 
     def mark_folder(self, folder: Path) -> None:
         """Writes into the folder what the results in it are made of."""
-        write_whole(folder / MADE_OF, json.dumps(self.made_of, indent=1) + "\n")
+        write_whole(folder / MANIFEST, json.dumps(self.made_of, indent=1) + "\n")

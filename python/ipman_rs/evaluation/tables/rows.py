@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.data.frames import Rows
-from ipman_rs.files import being_written, regular, safe_npz
+from ipman_rs.files import atomic_write, regular_file, safe_npz
 
 BLOCK = 1 << 16  # rows that are gone through at a time
 _CHUNK = 1 << 22  # bytes that are unpacked at a time
@@ -45,7 +45,7 @@ class RowsOnDisk:
                     raise OSError(f"{self.path}: ends early; was it changed meanwhile?")
                 found[start:stop] = np.frombuffer(part, self.dtype).reshape(stop - start, *self.shape[1:])
         try:
-            return safe_npz.checked_text(found)
+            return safe_npz.check_text(found)
         except ValueError as error:
             raise ValueError(f"{self.source or self.path}: {error}") from None
 
@@ -63,35 +63,35 @@ def _runs(numbers: NDArray[np.integer]) -> Iterator[tuple[int, int]]:
     yield from zip([0, *ends[:-1]], ends, strict=True)
 
 
-def of_npz(path: Path, name: str, unpacked: Path) -> RowsOnDisk:
+def open_npz(path: Path, name: str, unpacked: Path) -> RowsOnDisk:
     """Array `name` of an .npz file: where it lies in there, or, if it is compressed, unpacked once into a folder.
 
     Nothing is executed. ValueError if it is damaged, holds Python objects, or lacks some of the bytes that it claims.
     """
-    regular(path)
+    regular_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
             member = archive.getinfo(f"{name}.npy")
             if member.compress_type == zipfile.ZIP_STORED:
-                return _rows(path, safe_npz.place_in(path, member))
+                return _rows(path, safe_npz.locate_array(path, member))
             place = unpacked / f"{name}.npy"
             if not place.exists():
                 unpacked.mkdir(parents=True, exist_ok=True)
                 with archive.open(member) as stream:
                     _copy(stream, place, member.file_size)
-        return replace(of_npy(place), source=path)
+        return replace(open_npy(place), source=path)
     except Exception as error:  # damaged bytes can fail in any way (zlib, struct, header syntax)
         if isinstance(error, OSError) and error.errno not in (None, errno.EINVAL):
             raise  # the disk is full, say, which is no fault of the file
         raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
 
 
-def of_npy(path: Path) -> RowsOnDisk:
+def open_npy(path: Path) -> RowsOnDisk:
     """The array of an `.npy` file. Raises ValueError, without the file's name, where it cannot be read row by row."""
-    return _rows(path, safe_npz.place_in(path))
+    return _rows(path, safe_npz.locate_array(path))
 
 
-def _rows(path: Path, place: safe_npz.Place) -> RowsOnDisk:
+def _rows(path: Path, place: safe_npz.ArrayLocation) -> RowsOnDisk:
     if place.order == "F" and len(place.shape) > 1:
         raise ValueError("is stored column by column; save np.ascontiguousarray of it")
     return RowsOnDisk(path, place.offset, place.dtype, place.shape)
@@ -99,7 +99,7 @@ def _rows(path: Path, place: safe_npz.Place) -> RowsOnDisk:
 
 def _copy(stream: Any, place: Path, size: int) -> None:
     """The bytes of a stream into a file that appears once it is whole."""
-    with being_written(place) as file:
+    with atomic_write(place) as file:
         copied = 0
         while chunk := stream.read(_CHUNK):
             copied += len(chunk)

@@ -15,14 +15,14 @@ from ..statistics.metric_sums import Summary
 from ..statistics.permutation_test import sign_flip
 from .frame_metrics import Columns
 from .job import Job
-from .metrics import FIGURES
+from .metrics import METRICS
 
 # The frames below each of these are counted, of figures that are lengths or angles: a tenth of a millimetre to 10 m.
 EDGES = np.logspace(-4, 1, 251)
 
 
 @dataclass
-class Measured:
+class MethodSummary:
     """One method over all frames."""
 
     name: str
@@ -52,17 +52,17 @@ class _Sums:
     frames: int = 0
 
     def add(self, piece: Columns) -> None:
-        figures = {name: value for name, value in piece.items() if name in FIGURES}
-        why = {name: np.where(piece["why"] == "", FIGURES[name].undefined, piece["why"]) for name in figures}
+        figures = {name: value for name, value in piece.items() if name in METRICS}
+        why = {name: np.where(piece["why"] == "", METRICS[name].undefined, piece["why"]) for name in figures}
         self.sums.add(figures, piece["names"], piece["sequences"], why)
         self.frames += len(piece["names"])
         for name, value in figures.items():
-            if FIGURES[name].unit in ("mm", "°"):
+            if METRICS[name].unit in ("mm", "°"):
                 counts = np.searchsorted(np.sort(value[np.isfinite(value)]), EDGES)
                 self.below[name] = self.below.get(name, 0) + counts
 
 
-def measured(job: Job, progress: Callable[[int], None] = lambda frames: None) -> Measured:
+def summarise(job: Job, progress: Callable[[int], None] = lambda frames: None) -> MethodSummary:
     """Of all pieces of a job. ValueError where one is missing or damaged."""
     sums = _Sums()
     for piece in job.results():
@@ -71,7 +71,7 @@ def measured(job: Job, progress: Callable[[int], None] = lambda frames: None) ->
     total = sums.sums
     summary = _ordered(total.summary())
     clusters = {name: total.clusters(name) for name in summary}
-    return Measured(job.name, summary, total.intervals(), sums.below, sums.frames, clusters, total.is_pooled)
+    return MethodSummary(job.name, summary, total.intervals(), sums.below, sums.frames, clusters, total.is_pooled)
 
 
 def difference(job: Job, baseline: Job, progress: Callable[[int], None] = lambda frames: None) -> Difference:
@@ -79,7 +79,7 @@ def difference(job: Job, baseline: Job, progress: Callable[[int], None] = lambda
     sums = Accumulator()
     for own, other in zip(job.results(), baseline.results(), strict=True):
         both, mine, theirs = _common(own, other)
-        shared = [name for name in FIGURES if name in own and name in other]
+        shared = [name for name in METRICS if name in own and name in other]
         figures = {name: own[name][mine] - other[name][theirs] for name in shared}
         sums.add(figures, both, own["sequences"][mine])
         progress(len(own["names"]))
@@ -98,10 +98,10 @@ def _common(own: Columns, other: Columns) -> tuple[NDArray[Any], NDArray[Any], N
 
 
 def _ordered(found: dict[str, Any]) -> dict[str, Any]:
-    return {name: found[name] for name in FIGURES if name in found}
+    return {name: found[name] for name in METRICS if name in found}
 
 
-def frames_of(jobs: list[Job]) -> Iterator[tuple[str, Columns]]:
+def pieces_by_method(jobs: list[Job]) -> Iterator[tuple[str, Columns]]:
     """Method and figures, piece by piece."""
     for job in jobs:
         for piece in job.results():

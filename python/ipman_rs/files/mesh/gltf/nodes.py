@@ -30,7 +30,7 @@ def world_matrices(document: Document) -> dict[int, Array]:
     return world
 
 
-def moved(points: Array, matrix: Array) -> Array:
+def transform(points: Array, matrix: Array) -> Array:
     """(N, 3) by a matrix (4, 4), or one for each point (N, 3, 4), in the same sums: equal points stay equal."""
     columns = [matrix[..., :3, k] for k in range(4)]
     x, y, z = (points[:, k, None] for k in range(3))
