@@ -88,7 +88,7 @@ def test_every_table_is_printed(table, run, folder, own, tmp_path):
     assert done.code == 0, done.err
     page = (tmp_path / "out" / "evaluation.md").read_text()
     assert page.startswith(f"# {TABLES[table].title}\n")
-    for name in TABLES[table].figures:
+    for name in TABLES[table].metrics:
         assert METRICS[name].title in page
     for method, printed in TABLES[table].published.items():
         assert f"{method} (printed)" in page
@@ -176,6 +176,6 @@ def test_files_that_are_wrong(run, folder, own, tmp_path):
 
 def test_the_names_of_tables_are_one(run):
     assert tuple(TABLES) == command.TABLES
-    assert all(name in METRICS for table in TABLES.values() for name in table.figures)
-    assert all(name in table.figures for table in TABLES.values() for row in table.published.values() for name in row)
+    assert all(name in METRICS for table in TABLES.values() for name in table.metrics)
+    assert all(name in table.metrics for table in TABLES.values() for row in table.published.values() for name in row)
     assert "ipman evaluate hmr.npz --table rich" in run("evaluate", "--help").out

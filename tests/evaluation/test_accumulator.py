@@ -275,11 +275,11 @@ def test_other_files(tmp_path):
 def test_bad_input_adds_nothing(tmp_path):
     found = of(*data(50, 5), np.arange(50))
     before = file_of(found, tmp_path)
-    with pytest.raises(ValueError, match="sequences: expected a name a frame, 2, got 3"):
+    with pytest.raises(ValueError, match="sequences: expected a name per frame, 2, got 3"):
         found.add({"a": [1.0, 2.0]}, ["f", "g"], ["s"] * 3)
-    with pytest.raises(ValueError, match=r"b: expected a number a frame, \(2,\), got \(3,\)"):
+    with pytest.raises(ValueError, match=r"b: expected a number per frame, \(2,\), got \(3,\)"):
         found.add({"a": [1.0, 2.0], "b": [1.0, 2.0, 3.0]}, ["f", "g"], ["new", "new"])
-    with pytest.raises(ValueError, match=r"why: expected a word or a word a frame, \(2,\), got \(3,\)"):
+    with pytest.raises(ValueError, match=r"why: expected a word or a word per frame, \(2,\), got \(3,\)"):
         found.add({"a": [1.0, np.nan]}, ["f", "g"], ["new", "new"], ["x"] * 3)
     with pytest.raises(ValueError, match="metric: expected one of bose, mpjpe, got 'pve'"):
         found.clusters("pve")

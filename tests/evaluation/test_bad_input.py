@@ -131,7 +131,7 @@ def test_other_units_and_degrees_are_mended_or_forced(tmp_path, true, guessed):
     np.testing.assert_allclose(mended.estimates[:5].transl, moved["transl"][:5], atol=1e-3)  # float32, 900 m away
     mended.begin()
     assert mended.flags[0].startswith("transl: looks like millimetres: 9")
-    assert mended.made_of["unit"] == 0.001
+    assert mended.manifest["unit"] == 0.001
     assert plain.flags == ()
     with pytest.raises(ValueError, match="another evaluation"):
         job_of(tmp_path / "mended", true, other, unit=0.001, degrees=False, force=True).begin()

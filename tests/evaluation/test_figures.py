@@ -159,7 +159,7 @@ def test_a_pressure_mat_is_compared(evaluated):
     _, job = evaluated
     model, floor = ip.load_body("anny-lite"), ip.Ground.y_up()
     guess = job.estimates[slice(0, 6)]
-    vertices = job.bodies.posed(guess).vertices
+    vertices = job.body_models.posed(guess).vertices
     samples = ip.sample_surface(vertices, model.template)
     mat = PressureMaps(
         np.zeros((6, 90, 90)), np.array([-1.0, 0, -1.0]), np.array([1.0, 0, 0]), np.array([0, 0, 1.0]), 0.025
@@ -168,7 +168,7 @@ def test_a_pressure_mat_is_compared(evaluated):
     centers = ip.center_of_pressure(vertices, model.template, floor, alpha=100, gamma=10)
     true = replace(job.data[slice(0, 6)], pressure=replace(mat, values=pressed), center_of_pressure=centers)
     assert isinstance(true, Frames)
-    found = frame_metrics.pair_metrics(true, guess, job)
+    found = frame_metrics.pair_metrics(true, guess, job.setup)
     assert found["cop_error"] == pytest.approx(np.zeros(6), abs=1e-5)
     assert (found["pressure_iou"] > 0.9).all()
     assert (found["pressure_iou_chosen"] >= found["pressure_iou"] - 0.2).all()

@@ -1,7 +1,7 @@
-"""How far estimated bodies are from true ones, whether they stand, and what of a difference is chance.
+"""Metrics of estimated bodies: their errors, their balance, and the statistics of differences between methods.
 
-Metrics take numpy arrays or torch tensors and give one number a body, (...), in metres, radians or shares; NaN where
-there is none (`numpy_or_torch`). `Accumulator` adds them up over shards, exactly.
+Metrics take numpy arrays or torch tensors and return one number per body, (...), in metres, radians or shares; NaN
+where a metric is undefined (`numpy_or_torch`). `Accumulator` sums them over shards, exactly.
 """
 
 from ipman_rs.renamed import old_names

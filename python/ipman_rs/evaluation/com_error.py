@@ -12,7 +12,10 @@ from .points import norm, vectors
 
 @numpy_or_torch
 def com_error(estimated: ArrayLike, true: ArrayLike) -> Any:
-    """Distance in space of two centres of mass, (..., 3) -> (...) m; NaN where one is not finite. ValueError where the
-    shapes differ."""
+    """Distance in space between two centres of mass, (..., 3) -> (...) m; NaN where one is not finite.
+
+    Raises:
+        ValueError: the shapes differ.
+    """
     first, second = vectors("centres of mass", estimated, true)
     return norm(first - second)

@@ -12,10 +12,13 @@ from .points import norm, vectors
 
 @numpy_or_torch
 def cop_error(estimated: ArrayLike, true: ArrayLike, ground: AnyGround) -> Any:
-    """Distance along the ground of two centres of pressure, (..., 3) -> (...) m; NaN where one is not finite.
+    """Distance along the ground between two centres of pressure, (..., 3) -> (...) m; NaN where one is not finite.
 
-    Heights do not count: a mat measures none. ValueError where the shapes differ.
+    Heights do not count, because a mat measures none.
+
+    Raises:
+        ValueError: the shapes differ.
     """
     first, second = vectors("centres of pressure", estimated, true)
-    apart = first - second
-    return norm(apart - (apart * ground.normal).sum(axis=-1, keepdims=True) * ground.normal)
+    difference = first - second
+    return norm(difference - (difference * ground.normal).sum(axis=-1, keepdims=True) * ground.normal)

@@ -1,4 +1,4 @@
-"""How deep a body goes into the ground, and how high it hovers above it."""
+"""Penetration of a body into the ground, and its hover above it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pressure IoU: how well the cells that carry an estimated body are those that a mat measured."""
+"""Pressure IoU: overlap of the cells that an estimated body loads with those that a mat measured."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ def pressure_iou(estimated: ArrayLike, measured: ArrayLike, pressure_mode: Press
 
     Both maps are first scaled to run from 0 to 1; "released" takes the measured one in its own unit instead, as the
     authors' code does. NaN where a map is not finite or nothing was measured. A threshold that no cell of either
-    reaches counts 0. ValueError where the shapes differ.
+    reaches counts 0.
+
+    Raises:
+        ValueError: the shapes differ.
     """
     first, second = scaled_maps(estimated, measured, pressure_mode)
     return best_iou(first, second)
@@ -38,7 +41,7 @@ def frame_difference(estimated: ArrayLike, measured: ArrayLike, pressure_mode: P
 
 
 def scaled_maps(estimated: ArrayLike, measured: ArrayLike, pressure_mode: PressureMode) -> tuple[Array, Array]:
-    """Both maps, scaled; the measured one NaN where it shows nothing."""
+    """Both maps, scaled; the measured one is NaN if nothing was measured."""
     choice("pressure_mode", pressure_mode, PressureMode)
     first, second = real_array("estimated", estimated).astype(float), real_array("measured", measured).astype(float)
     if first.shape != second.shape or first.ndim < 2 or 0 in first.shape[-2:]:
@@ -47,17 +50,18 @@ def scaled_maps(estimated: ArrayLike, measured: ArrayLike, pressure_mode: Pressu
 
 
 def scaled_measurement(values: Array, pressure_mode: PressureMode) -> Array:
+    """Measured maps (..., H, W), scaled as the mode says; NaN if all cells are equal, so that nothing was measured."""
     nothing = ~(values.max(axis=(-2, -1), keepdims=True) > values.min(axis=(-2, -1), keepdims=True))
     scaled = normalised(values, (-2, -1)) if pressure_mode == "paper" else values
     return np.where(nothing, np.nan, scaled)
 
 
 def best_iou(first: Array, second: Array) -> Array:
-    """(...) of maps (..., H, W), which may broadcast."""
-    found = []
+    """The largest IoU over `THRESHOLDS`, (...), of maps (..., H, W), which may broadcast."""
+    ious = []
     for threshold in THRESHOLDS:
         one, other = first > threshold, second > threshold
         either = (one | other).sum(axis=(-2, -1))
-        found.append((one & other).sum(axis=(-2, -1)) / np.maximum(either, 1))
+        ious.append((one & other).sum(axis=(-2, -1)) / np.maximum(either, 1))
     unknown = np.isnan(first).any(axis=(-2, -1)) | np.isnan(second).any(axis=(-2, -1))
-    return np.where(unknown, np.nan, np.max(found, axis=0))
+    return np.where(unknown, np.nan, np.max(ious, axis=0))

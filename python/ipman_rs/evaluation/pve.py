@@ -17,10 +17,10 @@ def pve(
     """Mean distance of corresponding vertices, (..., V, 3) -> (...) m: in the world, or aligned at the roots.
 
     Args:
-        root, true_root: (..., 3), such as the pelvis of each: both bodies are moved there first. Both or none.
+        root, true_root: (..., 3), such as the pelvis of each, at which both bodies are aligned first. Both or none.
 
     Raises:
-        ValueError: shapes differ, or one root is missing.
+        ValueError: the shapes differ, or one root is missing.
     """
     first, second = pair("vertices", estimated, true)
     if (root is None) != (true_root is None):

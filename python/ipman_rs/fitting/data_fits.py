@@ -149,7 +149,7 @@ class DataFit(Resumable):
         self.mark_folder(self.folder)
 
     @cached_property
-    def made_of(self) -> dict[str, Any]:
+    def manifest(self) -> dict[str, Any]:
         """All that decides the fits, as plain values; no paths, for a folder may be moved."""
         files = [] if self.models is None else self.bodies.files(str(self.data[slice(0, 1)].body))
         given = (self.body, self.pose, self.contact)

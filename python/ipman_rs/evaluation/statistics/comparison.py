@@ -1,4 +1,4 @@
-"""Two methods on the same frames, from what their accumulators hold."""
+"""Paired comparison of two methods on the same frames, from their accumulators."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .permutation_test import sign_flip
 
 
 class PairedComparison(NamedTuple):
-    """One metric of two methods over the sequences in which both have it for the same frames."""
+    """One metric of two methods, over the sequences in which both have it for the same frames."""
 
     difference: Interval  # mean of first − second over the frames, and its bootstrap interval over sequences
     p: float  # of the sign-flip test
@@ -24,10 +24,10 @@ class PairedComparison(NamedTuple):
 def compare(
     first: Accumulator, second: Accumulator, level: float = 0.95, resamples: int = 10_000, seed: int = 0
 ) -> dict[str, PairedComparison]:
-    """Each metric that both have. NaN where there is no sequence with the same frames in both.
+    """The comparison of each metric that both have. NaN where no sequence has the same frames in both.
 
-    Where single frames fail with one method, add the frames' differences to an accumulator of their own instead: a
-    sequence with a failed frame is left out here, whole.
+    A sequence in which one method failed on a frame is left out as a whole. To keep its other frames, add the
+    differences of the frames to an accumulator of their own instead.
     """
     if first.is_pooled != second.is_pooled:
         first, second = first.pooled(), second.pooled()
@@ -40,9 +40,9 @@ def _compare(
 ) -> PairedComparison:
     one, other = first.clusters(metric), second.clusters(metric)
     rows = {name: row for row, name in enumerate(other.names)}
-    found = [(i, rows[name]) for i, name in enumerate(one.names) if name in rows]
-    same = [(i, j) for i, j in found if one.counts[i] == other.counts[j] and one.prints[i] == other.prints[j]]
-    left_out = len(one.names) + len(other.names) - len(found) - len(same)
+    shared = [(i, rows[name]) for i, name in enumerate(one.names) if name in rows]
+    same = [(i, j) for i, j in shared if one.counts[i] == other.counts[j] and one.prints[i] == other.prints[j]]
+    left_out = len(one.names) + len(other.names) - len(shared) - len(same)
     if not same:
         return PairedComparison(Interval(np.nan, np.nan, np.nan), np.nan, 0, 0, left_out)
     i, j = np.transpose(same)

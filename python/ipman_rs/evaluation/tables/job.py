@@ -26,7 +26,7 @@ from ipman_rs.volume import mass_properties
 
 from ..procrustes import similarity
 from . import predictions as predicted
-from .frame_metrics import Columns, piece_metrics
+from .frame_metrics import Columns, Setup, piece_metrics
 from .joints import Definition, Regressors, define, paired_joints
 from .models import Models
 from .resumable import Resumable
@@ -66,7 +66,7 @@ class Source:
         return data.open(self.name, self.path, **options)
 
     @property
-    def made_of(self) -> list[list[Any]]:
+    def manifest(self) -> list[list[Any]]:
         """The options; of those that are files what is in them, for other machines have other paths."""
         return [[name, predicted.fingerprint(Path(value)) if is_file(value) else value] for name, value in self.options]
 
@@ -107,12 +107,8 @@ class Job(Resumable):
     piece: int = PIECE
 
     @cached_property
-    def place(self) -> Path:
-        return Path(self.folder) / "methods" / self.name
-
-    @property
     def pieces_folder(self) -> Path:
-        return self.place
+        return Path(self.folder) / "methods" / self.name
 
     @cached_property
     def unpacked(self) -> Path:
@@ -120,7 +116,7 @@ class Job(Resumable):
 
     @cached_property
     def data(self) -> DataSet:
-        return self.source.open(self.unpacked, self.bodies)
+        return self.source.open(self.unpacked, self.body_models)
 
     @cached_property
     def estimates(self) -> predicted.Predictions:
@@ -129,7 +125,7 @@ class Job(Resumable):
         )
 
     @cached_property
-    def bodies(self) -> Models:
+    def body_models(self) -> Models:
         return Models(None if self.models is None else Path(self.models))
 
     @cached_property
@@ -156,9 +152,14 @@ class Job(Resumable):
             known = np.asarray(np.isfinite(self.sample.joints).all(axis=2))
             named = enumerate(self.sample.joint_names or ())
             measured = frozenset(name for k, name in named if known[:, k].any())
-        truth = self.bodies.posed(self._truth(slice(0, 1)))
-        guess = truth if self.predictions == TRUTH else self.bodies.posed(self.estimates[slice(0, 1)])
+        truth = self.body_models.posed(self._truth(slice(0, 1)))
+        guess = truth if self.predictions == TRUTH else self.body_models.posed(self.estimates[slice(0, 1)])
         return define(truth, guess, measured, self.joint_regressors, self.source.name)
+
+    @cached_property
+    def setup(self) -> Setup:
+        """What the metrics of frames need besides the frames."""
+        return Setup(self.body_models, self.definition, self.joint_regressors, self.preset)
 
     @property
     def pieces(self) -> int:
@@ -171,8 +172,8 @@ class Job(Resumable):
     def begin(self) -> None:
         """Makes the folder; ValueError where it holds the figures of something else, or lengths cannot fit."""
         _ = self.joint_regressors  # fails early
-        self.place.mkdir(parents=True, exist_ok=True)
-        self.check_folder(self.place, "figures of another evaluation")
+        self.pieces_folder.mkdir(parents=True, exist_ok=True)
+        self.check_folder(self.pieces_folder, "figures of another evaluation")
         if self.predictions != TRUTH and len(self.estimates) < len(self.data) and not self.partial:
             raise ValueError(
                 f"{self.predictions}: has {len(self.estimates):,} frames, but the data set {self.source.name} has "
@@ -180,7 +181,7 @@ class Job(Resumable):
             )
         _ = self.flags
         _ = self.definition
-        self.mark_folder(self.place)
+        self.mark_folder(self.pieces_folder)
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
@@ -198,7 +199,7 @@ class Job(Resumable):
 
     def _masses(self) -> list[check.Finding]:
         """Of a few estimated bodies."""
-        bodies = self.bodies.posed(self.estimates[check.evenly(len(self.estimates), SAMPLED_BODIES)])
+        bodies = self.body_models.posed(self.estimates[check.evenly(len(self.estimates), SAMPLED_BODIES)])
         if bodies.vertices is None or bodies.model is None:
             return []
         masses = mass_properties(bodies.vertices, bodies.model.template).mass
@@ -208,10 +209,10 @@ class Job(Resumable):
     def _betas(self) -> list[check.Finding]:
         """Whether the model has as many components of shape as the predictions."""
         some = self.estimates[slice(0, 1)]
-        if some.betas is None or some.body is None or some.vertices is not None or not self.bodies.has(some.body):
+        if some.betas is None or some.body is None or some.vertices is not None or not self.body_models.has(some.body):
             return []
         gender = "neutral" if some.genders is None else str(some.genders[0])
-        width, model = some.betas.shape[1], self.bodies.get(some.body, gender, some.betas.shape[1])
+        width, model = some.betas.shape[1], self.body_models.get(some.body, gender, some.betas.shape[1])
         if width <= model.num_betas:
             return []
         return [check.Finding("odd", f"betas: the first {model.num_betas} of {width}, as many as {model.name} has")]
@@ -220,7 +221,7 @@ class Job(Resumable):
         """Whether the estimated people lie or hang along another axis than the data set's up."""
         some = check.sample(self.estimates)
         ground = some.ground or self.data[slice(0, 1)].ground
-        bodies = self.bodies.posed(some)
+        bodies = self.body_models.posed(some)
         if ground is None or bodies.joints is None:
             return []
         normal = ground.normal if ground.normal.ndim == 1 else ground.normal[0]
@@ -237,7 +238,7 @@ class Job(Resumable):
         there = np.flatnonzero(where >= 0)
         if self.definition is None or not len(there):
             return []
-        truth, guess = self.bodies.posed(true[there]), self.bodies.posed(self.estimates[where[there]])
+        truth, guess = self.body_models.posed(true[there]), self.body_models.posed(self.estimates[where[there]])
         joints = paired_joints(truth, guess, self.definition, self.joint_regressors)
         _, matrices, _ = similarity(joints.true, joints.estimated)
         matrices = matrices[np.isfinite(matrices).all(axis=(1, 2))]
@@ -268,12 +269,12 @@ class Job(Resumable):
         return ", or --option frame=camera or frame=world" if "frame" in known else ""
 
     @cached_property
-    def made_of(self) -> dict[str, Any]:
+    def manifest(self) -> dict[str, Any]:
         """All that decides the figures; no paths, for other machines have other ones."""
         kinds = {self.data[slice(0, 1)].body}
         if self.predictions != TRUTH:
             kinds.add(self.estimates[slice(0, 1)].body)
-        files = [path for kind in kinds - {None} for path in self.bodies.files(str(kind))]
+        files = [path for kind in kinds - {None} for path in self.body_models.files(str(kind))]
         true = self.data
         return {
             "predictions": TRUTH if self.predictions == TRUTH else self.estimates.fingerprint,
@@ -282,7 +283,7 @@ class Job(Resumable):
             if isinstance(true, predicted.Predictions)
             else _content(check.sample(true, 16)),
             "split": self.source.split,
-            "options": self.source.made_of,
+            "options": self.source.manifest,
             "frames": len(self.data),
             "models": {path.name: predicted.fingerprint(path) for path in sorted(files)},
             "regressors": sorted(predicted.fingerprint(Path(path)) for path in self.regressors),
@@ -304,7 +305,7 @@ class Job(Resumable):
     def measure(self, number: int) -> None:
         """Does a piece. ValueError where frames have no prediction or something does not fit."""
         start = number * self.piece
-        self.save(number, piece_metrics(self, start, start + self.frames(number)))
+        self.save(number, piece_metrics(self.pair, self.setup, start, start + self.frames(number)))
 
     def damaged(self) -> list[int]:
         """Pieces that are there, but not whole or not of this evaluation: `run` does them again."""

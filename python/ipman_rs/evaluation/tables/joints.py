@@ -95,10 +95,10 @@ def define(
     measured: the data set's own joints that have numbers in some frame. data: name of the data set. ValueError where a
     body would be held against joints of another definition, or where the truth is bodies whose model is missing.
     """
-    if truth.without_model is not None and estimate.vertices is not None and estimate.given is None:
+    if truth.missing_model is not None and estimate.vertices is not None and estimate.file_joints is None:
         raise ValueError(
             f"{data}: its truth is bodies of {truth.kind}, to which predicted bodies are compared: --models FOLDER "
-            f"with {truth.without_model}.npz or .pkl"
+            f"with {truth.missing_model}.npz or .pkl"
         )
     makers = _makers(truth, estimate, regressors, data)
     if makers is None:
@@ -144,9 +144,9 @@ def _makers(truth: FrameBodies, estimate: FrameBodies, regressors: Regressors, d
     guess: Maker | None = None
     if truth.vertices is not None and estimate.vertices is not None:
         true, guess = _maker_of_body(truth, regressors), _maker_of_body(estimate, regressors)
-    elif estimate.given is not None:
-        true, guess = "given" if truth.given is not None else _maker_of_body(truth, regressors), "given"
-    elif truth.given is not None and estimate.vertices is not None:
+    elif estimate.file_joints is not None:
+        true, guess = "given" if truth.file_joints is not None else _maker_of_body(truth, regressors), "given"
+    elif truth.file_joints is not None and estimate.vertices is not None:
         true, guess = "given", _maker_as_measured(estimate, regressors, data)
     return None if true is None or guess is None else (true, guess)
 
@@ -156,7 +156,7 @@ def _maker_of_body(bodies: FrameBodies, regressors: Regressors) -> Maker | None:
         return "h36m"
     if bodies.vertices is not None and regressors.extra is not None:
         return "extra"
-    return "own" if bodies.own is not None else "given" if bodies.given is not None else None
+    return "own" if bodies.model_joints is not None else "given" if bodies.file_joints is not None else None
 
 
 def _maker_as_measured(estimate: FrameBodies, regressors: Regressors, data: str) -> Maker | None:
@@ -175,28 +175,28 @@ def _maker_as_measured(estimate: FrameBodies, regressors: Regressors, data: str)
 
 def _names(bodies: FrameBodies, maker: Maker, regressors: Regressors) -> tuple[str, ...]:
     if maker == "given":
-        return bodies.given_names
+        return bodies.file_joint_names
     if maker == "own":
-        return bodies.own_names
+        return bodies.model_joint_names
     if maker == "h36m" and regressors.human36m is not None:
         return regressors.human36m.names
     extra = () if regressors.extra is None else regressors.extra.names
-    return (*extra, *(name for name in bodies.own_names if name not in extra))
+    return (*extra, *(name for name in bodies.model_joint_names if name not in extra))
 
 
 def _points(bodies: FrameBodies, maker: Maker, regressors: Regressors) -> Points:
     """Joints (F, K, 3) of `_names`."""
     if maker == "given":
-        return _required(bodies.given)
+        return _required(bodies.file_joints)
     if maker == "own":
-        return _required(bodies.own)
+        return _required(bodies.model_joints)
     if maker == "h36m" and regressors.human36m is not None:
         return regressors.human36m.joints(_required(bodies.vertices))
     if regressors.extra is None:
         raise ValueError("joints: expected a regressor")
     points = [regressors.extra.joints(_required(bodies.vertices))]
-    if bodies.own is not None:
-        points.append(bodies.own[:, [name not in regressors.extra.names for name in bodies.own_names]])
+    if bodies.model_joints is not None:
+        points.append(bodies.model_joints[:, [name not in regressors.extra.names for name in bodies.model_joint_names]])
     return np.concatenate(points, axis=1)
 
 
@@ -240,6 +240,6 @@ def _maker_words(bodies: FrameBodies, maker: Maker, giver: str) -> str:
         "given": f"the joints that {giver}",
         "own": own,
         "h36m": "J_regressor_h36m × vertices",
-        "extra": "J_regressor_extra × vertices" + (f" and {own}" if bodies.own is not None else ""),
+        "extra": "J_regressor_extra × vertices" + (f" and {own}" if bodies.model_joints is not None else ""),
     }
     return words[maker]

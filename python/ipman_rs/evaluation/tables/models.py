@@ -28,23 +28,23 @@ class FrameBodies:
     kind: str | None  # "smpl", "anny" …
     model: BodyModel | None  # whose faces and parts the vertices have
     vertices: NDArray[Any] | None
-    own: NDArray[Any] | None  # the joints of the posed body model
-    given: NDArray[Any] | None  # the joints that the frames name themselves: measured, or predicted without a body
-    given_names: tuple[str, ...]
-    without_model: str | None = None  # such as SMPLX_FEMALE: of a pose that has no model here, beside given joints
+    model_joints: NDArray[Any] | None  # of the posed body model
+    file_joints: NDArray[Any] | None  # that the frames name themselves: measured, or predicted without a body
+    file_joint_names: tuple[str, ...]
+    missing_model: str | None = None  # such as SMPLX_FEMALE: of a pose that has no model here, beside given joints
 
     @property
-    def own_names(self) -> tuple[str, ...]:
-        return () if self.own is None or self.model is None else self.model.joint_names
+    def model_joint_names(self) -> tuple[str, ...]:
+        return () if self.model_joints is None or self.model is None else self.model.joint_names
 
     @property
     def joints(self) -> NDArray[Any] | None:
         """Some joints, by `joint_names`: the body's own before given ones."""
-        return self.given if self.own is None else self.own
+        return self.file_joints if self.model_joints is None else self.model_joints
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        return self.given_names if self.own is None else self.own_names
+        return self.file_joint_names if self.model_joints is None else self.model_joint_names
 
 
 @dataclass(eq=False)

@@ -14,16 +14,16 @@ Printed = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Table:
-    """figures: the columns, by their names in `metrics.METRICS`; published: by method, then by figure, as printed.
+    """metrics: the columns, by their names in `metrics.METRICS`; published: by method, then by metric, as printed.
 
     options: of the data set's reader, where the user gives no other. regressor: whether the paper compares the joints
-    of J_regressor_h36m.npy. across: one row a figure and one column a method, instead of the other way round.
+    of J_regressor_h36m.npy. across: one row per metric and one column per method, instead of the other way round.
     """
 
     title: str
     data: str
     split: str | None
-    figures: tuple[str, ...]
+    metrics: tuple[str, ...]
     published: Printed = field(default_factory=dict)
     note: str = ""
     across: bool = False

@@ -58,7 +58,7 @@ class Predictions:
     columns: dict[str, RowsOnDisk]
     common: dict[str, Any]  # what is one for all frames
     fingerprint: str  # of the file's bytes
-    reading: ReadOptions = ReadOptions()
+    options: ReadOptions = ReadOptions()
     others: tuple[str, ...] = ()  # further arrays of the file, which nothing reads
 
     def __len__(self) -> int:
@@ -72,10 +72,10 @@ class Predictions:
         for name in found.keys() & set(NUMBERS):
             kind = found[name].dtype
             found[name] = found[name].astype(bool if name in LABELS else np.promote_types(kind, "f4"))
-        if self.reading.unit != 1.0:
+        if self.options.unit != 1.0:
             for name in found.keys() & {*LENGTHS}:
-                found[name] = found[name] * self.reading.unit
-        if self.reading.degrees and "pose" in found:
+                found[name] = found[name] * self.options.unit
+        if self.options.degrees and "pose" in found:
             found["pose"] = np.radians(found["pose"])
         if "betas" in self.common:
             found["betas"] = np.repeat(self.common["betas"], len(found["names"]), axis=0)
@@ -83,15 +83,15 @@ class Predictions:
             found["ground"] = _ground(found["ground"])
         found.setdefault("sequences", found["names"])
         every = {**self.common, **found}
-        if self.reading.unit != 1.0 and "ground" in every:
-            every["ground"] = Ground(every["ground"].normal, every["ground"].height * self.reading.unit)
+        if self.options.unit != 1.0 and "ground" in every:
+            every["ground"] = Ground(every["ground"].normal, every["ground"].height * self.options.unit)
         return Frames(**every)
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
         """What is odd about a sample, in words. ValueError, naming the option that mends it, for what is wrong."""
         found = [each for each in check.check_frames(check.sample(self)) if not each.what.startswith("lowest of")]
-        return judge.admit(self.path, [*found, *self.unused()], self.reading.force)
+        return judge.admit(self.path, [*found, *self.unused()], self.options.force)
 
     def unused(self) -> list[check.Finding]:
         """What of the file no figure is made of."""
@@ -109,12 +109,12 @@ class Predictions:
         return NameIndex.of(self)
 
 
-def read(path: str | Path, unpacked: Path, reading: ReadOptions | None = None) -> Predictions:
+def read(path: str | Path, unpacked: Path, options: ReadOptions | None = None) -> Predictions:
     """The frames of an .npz or .parquet file (see above).
 
     `unpacked`: folder for what cannot be read row by row where it is (compressed, or Parquet). ValueError naming the
     file where it is missing or damaged, where arrays differ in length, or where units cannot be right.
-    `reading`: as the options of a command say; errors name these.
+    `options`: from a command; then errors name the command's options.
     """
     path = Path(path)
     regular_file(path)
@@ -127,8 +127,8 @@ def read(path: str | Path, unpacked: Path, reading: ReadOptions | None = None) -
     else:
         columns, common, names = _read_npz(path, unpacked)
     others = tuple(sorted(names - {*TEXT, *NUMBERS, *FOR_ALL}))
-    found = Predictions(path, *_check_arrays(path, columns, common), content, reading or ReadOptions(), others)
-    if reading is not None:
+    found = Predictions(path, *_check_arrays(path, columns, common), content, options or ReadOptions(), others)
+    if options is not None:
         _ = found.flags
         return found
     check.raise_if_wrong(

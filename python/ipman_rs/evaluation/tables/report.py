@@ -53,10 +53,10 @@ class Report:
         return lines
 
     @property
-    def figures(self) -> dict[str, Metric]:
+    def metrics(self) -> dict[str, Metric]:
         """Those of the table, or all that some method has."""
         known = {name for each in self.measured for name in each.summary}
-        wanted = [name for name in METRICS if name in known] if self.table is None else self.table.figures
+        wanted = [name for name in METRICS if name in known] if self.table is None else self.table.metrics
         return {name: METRICS[name] for name in wanted}
 
 
@@ -81,7 +81,7 @@ def texts(report: Report) -> dict[str, str]:
 
 def markdown(report: Report) -> str:
     return environment(Path(__file__).parent).get_template(f"{NAME}.md.j2").render(
-        report=report, figures=report.figures, table=rows(report), missing=_missing(report), version=__version__,
+        report=report, figures=report.metrics, table=rows(report), missing=_missing(report), version=__version__,
         shown=shown, interval=_interval, verdict=_verdict,
     )  # fmt: skip
 
@@ -95,7 +95,7 @@ def shown(figure: Metric, value: float | None) -> str:
 
 def rows(report: Report) -> tuple[list[str], list[list[str]]]:
     """The table, printed figures above the measured ones: its head and its lines."""
-    figures = report.figures
+    figures = report.metrics
     columns: list[tuple[str, dict[str, str]]] = []
     for method, printed in (report.table.published if report.table else {}).items():
         told = {name: f"{value:.{METRICS[name].digits}f}" for name, value in printed.items()}
@@ -139,12 +139,12 @@ def _missing(report: Report) -> list[str]:
     for each in report.measured:
         for name, summary in each.summary.items():
             why = ", ".join(f"{count:,} {reason}" for reason, count in sorted(summary.missing.items()))
-            if why and name in report.figures:
+            if why and name in report.metrics:
                 told.setdefault((f"{each.name}: {sum(summary.missing.values()):,} of {each.frames:,}", why), []).append(
                     name
                 )
     lacking: dict[str, list[str]] = {}
-    for name, figure in report.figures.items():
+    for name, figure in report.metrics.items():
         if not any(name in each.summary for each in report.measured):
             lacking.setdefault(figure.needs, []).append(figure.title)
     return [f"{', '.join(titles)}: not to be had without {needs}" for needs, titles in lacking.items()] + [
@@ -252,7 +252,7 @@ def _plot(report: Report) -> dict[str, bytes]:
     import matplotlib
     from matplotlib.figure import Figure
 
-    known = [name for name in report.figures if any(name in each.below for each in report.measured)]
+    known = [name for name in report.metrics if any(name in each.below for each in report.measured)]
     panels = max(1, len(known) + len(report.differences))
     wide = min(3, panels)
     high = -(-panels // wide)
@@ -264,7 +264,7 @@ def _plot(report: Report) -> dict[str, bytes]:
         axes[0].legend(fontsize=8)
     for axis, each in zip(axes[len(known) :], report.differences, strict=False):
         means = {name: found.mean for name, found in report.measured[0].intervals.items()}
-        _differences(axis, each, {name: means[name] for name in report.figures if name in each.intervals})
+        _differences(axis, each, {name: means[name] for name in report.metrics if name in each.intervals})
     for axis in axes[len(known) + len(report.differences) :]:
         axis.set_axis_off()
     svg, png = io.BytesIO(), io.BytesIO()

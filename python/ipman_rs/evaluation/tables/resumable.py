@@ -20,7 +20,7 @@ MANIFEST = "made_of.json"
 class Resumable:
     """A piece is an `.npz` file. It is named by its number, appears when it is whole, and says what it was made of.
 
-    A subclass says where its pieces lie (`pieces_folder`) and what decides their content (`made_of`: plain values).
+    A subclass says where its pieces lie (`pieces_folder`) and what decides their content (`manifest`: plain values).
     """
 
     @property
@@ -28,13 +28,13 @@ class Resumable:
         raise NotImplementedError
 
     @property
-    def made_of(self) -> dict[str, Any]:
+    def manifest(self) -> dict[str, Any]:
         raise NotImplementedError
 
     @cached_property
     def key(self) -> str:
-        """A hash of `made_of`, which every piece carries."""
-        return hashlib.sha256(json.dumps(self.made_of, sort_keys=True).encode()).hexdigest()
+        """A hash of `manifest`, which every piece carries."""
+        return hashlib.sha256(json.dumps(self.manifest, sort_keys=True).encode()).hexdigest()
 
     def file(self, number: int) -> Path:
         return self.pieces_folder / f"{number:06d}.npz"
@@ -61,8 +61,8 @@ class Resumable:
             return
         found = read_json(folder / MANIFEST)
         stored = found if isinstance(found, dict) else {}
-        names = {**stored, **self.made_of}
-        other = [name for name in names if stored.get(name) != self.made_of.get(name)]
+        names = {**stored, **self.manifest}
+        other = [name for name in names if stored.get(name) != self.manifest.get(name)]
         if other:
             raise ValueError(
                 f"{folder}: holds {what} ({', '.join(other)} differ); choose another folder with -o, or delete this one"
@@ -70,4 +70,4 @@ class Resumable:
 
     def mark_folder(self, folder: Path) -> None:
         """Writes into the folder what the results in it are made of."""
-        write_whole(folder / MANIFEST, json.dumps(self.made_of, indent=1) + "\n")
+        write_whole(folder / MANIFEST, json.dumps(self.manifest, indent=1) + "\n")
