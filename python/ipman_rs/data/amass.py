@@ -78,23 +78,25 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         files = _motions(root, None)
     except ValueError as error:
         return [Finding("missing", str(error), "expected a folder such as AMASS, with CMU/01/01_01_poses.npz in it")]
-    found = [Finding("ok", f"{len(files)} motions")]
+    findings = [Finding("ok", f"{len(files)} motions")]
     there = {part for file in files for part in file.relative_to(root).parts[:-1]} if root.is_dir() else set()
     for split, names in SPLITS.items():
         has = [name for name in names if name in there]
         if has:
-            found.append(Finding("ok", f"{split}: {', '.join(has)}"))
+            findings.append(Finding("ok", f"{split}: {', '.join(has)}"))
         elif root.is_dir():
-            found.append(Finding("missing", f"{split}: none of {', '.join(names)}"))
+            findings.append(Finding("missing", f"{split}: none of {', '.join(names)}"))
     whole = []
     for file in files:
         try:
             _header(file)
             whole.append(file)
         except ValueError as error:
-            found.append(Finding("wrong", str(error), "download it again"))
+            findings.append(Finding("wrong", str(error), "download it again"))
     named = {file: _name(file, root) for file in whole}
-    return found + sequences.check_sequences([(name, partial(_all_frames, file, name)) for file, name in named.items()])
+    return findings + sequences.check_sequences(
+        [(name, partial(_all_frames, file, name)) for file, name in named.items()]
+    )
 
 
 def _motions(root: Path, split: str | None) -> list[Path]:
@@ -188,7 +190,7 @@ def _gender(file: Path) -> str:
     value = safe_npz.read(file, "gender").reshape(-1)
     if value.dtype.kind not in "US" or len(value) != 1:
         raise ValueError(f"{file}: gender: expected a word, got {value!r:.60}")
-    said = value[0].decode("latin1") if value.dtype.kind == "S" else str(value[0])
-    if said not in ("neutral", "female", "male"):
-        raise ValueError(f"{file}: gender: expected neutral, female or male, got {said!r}")
-    return said
+    gender = value[0].decode("latin1") if value.dtype.kind == "S" else str(value[0])
+    if gender not in ("neutral", "female", "male"):
+        raise ValueError(f"{file}: gender: expected neutral, female or male, got {gender!r}")
+    return gender

@@ -132,12 +132,12 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
 def _check_file(file: Path) -> list[Finding]:
     try:
         scene = BedlamScene(file)
-        found = [Finding("ok", f"{len(scene)} rows with {', '.join(scene.file)}")]
-        found += _check_scene(scene)
-        found += scene.file.scan()
+        findings = [Finding("ok", f"{len(scene)} rows with {', '.join(scene.file)}")]
+        findings += _check_scene(scene)
+        findings += scene.file.scan()
     except ValueError as error:
         return [Finding("wrong", str(error))]
-    return [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in found]
+    return [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in findings]
 
 
 def _files(place: Path) -> list[Path]:

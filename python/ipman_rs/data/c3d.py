@@ -79,14 +79,14 @@ class C3DFile:
 
     @cached_property
     def _computed(self) -> list[int]:
-        said = {name for group in GROUPS for name in parameter_values(self.parameters.get("POINT", {}), group)}
+        listed = {name for group in GROUPS for name in parameter_values(self.parameters.get("POINT", {}), group)}
         bare = [name.rpartition(":")[2] for name in self.names]
         axes = {name[:3] for name in bare if all(name[:3] + end in bare for end in "OALP")}  # LFEO, LFEA, LFEL, LFEP
         return [
             column
             for column, (name, own) in enumerate(zip(self.names, bare, strict=True))
-            if name in said
-            or own in said
+            if name in listed
+            or own in listed
             or OUTPUTS.fullmatch(own)
             or (len(own) == 4 and own[:3] in axes and own[3] in "OALP")
             or alphanumeric(own) in CENTER_OF_MASS
@@ -104,8 +104,8 @@ class C3DFile:
         ValueError for two people of whom none is chosen.
         """
         rest = self._measured
-        seen, _ = visibility(self.points[:, rest], [self.names[column] for column in rest])
-        chosen = select_markers([self.names[column] for column in rest], seen, self.source, subject)
+        visible, _ = visibility(self.points[:, rest], [self.names[column] for column in rest])
+        chosen = select_markers([self.names[column] for column in rest], visible, self.source, subject)
         return MarkerColumns(chosen.names, [rest[column] for column in chosen.columns], chosen.notes)
 
     def center_of_mass(self, subject: str | None = None) -> Array | None:
@@ -147,15 +147,15 @@ def read(path: str | os.PathLike[str]) -> C3DFile:
     try:
         content = c3d_format.content(data)
     except ValueError as error:
-        said = str(error)
-        raise ValueError(f"{path}: {said}" if said.endswith("?") else f"{path}: {said}; {AGAIN}") from None
+        message = str(error)
+        raise ValueError(f"{path}: {message}" if message.endswith("?") else f"{path}: {message}; {AGAIN}") from None
     about, count = content.parameters["POINT"], content.points.shape[1]
     names = [str(name) for name in parameter_values(about, "LABELS")][:count]
     names += [""] * (count - len(names))
     rate = _number(about, "RATE")
     screen = "".join(str(value) for value in about.get("Y_SCREEN", []))
     axis = screen.strip()[-1:].lower()
-    found = C3DFile(
+    file = C3DFile(
         names=tuple(names),
         points=content.points,
         times=(content.first + np.arange(len(content.points))) / (rate if rate > 0 else 1.0),
@@ -168,20 +168,22 @@ def read(path: str | os.PathLike[str]) -> C3DFile:
         notes=content.notes,
     )
     if screen.strip() and axis not in TO_Y_UP:
-        note = f"its Y_SCREEN is {screen!r}, which is no axis: taken as {found.up} up (--up)"
-        found = replace(found, notes=(*found.notes, note))
-    if str(found.unit).strip():
-        return found
-    unit = _likely_unit(found)
-    return replace(found, unit=unit, notes=(*found.notes, unit_note(unit)))
+        note = f"its Y_SCREEN is {screen!r}, which is no axis: taken as {file.up} up (--up)"
+        file = replace(file, notes=(*file.notes, note))
+    if str(file.unit).strip():
+        return file
+    unit = _likely_unit(file)
+    return replace(file, unit=unit, notes=(*file.notes, unit_note(unit)))
 
 
-def _likely_unit(found: C3DFile) -> str:
+def _likely_unit(file: C3DFile) -> str:
     """The unit of a file that does not say it: the one in which its markers, or else its plates, are not too large."""
-    rest = found._measured
-    seen, _ = visibility(found.points[:, rest], [found.names[column] for column in rest])
-    corners = [each for each in found.values("FORCE_PLATFORM", "CORNERS") if isinstance(each, (int, float))]
-    places = found.points[:, rest][seen] if seen.any() else np.array(corners[: len(corners) // 3 * 3]).reshape(-1, 3)
+    rest = file._measured
+    visible, _ = visibility(file.points[:, rest], [file.names[column] for column in rest])
+    corners = [each for each in file.values("FORCE_PLATFORM", "CORNERS") if isinstance(each, (int, float))]
+    places = (
+        file.points[:, rest][visible] if visible.any() else np.array(corners[: len(corners) // 3 * 3]).reshape(-1, 3)
+    )
     return likely_unit(places) if len(places) else "mm"
 
 
@@ -197,17 +199,17 @@ def markers(
     `subject`: of whom, where the file has several people. ValueError, naming the file, if it is missing, damaged, has
     no markers, or has those of several people of whom none is chosen.
     """
-    found = read(path)
-    if not found.names and "ROTATION" in found.parameters:
+    file = read(path)
+    if not file.names and "ROTATION" in file.parameters:
         raise ValueError(f"{path}: expected markers, it has rotations of segments only, as Theia writes them")
-    rest = found._measured
-    notes = [note for note in found.notes if unit is None or note != unit_note(found.unit)]
-    if found._computed:
-        notes.append(f"{len(found._computed)} outputs of a model are no markers: {list_names(list(found.outputs), 4)}")
-    names = [found.names[column] for column in rest]
-    said, up = found.unit if unit is None else unit, up or found.up
-    times = found.times if rate is None else np.arange(len(found.points)) / rate
-    return tracks(names, found.points[:, rest], times, said, up, found.source, subject=subject, notes=notes)
+    rest = file._measured
+    notes = [note for note in file.notes if unit is None or note != unit_note(file.unit)]
+    if file._computed:
+        notes.append(f"{len(file._computed)} outputs of a model are no markers: {list_names(list(file.outputs), 4)}")
+    names = [file.names[column] for column in rest]
+    file_unit, up = file.unit if unit is None else unit, up or file.up
+    times = file.times if rate is None else np.arange(len(file.points)) / rate
+    return tracks(names, file.points[:, rest], times, file_unit, up, file.source, subject=subject, notes=notes)
 
 
 def _faced(parameters: Parameters) -> str:

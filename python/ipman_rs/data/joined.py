@@ -32,11 +32,11 @@ class Joined:
         part = np.searchsorted(self.ends, wanted, side="right")
         order = np.argsort(part, kind="stable")
         starts = np.append(0, self.ends)
-        found = concatenate(
+        frames = concatenate(
             [self.parts[each][wanted[order][part[order] == each] - starts[each]] for each in np.unique(part)]
             or [self.parts[0][:0]]
         )
-        return found if (order == np.arange(len(order))).all() else found[np.argsort(order, kind="stable")]
+        return frames if (order == np.arange(len(order))).all() else frames[np.argsort(order, kind="stable")]
 
 
 def concatenate(parts: Sequence[Frames]) -> Frames:

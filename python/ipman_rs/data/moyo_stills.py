@@ -61,12 +61,12 @@ class FrameList:
         self.path = Path(path)
         content = read_bytes(path, MAX_BYTES)
         try:
-            found = _python(content.decode()) if self.path.suffix == ".py" else {"": parse_json(content)}
+            lists = _python(content.decode()) if self.path.suffix == ".py" else {"": parse_json(content)}
         except (ValueError, SyntaxError, RecursionError, MemoryError) as error:
             raise ValueError(f"{path}: expected the chosen image of each pose: {error}") from None
-        for name, images in found.items():
+        for name, images in lists.items():
             _check(f"{path}: {name}".removesuffix(": "), images)
-        self.lists: Mapping[str, Mapping[str, int]] = found
+        self.lists: Mapping[str, Mapping[str, int]] = lists
 
     def frame(self, sequence: str, count: int) -> int | None:
         """The chosen frame of a sequence of `count` frames; None for a pose that is not in the list.
@@ -87,17 +87,17 @@ class FrameList:
 
 def _python(text: str) -> dict[str, Any]:
     """Both dictionaries of the authors' constants.py, read as literals."""
-    found = {
+    lists = {
         target.id: ast.literal_eval(line.value)
         for line in ast.parse(text).body
         if isinstance(line, ast.Assign)
         for target in line.targets
         if isinstance(target, ast.Name) and target.id in (COMBINED, NEXUS)
     }
-    lacking = [name for name in (COMBINED, NEXUS) if name not in found]
+    lacking = [name for name in (COMBINED, NEXUS) if name not in lists]
     if lacking:
         raise ValueError(f"no {lacking[0]} in it; it should be moyo/utils/constants.py of moyo_toolkit")
-    return found
+    return lists
 
 
 def _check(where: str, images: Any) -> None:

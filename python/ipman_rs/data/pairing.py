@@ -28,8 +28,8 @@ Words = tuple[str, ...]
 def distinctive_words(name: str) -> Words:
     """What of a file's or a folder's name says whose it is: "grf_walk-2" is ("walk", "2")."""
     parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
-    found = tuple(re.findall(r"[^\W_]+", parted.lower()))
-    return () if name.lower() in KINDS else tuple(word for word in found if word not in KINDS)
+    parts = tuple(re.findall(r"[^\W_]+", parted.lower()))
+    return () if name.lower() in KINDS else tuple(word for word in parts if word not in KINDS)
 
 
 def is_static(name: str) -> bool:
@@ -89,27 +89,27 @@ def pair(
     markers: Sequence[Path],
     tables: Mapping[Path, str],
     root: Path,
-    given: Iterable[Path] = (),
+    with_plates: Iterable[Path] = (),
     aliases: Mapping[Path, Path] | None = None,
 ) -> Pairs:
     """Gives each table, whose kind is "forces" or "com", to the recording that it belongs to.
 
     `given`: recordings that bring their own forces. `aliases`: a file whose name counts for a table, too.
     """
-    found = Pairs(forces={path: path for path in given})
+    pairs = Pairs(forces={path: path for path in with_plates})
     recordings = [ParsedPath.of(path, root) for path in markers]
-    for kind, paired in (("forces", found.forces), ("com", found.com)):
+    for kind, paired in (("forces", pairs.forces), ("com", pairs.com)):
         places = [ParsedPath.of(path, root) for path, what in tables.items() if what == kind]
-        strangers = _by_name(places, recordings, paired, found, aliases or {}, root)
-        _by_number(kind, strangers, places, recordings, found, root)
-    return found
+        strangers = _by_name(places, recordings, paired, pairs, aliases or {}, root)
+        _by_number(kind, strangers, places, recordings, pairs, root)
+    return pairs
 
 
 def _by_name(
     tables: list[ParsedPath],
     recordings: list[ParsedPath],
     paired: dict[Path, Path],
-    found: Pairs,
+    pairs: Pairs,
     aliases: Mapping[Path, Path],
     root: Path,
 ) -> list[ParsedPath]:
@@ -129,16 +129,16 @@ def _by_name(
             strangers.append(table)
         elif len(able) > 1 and able[0][0] == able[1][0]:
             which = " and ".join(_relative(path, root) for score, path in able if score == able[0][0])
-            found.left[table.path] = f"it can belong to {which}; give it the name of one of them"
+            pairs.left[table.path] = f"it can belong to {which}; give it the name of one of them"
         else:
             claims.setdefault(able[0][1], []).append((able[0][0], table.path))
     for recording, claimed in claims.items():
         for _, path in sorted(claimed):
             if recording in paired:
-                found.left[path] = (
-                    f"{_relative(recording, root)} has {_what(paired, found)} {_source(recording, paired, root)}"
+                pairs.left[path] = (
+                    f"{_relative(recording, root)} has {_what(paired, pairs)} {_source(recording, paired, root)}"
                 )
-                found.rivals[path] = recording
+                pairs.rivals[path] = recording
             else:
                 paired[recording] = path
     return strangers
@@ -149,22 +149,22 @@ def _by_number(
     strangers: list[ParsedPath],
     tables: list[ParsedPath],
     recordings: list[ParsedPath],
-    found: Pairs,
+    pairs: Pairs,
     root: Path,
 ) -> None:
     """Gives those tables to a recording which are the only ones of their kind, in a folder or of a person."""
-    paired = found.forces if kind == "forces" else found.com
+    paired = pairs.forces if kind == "forces" else pairs.com
     what = "forces" if kind == "forces" else "centre of mass"
     for table in strangers:
-        owner, why = _only_candidate(table, tables, recordings, paired, None if kind == "forces" else found.forces)
+        owner, why = _only_candidate(table, tables, recordings, paired, None if kind == "forces" else pairs.forces)
         if owner is None:
-            found.left[table.path] = (
+            pairs.left[table.path] = (
                 "its name has no recording's name in it; expected such as "
                 f"{recordings[0].path.stem}_{'grf' if kind == 'forces' else 'com'}{table.path.suffix}"
             )
         else:
             paired[owner.path] = table.path
-            found.notes.append(
+            pairs.notes.append(
                 f"{_relative(table.path, root)}: taken as the {what} of {_relative(owner.path, root)}, "
                 f"the only recording {why}"
             )
@@ -188,14 +188,14 @@ def _only_candidate(
             continue
         move = [one for one in able if not is_static(one.path.stem) and not is_static(" ".join(one.words))]
         loaded = [] if forces is None else [one for one in able if one.path in forces]
-        for some, why in ((able, where), (loaded, "with forces"), (move, "in which nobody stands still")):
-            if len(some) == 1 and some[0].path not in paired:
-                return some[0], why
+        for candidates, why in ((able, where), (loaded, "with forces"), (move, "in which nobody stands still")):
+            if len(candidates) == 1 and candidates[0].path not in paired:
+                return candidates[0], why
     return None, ""
 
 
-def _what(paired: dict[Path, Path], found: Pairs) -> str:
-    return "forces" if paired is found.forces else "a centre of mass"
+def _what(paired: dict[Path, Path], pairs: Pairs) -> str:
+    return "forces" if paired is pairs.forces else "a centre of mass"
 
 
 def _source(recording: Path, paired: dict[Path, Path], root: Path) -> str:
@@ -231,7 +231,7 @@ def names(markers: Sequence[Path], root: Path) -> list[str]:
     longer = ["_".join([*place.owner, name]) for place, name in zip(places, short, strict=True)]
     whole = ["_".join(path.relative_to(root).with_suffix("").parts) for path in markers]
     ended = ["_".join([*path.relative_to(root).with_suffix("").parts, path.suffix[1:]]) for path in markers]
-    found = list(short)
+    unique = list(short)
     for better in (longer, whole, ended):
-        found = [name if found.count(name) == 1 else better[row] for row, name in enumerate(found)]
-    return found
+        unique = [name if unique.count(name) == 1 else better[row] for row, name in enumerate(unique)]
+    return unique

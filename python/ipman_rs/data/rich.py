@@ -261,23 +261,25 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
     except ValueError as error:
         return [Finding("missing", str(error), "fetch the bodies of a split and unpack them")]
     counts = {split: sum(folder.parent.name == split for folder in folders) for split in SPLITS}
-    found = [Finding("ok", f"{len(folders)} sequences ({', '.join(f'{n} in {split}' for split, n in counts.items())})")]
+    findings = [
+        Finding("ok", f"{len(folders)} sequences ({', '.join(f'{n} in {split}' for split, n in counts.items())})")
+    ]
     for split, names in IPMAN.items():
         lacking = [name for name in names if name not in {folder.name for folder in folders}]
         if lacking:
-            found.append(Finding("missing", f"{split}: {', '.join(lacking)}"))
+            findings.append(Finding("missing", f"{split}: {', '.join(lacking)}"))
         else:
-            found.append(Finding("ok", f"{split}: all {len(names)} sequences"))
+            findings.append(Finding("ok", f"{split}: all {len(names)} sequences"))
     read, cached_scene = [], lru_cache(maxsize=None)(read_scene)
     for folder in folders:
-        found += _check_companions(root, folder)
+        findings += _check_companions(root, folder)
         try:
             scene = cached_scene(*scene_files(root, folder))
             for view in _views(root, folder, (0,)):
                 read.append((view.sequence, lambda v=view, s=scene: _frames(root, v, s, None, None)))
         except ValueError as error:
-            found.append(Finding("wrong", str(error)))
-    return found + sequences.check_sequences(read)
+            findings.append(Finding("wrong", str(error)))
+    return findings + sequences.check_sequences(read)
 
 
 def _check_companions(root: Path, folder: Path) -> list[Finding]:

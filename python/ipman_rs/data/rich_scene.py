@@ -77,9 +77,9 @@ def camera(file: Path) -> tuple[Array, Array, Array]:
 
 
 def _matrix(root: Any, name: str, size: int, file: Path) -> Array:
-    said = safe_xml.text(root, f"{name}/data", file).split()
+    words = safe_xml.text(root, f"{name}/data", file).split()
     try:
-        numbers = np.array(said, np.float64)
+        numbers = np.array(words, np.float64)
     except ValueError as error:
         raise ValueError(f"{file}: {name}: expected numbers: {error}") from None
     if numbers.size != size or not np.isfinite(numbers).all():
@@ -114,10 +114,10 @@ def ground(mesh: Path, to_world: Path) -> Ground:
 
 def _transform(file: Path) -> tuple[Array, Array, float]:
     """R, t and c of world = c · X R + t."""
-    said = read_json(file)
+    content = read_json(file)
     try:
-        rotation, translation = np.array(said["R"], float), np.array(said["t"], float).reshape(3)
-        scale = float(np.array(said["c"], float).reshape(()))
+        rotation, translation = np.array(content["R"], float), np.array(content["t"], float).reshape(3)
+        scale = float(np.array(content["c"], float).reshape(()))
     except (ValueError, LookupError, TypeError, OverflowError) as error:
         raise ValueError(f"{file}: expected R, t and c of the way to the scan's world: {error!r}") from None
     if rotation.shape != (3, 3) or np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3:

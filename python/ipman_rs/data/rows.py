@@ -79,8 +79,8 @@ class RowFile:
                 continue
             bad = sum(_not_finite(array[start : start + PIECE]) for start in range(0, self.count, PIECE))
             if bad:
-                said = f"{name}: NaN or infinity in {bad} of {self.count} rows"
-                yield Finding("missing", said, "no figure is computed for them")
+                message = f"{name}: NaN or infinity in {bad} of {self.count} rows"
+                yield Finding("missing", message, "no figure is computed for them")
 
     def _opened(self, names: Iterable[str]) -> dict[str, NDArray[Any]]:
         arrays: dict[str, NDArray[Any]] = {}

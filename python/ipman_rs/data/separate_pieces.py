@@ -25,11 +25,11 @@ def check_pieces(vertices: Array, faces: NDArray[np.integer[Any]], normal: Array
     points = np.asarray(vertices, np.float64)[used]
     size = (_extreme_per_piece(np.maximum, points, piece) - _extreme_per_piece(np.minimum, points, piece)).max(axis=1)
     large = size >= LARGE * size.max()
-    found = []
+    findings = []
     if large.sum() > 1:
         what = f"{large.sum()} large separate pieces are measured as one body"
-        found.append(Finding("odd", what, "several people, things beside one, or clothes over one?"))
-    return found + _below(points @ Ground(normal).normal, piece, large, GAP * float(size.max()))
+        findings.append(Finding("odd", what, "several people, things beside one, or clothes over one?"))
+    return findings + _below(points @ Ground(normal).normal, piece, large, GAP * float(size.max()))
 
 
 def _below(heights: Array, piece: NDArray[np.int64], large: NDArray[np.bool_], gap: float) -> list[Finding]:

@@ -56,8 +56,8 @@ def sequences(lengths: Sequence[int], read: Callable[[int], Frames], source: str
     """
     if not sum(lengths):
         raise ValueError(f"{source}: no frame at all: is the download complete?")
-    kept = lru_cache(KEPT)(read)
-    return Joined([OnDemand(length, partial(kept, index)) for index, length in enumerate(lengths)])
+    cached = lru_cache(KEPT)(read)
+    return Joined([OnDemand(length, partial(cached, index)) for index, length in enumerate(lengths)])
 
 
 def fill_missing(parts: Sequence[Frames]) -> list[Frames]:
@@ -99,29 +99,29 @@ def require_plausible_units(file: Path, frames: Frames) -> Frames:
 def check_sequences(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Finding]:
     """What can be told of sequences that are read one after the other: what is not right in each, and of all, by a
     sample."""
-    found, some = [], []
+    findings, samples = [], []
     for index, (name, read) in enumerate(parts):
         try:
             frames = read()
         except (ValueError, ImportError) as error:
-            found.append(check.Finding("wrong", str(error)))
+            findings.append(check.Finding("wrong", str(error)))
             continue
-        few = frames[check.evenly(len(frames), check.SAMPLE)]
-        for each in check.check_frames(replace(few, ground=None)):
+        sample = frames[check.evenly(len(frames), check.SAMPLE)]
+        for each in check.check_frames(replace(sample, ground=None)):
             if each.level != "ok":
-                found.append(check.Finding(each.level, f"{name}: {each.what}", each.advice))
+                findings.append(check.Finding(each.level, f"{name}: {each.what}", each.advice))
         if index in check.evenly(len(parts), SAMPLED**2):
-            some.append(frames[check.evenly(len(frames), SAMPLED)])
+            samples.append(frames[check.evenly(len(frames), SAMPLED)])
     try:
-        return found + (check.check_frames(concatenate(some)) if some else [])
+        return findings + (check.check_frames(concatenate(samples)) if samples else [])
     except ValueError as error:  # they have other joints, or only some have a ground
-        return [*found, check.Finding("missing", str(error))]
+        return [*findings, check.Finding("missing", str(error))]
 
 
 def check_recording(name: str, frames: Frames) -> list[check.Finding]:
     """What can be told of one recording, under its name."""
-    found = check.check_frames(check.sample(frames))
-    return [check.Finding(each.level, f"{name}: {each.what}", each.advice) for each in found]
+    findings = check.check_frames(check.sample(frames))
+    return [check.Finding(each.level, f"{name}: {each.what}", each.advice) for each in findings]
 
 
 def frame_names(name: str, count: int) -> NDArray[np.str_]:

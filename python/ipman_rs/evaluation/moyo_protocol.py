@@ -23,7 +23,7 @@ GAMMAS = np.linspace(10.0, 5000.0, 15)  # 1/m
 
 
 class PressureFigures(NamedTuple):
-    """Results of F frames, (F,) each: pressure IoU, CoP error (m), mean difference of the maps, and the α, γ (1/m) used."""
+    """Results of F frames, (F,) each: pressure IoU, CoP error (m), mean difference of the maps; the α, γ (1/m) used."""
 
     iou: Any
     cop_error: Any

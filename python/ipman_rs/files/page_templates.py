@@ -11,8 +11,8 @@ import jinja2
 
 def environment(folder: Path, **filters: Callable[..., Any]) -> jinja2.Environment:
     """For the templates in a folder; `filters` by the names that they have there."""
-    found = jinja2.Environment(
+    templates = jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder), trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
     )
-    found.filters |= filters
-    return found
+    templates.filters |= filters
+    return templates

@@ -27,10 +27,10 @@ def names(path: Path) -> set[str]:
     regular_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            found = {name.removesuffix(".npy") for name in archive.namelist()}
-        for name in found:
+            arrays = {name.removesuffix(".npy") for name in archive.namelist()}
+        for name in arrays:
             name.encode()  # half a character cannot be written anywhere
-        return found
+        return arrays
     except Exception as error:  # damaged bytes can fail in any way
         raise ValueError(f"{path}: not a .npz file ({error}); is the download complete?") from error
 

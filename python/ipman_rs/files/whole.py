@@ -88,8 +88,8 @@ def _remove_leftovers(path: Path) -> None:
     except OSError:
         return
     for entry in entries:
-        known = _PART.fullmatch(entry.name)
-        if known is None or known["name"] != name:
+        match = _PART.fullmatch(entry.name)
+        if match is None or match["name"] != name:
             continue
         with contextlib.suppress(OSError), open(entry.path, "rb") as left:
             _lock(left)

@@ -153,9 +153,9 @@ class MeasuredComparison:
     @cached_property
     def kind(self) -> str:
         """What the person does, as `Movement.kind` says."""
-        seen = np.ones(len(self.times), bool) if self.seen is None or not self.seen.any() else self.seen
+        visible = np.ones(len(self.times), bool) if self.seen is None or not self.seen.any() else self.seen
         paths = (self.com, self.acceleration, self.computed.soles, self.forward)
-        com, acceleration, soles, forward = (path[seen] for path in paths)
+        com, acceleration, soles, forward = (path[visible] for path in paths)
         floor = float(self.floor.height)
         return Movement(com, acceleration, soles, self.computed.left, forward, floor, self.rate or 1.0).kind
 
@@ -195,12 +195,12 @@ class MeasuredComparison:
     def centers(self) -> Mapping[str, Array]:
         """Where the centre of pressure should be (T, 3) m, by name: of a body at rest, of a moving one, and by the
         paper's formula for each γ."""
-        found = {"at rest: g(CoM)": self.floor.project(self.com)}
+        centers_by_name = {"at rest: g(CoM)": self.floor.project(self.com)}
         if self.plates is not None:
-            found["moving: ZMP of the CoM"] = zero_moment_point(self.com, self.acceleration, self.floor)
-            found["moving: ZMP of the parts"] = self.zmp
-            found["CoM along the force"] = along_force(self.com, self.force, self.floor)
-        return {**found, **{f"γ = {gamma}": points for gamma, points in self.computed.cop.items()}}
+            centers_by_name["moving: ZMP of the CoM"] = zero_moment_point(self.com, self.acceleration, self.floor)
+            centers_by_name["moving: ZMP of the parts"] = self.zmp
+            centers_by_name["CoM along the force"] = along_force(self.com, self.force, self.floor)
+        return {**centers_by_name, **{f"γ = {gamma}": points for gamma, points in self.computed.cop.items()}}
 
 
 def beside_centers(computed: Computed, rate: float, floor: Ground, plates: ForcePlates) -> Mask:

@@ -134,9 +134,9 @@ def first_shares(points: Array, pressure: Array, loads: Array, centers: Array) -
 
     loads (T, P) and centers (T, P, 3) m of the plates; NaN where not exactly two carry a load.
     """
-    found = np.full(len(points), np.nan)
+    shares = np.full(len(points), np.nan)
     for row in np.flatnonzero((loads > 0).sum(axis=1) == 2):
         first, second = (centers[row, plate, [0, 2]] for plate in np.flatnonzero(loads[row] > 0))
         across = (points[row][:, [0, 2]] - (first + second) / 2) @ (second - first)
-        found[row] = pressure[row, across < 0].sum() / pressure[row].sum()
-    return found
+        shares[row] = pressure[row, across < 0].sum() / pressure[row].sum()
+    return shares

@@ -106,13 +106,13 @@ def find_trials(
 def _files(folder: Path, apart: Path | None) -> list[Path]:
     """All but hidden ones."""
     away = None if apart is None else apart.resolve()
-    found = []
+    files = []
     for path in sorted(folder.rglob("*")):
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
         if hidden or not path.is_file() or (away is not None and path.resolve().is_relative_to(away)):
             continue
-        found.append(path)
-    return found
+        files.append(path)
+    return files
 
 
 def _drop_copies(markers: Sequence[Path], root: Path) -> tuple[list[Path], list[str]]:

@@ -62,9 +62,9 @@ def plates(
     `loads`: in which of its columns the forces are; `length`: metres in one of a `.c3d`'s, if it says that wrongly.
     """
     if path.suffix.lower() == ".c3d":
-        found = _recording(path, length)
-        axis = _axis(up, found.up, path)
-        return force_plates.from_c3d(found, axis).turned(TO_Y_UP[axis])
+        recording = _recording(path, length)
+        axis = _axis(up, recording.up, path)
+        return force_plates.from_c3d(recording, axis).turned(TO_Y_UP[axis])
     axis = _axis(up, "y", path)
     return opensim.plates(opensim.storage(path), unit, axis, loads).turned(TO_Y_UP[axis])
 
@@ -77,11 +77,11 @@ def center_of_mass(
     `up` and `length` as in `plates`; `subject`: whose, where a `.c3d` has several people.
     """
     if path.suffix.lower() == ".c3d":
-        found = _recording(path, length)
-        points = found.center_of_mass(subject)
+        recording = _recording(path, length)
+        points = recording.center_of_mass(subject)
         if points is None:
             raise ValueError(f"{path}: expected a centre of mass by a model such as Plug-in Gait, it has none")
-        return interpolate(found.times, points @ TO_Y_UP[_axis(up, found.up, path)].T, times)
+        return interpolate(recording.times, points @ TO_Y_UP[_axis(up, recording.up, path)].T, times)
     if path.suffix.lower() == ".csv":
         own, points = _csv(path)
     else:
@@ -91,8 +91,8 @@ def center_of_mass(
 
 
 def _recording(path: Path, length: float | None) -> c3d.C3DFile:
-    found = c3d.read(path)
-    return found if length is None else replace(found, unit=length)
+    recording = c3d.read(path)
+    return recording if length is None else replace(recording, unit=length)
 
 
 def _axis(up: Up, usual: str, path: Path) -> str:

@@ -46,12 +46,12 @@ def images(content: Any, source: str) -> list[Image]:
     """A row for each image of the file."""
     frames = _frames(content)
     size = _size(content, source) if isinstance(content, dict) else None
-    found = []
+    pictures = []
     for index, frame in enumerate(frames):
         place = source if len(frames) == 1 else f"{source}: frame {index}"
-        given = {"landmarks": frame} if isinstance(frame, list) else frame or {}
-        found.append(Image(place, _people(given, place), _size(given, place) or size))
-    return found
+        entry = {"landmarks": frame} if isinstance(frame, list) else frame or {}
+        pictures.append(Image(place, _people(entry, place), _size(entry, place) or size))
+    return pictures
 
 
 def _frames(content: Any) -> list[Any]:

@@ -24,13 +24,13 @@ def matches(content: Any) -> bool:
 def images(content: Any, source: str) -> list[Image]:
     if isinstance(content, dict):
         _check_names(content.get("meta_info"), source)
-    found = []
+    pictures = []
     for label, people in _frames(content) or []:
         place = source if label is None else f"{source}: frame {short_label(label)}"
         if people is not None and not isinstance(people, list):
             raise ValueError(f"{place}: instances: expected a list, got {type(people).__name__}")
-        found.append(Image(place, read_people(people or [], coco.person, f"{place}: instances")))
-    return found or [Image(source, [])]
+        pictures.append(Image(place, read_people(people or [], coco.person, f"{place}: instances")))
+    return pictures or [Image(source, [])]
 
 
 def _frames(content: Any) -> list[tuple[Any, Any]] | None:

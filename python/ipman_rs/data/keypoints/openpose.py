@@ -60,8 +60,8 @@ def shares(points: Array) -> tuple[Array, str]:
 
     OpenPose finds nothing outside the image, so a number below 0 says that -1 is its left or upper end.
     """
-    seen = points[:, 2] > 0
-    if points[seen, :2].min(initial=0.0) < 0 or (points[~seen, :2] == -1).all(axis=1).any():
+    visible = points[:, 2] > 0
+    if points[visible, :2].min(initial=0.0) < 0 or (points[~visible, :2] == -1).all(axis=1).any():
         return np.column_stack([(points[:, :2] + 1) / 2, points[:, 2]]), "-1 to 1"
     return points, "0 to 1"
 

@@ -52,42 +52,42 @@ class Image:
 
 def read_people(entries: Sequence[Any], person: Callable[[Any, str], Person], place: str) -> list[Person | str]:
     """The people of these entries, each read on its own: what is wrong with one says nothing about the others."""
-    found: list[Person | str] = []
+    people: list[Person | str] = []
     for index, entry in enumerate(entries):
         try:
-            found.append(person(entry, f"{place}[{index}]"))
+            people.append(person(entry, f"{place}[{index}]"))
         except ValueError as error:
-            found.append(str(error))
-    return found
+            people.append(str(error))
+    return people
 
 
 def array(value: Any, place: str) -> Array:
     """`value` as numbers, without leading axes of length 1; null is NaN. ValueError, naming the place."""
     try:
-        found = np.array(value, dtype=np.float64)
+        values = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{place}: expected numbers, got something else among them") from None
-    while found.ndim > 2 and found.shape[0] == 1:
-        found = found[0]
-    return found
+    while values.ndim > 2 and values.shape[0] == 1:
+        values = values[0]
+    return values
 
 
 def numbers(value: Any, rows: int, columns: int, place: str) -> Array:
     """`value`, flat or nested, as an array (rows, columns). ValueError, naming the place, for anything else."""
-    found = array(value, place)
-    if found.shape not in ((rows * columns,), (rows, columns)):
-        raise ValueError(f"{place}: expected {rows} points of {columns} numbers, got {_shape(found)}")
-    return finite_points(found.reshape(rows, columns), place)
+    values = array(value, place)
+    if values.shape not in ((rows * columns,), (rows, columns)):
+        raise ValueError(f"{place}: expected {rows} points of {columns} numbers, got {_shape(values)}")
+    return finite_points(values.reshape(rows, columns), place)
 
 
-def _shape(found: Array) -> str:
-    return "none" if found.size == 0 else f"shape {found.shape}"
+def _shape(values: Array) -> str:
+    return "none" if values.size == 0 else f"shape {values.shape}"
 
 
 def expected_counts(layouts: Mapping[int, tuple[str, Layout]]) -> str:
     """How many points a person may have, for errors."""
-    said = [f"{count} ({name})" for count, (name, _) in layouts.items()]
-    return f"{', '.join(said[:-1])} or {said[-1]}"
+    options = [f"{count} ({name})" for count, (name, _) in layouts.items()]
+    return f"{', '.join(options[:-1])} or {options[-1]}"
 
 
 def finite_points(points: Array, place: str) -> Array:
@@ -142,11 +142,11 @@ def confidences(images: Sequence[Image]) -> list[str]:
     return [*notes, f"scores up to {most:.3g} cut off at 1"] if most > 1.005 else notes
 
 
-def size_of(given: Mapping[str, Any], place: str) -> tuple[float, float] | None:
+def size_of(record: Mapping[str, Any], place: str) -> tuple[float, float] | None:
     """Width and height of an image, where a file has them under one of their usual names. ValueError for no numbers."""
     for pair in SIZES:
-        if all(given.get(name) is not None for name in pair):
-            return width_height([given[name] for name in pair], place)
+        if all(record.get(name) is not None for name in pair):
+            return width_height([record[name] for name in pair], place)
     return None
 
 
@@ -184,15 +184,15 @@ def choose(image: Image, person: int | None) -> tuple[Person, str | None]:
     if person is not None and not 0 <= person < len(people):
         raise ValueError(f"person: expected 0 to {len(people) - 1} in {place}, got {person}")
     usable = image.usable if person is None else {person: people[person]}
-    seen = {index: one for index, one in usable.items() if isinstance(one, Person) and (one.points[:, 2] > 0).any()}
-    if not seen:
+    visible = {index: one for index, one in usable.items() if isinstance(one, Person) and (one.points[:, 2] > 0).any()}
+    if not visible:
         raise ValueError(_nobody(image, person))
-    index = max(seen, key=lambda number: presence(seen[number].points))
+    index = max(visible, key=lambda number: presence(visible[number].points))
     if person is not None or len(people) == 1:
-        return seen[index], None
+        return visible[index], None
     faults = [f"{number} ({_short(one, place)})" for number, one in enumerate(people) if isinstance(one, str)]
     note = f"{place}: {len(people)} people; took number {index}, the largest and most confident"
-    return seen[index], note + (f"; cannot be used: {', '.join(faults)}" if faults else "")
+    return visible[index], note + (f"; cannot be used: {', '.join(faults)}" if faults else "")
 
 
 def _nobody(image: Image, person: int | None) -> str:
@@ -210,7 +210,7 @@ def _short(fault: str, place: str) -> str:
 
 def presence(points: Array) -> float:
     """How large a person is in the image, times how surely they were seen."""
-    seen = points[points[:, 2] > 0]
-    if len(seen) == 0:
+    visible = points[points[:, 2] > 0]
+    if len(visible) == 0:
         return 0.0
-    return float(np.linalg.norm(np.ptp(seen[:, :2], axis=0)) * points[:, 2].mean())
+    return float(np.linalg.norm(np.ptp(visible[:, :2], axis=0)) * points[:, 2].mean())

@@ -57,20 +57,20 @@ def meanings(names: Sequence[str], own: Mapping[str, Meaning | None] | None = No
     the same one, the one that needed the least taken away counts. Files of keypoints, which name the hips, mean joints
     by "RKnee".
     """
-    given = {comparable(name): meaning for name, meaning in (own or {}).items()}
+    own_meanings = {comparable(name): meaning for name, meaning in (own or {}).items()}
     ends = _shared_ends(names)
     ways = [_variants(name, ends) for name in names]
     points = {"lhip", "rhip"} <= {comparable(name) for name in names}
-    found = _match(names, ways, given, _KNOWN, skipped=_KEYPOINTS if points else {})
-    if points and len(found) < FEWEST_POINTS:  # with as many markers, keypoints in the file are not needed
-        return _match(names, ways, given, _KEYPOINTS, skipped={})
-    return found
+    matches = _match(names, ways, own_meanings, _KNOWN, skipped=_KEYPOINTS if points else {})
+    if points and len(matches) < FEWEST_POINTS:  # with as many markers, keypoints in the file are not needed
+        return _match(names, ways, own_meanings, _KEYPOINTS, skipped={})
+    return matches
 
 
 def _match(
     names: Sequence[str],
     ways: Sequence[Sequence[str]],
-    given: Mapping[str, Meaning | None],
+    own: Mapping[str, Meaning | None],
     known: Mapping[str, Meaning],
     skipped: Mapping[str, Meaning],
 ) -> dict[str, Meaning]:
@@ -78,11 +78,11 @@ def _match(
     for name, variants in zip(names, ways, strict=True):
         for steps, variant in enumerate(variants):
             key = comparable(variant)
-            if (key in given or key in known) and not (steps == 0 and key in skipped and key not in given):
+            if (key in own or key in known) and not (steps == 0 and key in skipped and key not in own):
                 if key not in taken or steps < taken[key][0]:
                     taken[key] = steps, name
                 break
-    meant = {name: given.get(key, known.get(key)) for key, (_, name) in taken.items()}
+    meant = {name: own.get(key, known.get(key)) for key, (_, name) in taken.items()}
     return {name: meaning for name in names if (meaning := meant.get(name)) is not None}
 
 

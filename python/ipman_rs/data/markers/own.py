@@ -33,10 +33,10 @@ def _meaning(what: str, place: Any, body: BodyModel) -> Meaning | None:
 
     if place is None or place == "":
         return None
-    known = places(body)
+    place_names = places(body)
     if isinstance(place, str):
         word = place.strip().lower().replace(" ", "_").replace("-", "_")
-        if word in known:
+        if word in place_names:
             return word
         other = meanings([place.strip()])
         if other:

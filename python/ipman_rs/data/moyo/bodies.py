@@ -77,18 +77,18 @@ def _center_of_mass(path: Path, count: int) -> Array:
     """(count, 3) m, NaN where Vicon has none."""
     points = c3d.read(path).positions([COM, COM_FLOOR])
     points[(points == 0).all(axis=-1)] = np.nan
-    found, floor = _pad_rows(path, "frames", points, count).swapaxes(0, 1)
-    both = np.isfinite(floor).all(axis=1) & np.isfinite(found).all(axis=1)
+    centers, floor = _pad_rows(path, "frames", points, count).swapaxes(0, 1)
+    both = np.isfinite(floor).all(axis=1) & np.isfinite(centers).all(axis=1)
     if not both.any():
-        return found
-    off = np.median(np.abs(floor - found)[both], axis=0)
+        return centers
+    off = np.median(np.abs(floor - centers)[both], axis=0)
     if off[:2].max() > 0.02 or abs(np.median(floor[both, 2])) > 0.05:
         axis = "xyz"[int(off.argmax())]
         raise ValueError(
             f"{path}: looks like {axis} up: {COM_FLOOR} is expected under {COM}, on z = 0, but lies "
             f"({', '.join(f'{number:.2f}' for number in off)}) m from it"
         )
-    return found
+    return centers
 
 
 def _pad_rows(path: Path, what: str, values: NDArray[Any], count: int) -> NDArray[Any]:

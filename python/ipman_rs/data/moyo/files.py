@@ -43,15 +43,15 @@ def find_sequences(root: Path, split: str | None) -> list[SequenceFiles]:
     if not root.is_dir():
         raise ValueError(f"{root}: expected a folder with mosh/train/*{SUFFIX} in it, {_what(root)}")
     sessions = [root] if (root / "mosh").is_dir() else sorted(each.parent for each in root.glob("*/mosh"))
-    found = [
+    recordings = [
         SequenceFiles(session, part, file.name.removesuffix(SUFFIX))
         for session in sessions
         for part in (SPLITS if split is None else (split,))
         for file in sorted((session / "mosh" / part).glob(f"*{SUFFIX}"))
     ]
-    if not found:
+    if not recordings:
         raise ValueError(f"{root}: expected sequences (mosh/{split or 'train'}/*{SUFFIX}), found none")
-    return found
+    return recordings
 
 
 def _what(path: Path) -> str:

@@ -96,8 +96,8 @@ class Rendered:
         count = len(self.keypoint_names)
         for key, shape in {**SHAPES, "keypoints": (count, 3), "visible": (count,)}.items():
             if arrays[key].shape != shape or arrays[key].dtype.kind not in "fb":
-                found = f"{arrays[key].shape} of {arrays[key].dtype}"
-                raise self._bad(name, f"{key}: expected numbers of shape {shape}, got {found}")
+                actual = f"{arrays[key].shape} of {arrays[key].dtype}"
+                raise self._bad(name, f"{key}: expected numbers of shape {shape}, got {actual}")
             if not np.isfinite(arrays[key]).all():
                 raise self._bad(name, f"{key}: not finite")
         return Labels(arrays, record)
@@ -177,11 +177,11 @@ class Rendered:
 
 def members(path: Path) -> dict[str, ByteRange]:
     """The files of a shard, as far as it can be read."""
-    found: dict[str, ByteRange] = {}
+    places: dict[str, ByteRange] = {}
     try:
         with tarfile.open(regular_file(path), "r:") as archive:
             for member in archive:
-                found[member.name] = member.offset_data, member.size
+                places[member.name] = member.offset_data, member.size
     except Exception as error:  # damaged bytes can fail in any way
-        warnings.warn(f"{path}: damaged after {len(found)} files: {error}", stacklevel=2)
-    return found
+        warnings.warn(f"{path}: damaged after {len(places)} files: {error}", stacklevel=2)
+    return places

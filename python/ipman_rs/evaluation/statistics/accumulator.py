@@ -28,14 +28,14 @@ class Clusters(NamedTuple):
     names: list[str]  # sequences, or the numbers of the clusters that they were pooled into
     sums: NDArray[np.float64]  # (G,) exact, rounded once
     counts: NDArray[np.int64]  # (G,) frames with a value
-    prints: NDArray[np.uint64]  # (G,) sum of the fingerprints of the frames' names: it identifies the set of frames
+    prints: NDArray[np.uint64]  # (G,) sum of the fingerprints of the frames' names, which identifies the frames
 
 
 class Accumulator:
     """Sums of metrics, one number per frame, by metric and sequence.
 
-    Sums are exact (`exact_sum`), so `summary` and `intervals` depend only on which frames were added, not on their order
-    or on how they were distributed over merged accumulators. The mean is the exact one, rounded once.
+    Sums are exact (`exact_sum`), so `summary` and `intervals` depend only on which frames were added, not on their
+    order or on how they were distributed over merged accumulators. The mean is the exact one, rounded once.
 
     Memory does not grow with the number of frames. Sums are kept per sequence, for the intervals; beyond 4096 sequences
     (a single image is one), per cluster instead, of 4096 clusters to which a hash of their names assigns the sequences.
@@ -57,7 +57,7 @@ class Accumulator:
 
         Args:
             figures: {metric: (F,)}; values that are not finite count as missing.
-            names: (F,) of the frames, unique in the data set; `compare` uses them to check that methods have the same frames.
+            names: (F,) of the frames, unique in the data set, by which `compare` checks that methods have the same.
             sequences: (F,) names.
             why: the reason for a missing value: one text, (F,) texts for all metrics, or {metric: either of these}; see
                 `reasons`. Used only where a value is missing.

@@ -1,8 +1,8 @@
-"""Which joints are compared, and what makes them on either side.
+"""Which joints are compared, and how they are obtained on either side.
 
-Where truth and estimate are bodies, both sides' joints are made of their bodies in one way: of the vertices by the same
-regressor, or, without a regressor, by the body model that both have. Joints that a data set measured are compared only
-where it has no bodies, or where the estimate is joints without a body; they then go by their names.
+Where truth and estimate are bodies, the joints of both are computed in the same way: from the vertices by the same
+regressor, or, without a regressor, by the body model if both have the same. Joints that a data set measured are
+compared only where it has no bodies, or where the estimate has joints but no body; they are then matched by name.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from .models import FrameBodies
 Points = NDArray[Any]
 Maker = Literal["given", "own", "extra", "h36m"]
 
-# The 14 of Human3.6M's 17 joints by which the literature compares (SPIN's H36M_TO_J14). The pelvis is the root, and not
-# counted; MPI-INF-3DHP counts all 17.
+# The 14 of Human3.6M's 17 joints on which the literature reports errors (SPIN's H36M_TO_J14). The pelvis is the root
+# and does not count; for MPI-INF-3DHP all 17 count.
 COUNTED = (
     "right_ankle", "right_knee", "right_hip", "left_hip", "left_knee", "left_ankle", "right_wrist", "right_elbow",
     "right_shoulder", "left_shoulder", "left_elbow", "left_wrist", "neck", "head",
 )  # fmt: skip
 ALL_17 = (*COUNTED, "pelvis", "spine", "jaw")
-LISTED = 24  # joints that are named one by one for a reader
+LISTED = 24  # joints that a report lists by name
 ROOTS = (("pelvis",), ("left_hip", "right_hip"))
-# By which regressor a body gets the joints that a data set measured, and the file that is asked for.
+# The regressor that gives a body the joints that a data set measured, and its file.
 MEASURED: dict[str, tuple[Maker, str]] = {
     "human36m": ("h36m", "J_regressor_h36m.npy"),
     "mpi-inf-3dhp": ("h36m", "J_regressor_h36m.npy"),
@@ -41,32 +41,32 @@ MEASURED: dict[str, tuple[Maker, str]] = {
 
 @dataclass(frozen=True)
 class Regressors:
-    """Those that the user gave: Human3.6M's joints, and SPIN's extra ones."""
+    """The user's joint regressors: for Human3.6M's joints, and for SPIN's extra ones."""
 
     human36m: JointRegressor | None = None
     extra: JointRegressor | None = None
 
     @classmethod
     def read(cls, paths: Sequence[str]) -> Regressors:
-        """ValueError, naming the file, for one that is damaged, or the second of its kind."""
-        found: dict[str, JointRegressor] = {}
+        """The regressors of these files. ValueError, naming the file, for a damaged one or a second of its kind."""
+        regressors: dict[str, JointRegressor] = {}
         for path in paths:
             regressor = joint_regressors.read(path)
             kind = "human36m" if regressor.names == HUMAN36M else "extra"
-            if kind in found:
+            if kind in regressors:
                 raise ValueError(f"{path}: expected one regressor of {len(regressor.names)} joints, got two")
-            found[kind] = regressor
-        return cls(**found)
+            regressors[kind] = regressor
+        return cls(**regressors)
 
 
 @dataclass(frozen=True)
 class Definition:
     """The joints that are compared.
 
-    names: those that are counted. roots: the pelvis, or both hips, whose mean both sides are aligned at. truth,
-    estimate: what makes the joints of each side: "given" by a file, the body's "own", "h36m" or "extra" by a regressor
-    of the vertices. same: both sides by one definition, so that equal bodies have equal joints. words: the same for a
-    reader.
+    names: the joints that count. roots: the pelvis, or both hips; both sides are aligned at their mean. truth,
+    estimate: the source of each side's joints: "given" by a file, the body's "own", or a regressor of the vertices
+    ("h36m", "extra"). same: both sides have the same definition, so that equal bodies have equal joints. words: all of
+    this as a sentence.
     """
 
     names: tuple[str, ...]
@@ -79,7 +79,7 @@ class Definition:
 
 @dataclass(frozen=True)
 class PairedJoints:
-    """Joints (F, K, 3) of the same names, and the root (F, 3) of each."""
+    """Joints (F, K, 3) m of both sides, under the same names, and the root (F, 3) m of each."""
 
     true: Points
     estimated: Points
@@ -90,10 +90,13 @@ class PairedJoints:
 def define(
     truth: FrameBodies, estimate: FrameBodies, measured: frozenset[str], regressors: Regressors, data: str
 ) -> Definition | None:
-    """How these two are compared; None where they share fewer than three joints, or no pelvis and no hips.
+    """How truth and estimate are compared; None if they share fewer than three joints, or neither pelvis nor hips.
 
-    measured: the data set's own joints that have numbers in some frame. data: name of the data set. ValueError where a
-    body would be held against joints of another definition, or where the truth is bodies whose model is missing.
+    measured: those of the data set's own joints that are finite in some frame. data: name of the data set.
+
+    Raises:
+        ValueError: a body would be compared with joints of another definition, or the body model of the truth is
+            missing.
     """
     if truth.missing_model is not None and estimate.vertices is not None and estimate.file_joints is None:
         raise ValueError(
@@ -118,7 +121,7 @@ def define(
 def paired_joints(
     truth: FrameBodies, estimate: FrameBodies, definition: Definition, regressors: Regressors
 ) -> PairedJoints:
-    """The joints of a definition."""
+    """The joints of both sides, as the definition says."""
     true = _by_name(truth, definition.truth, regressors)
     guess = _by_name(estimate, definition.estimate, regressors)
     return PairedJoints(
@@ -139,7 +142,7 @@ def _stacked(points: dict[str, Points], names: Sequence[str]) -> Points:
 
 
 def _makers(truth: FrameBodies, estimate: FrameBodies, regressors: Regressors, data: str) -> tuple[Maker, Maker] | None:
-    """What makes the joints of the truth and of the estimate; None where one has neither joints nor a body."""
+    """The sources of the joints of truth and estimate; None if one has neither joints nor a body."""
     true: Maker | None = None
     guess: Maker | None = None
     if truth.vertices is not None and estimate.vertices is not None:
@@ -160,7 +163,7 @@ def _maker_of_body(bodies: FrameBodies, regressors: Regressors) -> Maker | None:
 
 
 def _maker_as_measured(estimate: FrameBodies, regressors: Regressors, data: str) -> Maker | None:
-    """What gives a body the joints that a data set measured. ValueError where that takes a regressor."""
+    """How a body gets the joints that a data set measured. ValueError if that needs a regressor."""
     if data not in MEASURED:
         return _maker_of_body(estimate, regressors)
     maker, file = MEASURED[data]
@@ -234,7 +237,7 @@ def _words(
 
 
 def _maker_words(bodies: FrameBodies, maker: Maker, giver: str) -> str:
-    """What makes the joints of one side, in words."""
+    """The source of the joints of one side, in words."""
     own = f"the joints of the body {bodies.kind}"
     words: dict[Maker, str] = {
         "given": f"the joints that {giver}",

@@ -1,4 +1,4 @@
-"""The figures of an evaluation: how each is called and shown."""
+"""The metrics of an evaluation: titles, units, explanations, and what each needs."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _MAT = "a measured pressure map, and what BoSE needs"
 
 @dataclass(frozen=True)
 class Metric:
-    """A number a frame, in the files in metres, radians or shares; shown times `factor` in `unit`.
+    """One number per frame, stored in metres, radians or shares, and shown times `factor` in `unit`.
 
-    better: −1 where less is better, 1 where more is. needs: without it no frame has the figure. undefined: why a frame
-    with a finite body may have none nevertheless.
+    better: −1 if less is better, 1 if more is. needs: what data set and predictions must have for it. undefined: why a
+    frame with a finite body may lack it.
     """
 
     title: str

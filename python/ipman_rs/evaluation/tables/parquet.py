@@ -1,4 +1,4 @@
-"""Parquet files, by pyarrow (the extra `evaluate`): columns unpacked row by row, and a table written piece by piece."""
+"""Reading predictions from Parquet files with pyarrow (the extra `evaluate`): columns are unpacked into .npy files."""
 
 from __future__ import annotations
 
@@ -32,15 +32,20 @@ def require_pyarrow() -> tuple[Any, Any]:
 
 
 def read(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any], frozenset[str]]:
-    """The columns of predictions, unpacked into a folder, what is one for all frames, and the names of all columns.
-    ValueError if damaged."""
+    """The columns of predictions, unpacked into a folder; the values that all frames share; the names of all columns.
+
+    Raises:
+        ValueError: the file is damaged, or pyarrow is missing.
+    """
     require_pyarrow()
     try:
         with _open(path) as file:
-            known = frozenset(file.schema_arrow.names)
-            columns = {name: _unpack(path, file, name, unpacked) for name in (*TEXT, *NUMBERS) if name in known}
+            available = frozenset(file.schema_arrow.names)
+            columns = {name: _unpack(path, file, name, unpacked) for name in (*TEXT, *NUMBERS) if name in available}
             common = {
-                name: _common_value(path, file, name) for name in FOR_ALL if name in known and file.metadata.num_rows
+                name: _common_value(path, file, name)
+                for name in FOR_ALL
+                if name in available and file.metadata.num_rows
             }
     except Exception as error:  # damaged bytes can fail in any way
         if isinstance(error, OSError) and error.errno not in (None, errno.EINVAL):
@@ -48,7 +53,7 @@ def read(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, A
         if str(error).startswith(f"{path}: "):
             raise
         raise ValueError(f"{path}: not a Parquet file that can be read ({error}); is it complete?") from error
-    return columns, common, known
+    return columns, common, available
 
 
 @contextmanager
@@ -74,7 +79,7 @@ def _unpack(path: Path, file: Any, name: str, folder: Path) -> RowsOnDisk:
 
 
 def _shape(path: Path, file: Any, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Of the whole column; text is as wide as its longest."""
+    """Shape and type of a whole column; text is as wide as its longest entry."""
     row: tuple[int, ...] = ()
     dtype = np.dtype("U1")
     for number, rows in enumerate(_batches(path, file, name)):
@@ -86,7 +91,7 @@ def _shape(path: Path, file: Any, name: str) -> tuple[tuple[int, ...], np.dtype[
 
 
 def _batches(path: Path, file: Any, name: str) -> Iterator[NDArray[Any]]:
-    """The rows of a column, (n,) or (n, width), a batch after the other."""
+    """The rows of a column, batch by batch, (n,) or (n, width)."""
     pyarrow, _ = require_pyarrow()
     for batch in file.iter_batches(batch_size=_BATCH, columns=[name]):
         column = batch.column(0)
@@ -111,7 +116,7 @@ def _is_text(kind: Any) -> bool:
 
 
 def _common_value(path: Path, file: Any, name: str) -> NDArray[Any]:
-    """What every row says. ValueError where they differ."""
+    """The value that all rows have. ValueError where they differ."""
     first = None
     for rows in _batches(path, file, name):
         first = rows[0] if first is None else first

@@ -1,4 +1,4 @@
-"""Work in numbered pieces that are done once and kept, so that it goes on where it was killed, to the same bits."""
+"""Work in numbered pieces that are kept on disk, so that a killed run continues with the same bits."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ MANIFEST = "made_of.json"
 
 
 class Resumable:
-    """A piece is an `.npz` file. It is named by its number, appears when it is whole, and says what it was made of.
+    """A piece is an `.npz` file named by its number. It appears when it is complete, with a hash of its inputs.
 
-    A subclass says where its pieces lie (`pieces_folder`) and what decides their content (`manifest`: plain values).
+    A subclass defines the folder of its pieces (`pieces_folder`) and the inputs that determine their content
+    (`manifest`: plain values).
     """
 
     @property
@@ -40,13 +41,14 @@ class Resumable:
         return self.pieces_folder / f"{number:06d}.npz"
 
     def done(self, number: int) -> bool:
-        """Whether a piece is there, whole, and made of the same."""
+        """Whether a piece exists, is complete, and has the same inputs."""
         try:
             return self.file(number).exists() and str(safe_npz.read(self.file(number), "key")) == self.key
         except ValueError:
             return False
 
     def save(self, number: int, arrays: Mapping[str, Any]) -> None:
+        """Writes a piece."""
         with atomic_write(self.file(number)) as out:
             np.savez(out, allow_pickle=False, key=np.str_(self.key), **arrays)
 
@@ -56,11 +58,11 @@ class Resumable:
         return {name: safe_npz.read(self.file(number), name) for name in sorted(names)}
 
     def check_folder(self, folder: Path, what: str) -> None:
-        """ValueError where the folder holds results that were made of something else; `what`: they are."""
+        """ValueError if the folder holds results (`what` names them) of other inputs."""
         if not (folder / MANIFEST).exists():
             return
-        found = read_json(folder / MANIFEST)
-        stored = found if isinstance(found, dict) else {}
+        content = read_json(folder / MANIFEST)
+        stored = content if isinstance(content, dict) else {}
         names = {**stored, **self.manifest}
         other = [name for name in names if stored.get(name) != self.manifest.get(name)]
         if other:
@@ -69,5 +71,5 @@ class Resumable:
             )
 
     def mark_folder(self, folder: Path) -> None:
-        """Writes into the folder what the results in it are made of."""
+        """Writes the manifest into the folder of the results."""
         write_whole(folder / MANIFEST, json.dumps(self.manifest, indent=1) + "\n")

@@ -40,9 +40,9 @@ def parse(content: bytes) -> Mesh:
             elif words[0] in FREE_FORM:
                 free_form += 1
         except ValueError:
-            said = text.list_names([line.decode("utf-8", "replace")])
+            shown = text.list_names([line.decode("utf-8", "replace")])
             comma = "; decimals need a point, not a comma" if b"," in line else ""
-            raise ValueError(f"line {number}: expected numbers, got '{said}'{comma}") from None
+            raise ValueError(f"line {number}: expected numbers, got '{shown}'{comma}") from None
     vertices = np.array(points, np.float64).reshape(-1, 3)
     sizes = np.array(counts, np.int64)
     indices = _from_zero(np.array(corners, np.int64), np.repeat(np.array(before, np.int64), sizes))

@@ -155,8 +155,8 @@ class _Text:
             except IndexError:
                 raise ValueError(f"row {row} of {element.name} is cut; is the download complete?") from None
             except ValueError:
-                said = text.list_names([b" ".join(words).decode("latin-1")])
-                raise ValueError(f"row {row} of {element.name}: expected numbers, got '{said}'") from None
+                shown = text.list_names([b" ".join(words).decode("latin-1")])
+                raise ValueError(f"row {row} of {element.name}: expected numbers, got '{shown}'") from None
         return {
             one.name: (np.array(values[k]), np.array(lengths[k], np.int64)) if one.length else np.array(values[k])
             for k, one in enumerate(element.properties)

@@ -41,9 +41,9 @@ def _text(content: bytes) -> Mesh:
             try:
                 x, y, z = map(float, words[1:4])
             except ValueError:
-                said = text.list_names([line.decode("utf-8", "replace")])
+                shown = text.list_names([line.decode("utf-8", "replace")])
                 comma = "; decimals need a point, not a comma" if b"," in line else ""
-                raise ValueError(f"line {number}: expected three numbers, got '{said}'{comma}") from None
+                raise ValueError(f"line {number}: expected three numbers, got '{shown}'{comma}") from None
             corners.append([x, y, z])
         elif words[0] == b"solid":
             solids.append(text.name(b" ".join(line.split()[1:])))

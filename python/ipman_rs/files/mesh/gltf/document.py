@@ -162,9 +162,9 @@ def check_entries(kind: str, listed: Any) -> list[dict[str, Any]]:
     """A list of objects whose entries are what glTF has there. ValueError where they are not."""
     if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
         raise ValueError(f"its {kind} are no list of objects")
-    for name, (expected, said) in ENTRIES.get(kind, {}).items():
+    for name, (expected, kind_name) in ENTRIES.get(kind, {}).items():
         if any(name in one and not isinstance(one[name], expected) for one in listed):
-            raise ValueError(f"the {name} of its {kind}: expected {said}")
+            raise ValueError(f"the {name} of its {kind}: expected {kind_name}")
     return listed
 
 
@@ -190,9 +190,9 @@ def _chunks(content: bytes) -> tuple[dict[str, Any], bytes | None]:
             place += 8 + size
         words, binary = chunks.get(JSON, b""), chunks.get(BIN)
     try:
-        found = parse_json(words)
+        content_json = parse_json(words)
     except ValueError as error:
         raise ValueError(f"it holds no JSON of glTF ({text.list_names([error])})") from None
-    if not isinstance(found, dict) or not isinstance(found.get("asset", {}), dict):
+    if not isinstance(content_json, dict) or not isinstance(content_json.get("asset", {}), dict):
         raise ValueError("it holds no JSON of glTF")
-    return found, binary
+    return content_json, binary

@@ -49,14 +49,14 @@ def _roots(document: Document) -> list[int]:
 def _descendants(document: Document, roots: list[int]) -> list[int]:
     """Depth first, in the file's order. ValueError for a node that is reached twice."""
     order: list[int] = []
-    seen: set[int] = set()
+    visited: set[int] = set()
     stack = list(reversed(roots))
     while stack:
         index = stack.pop()
         node = document.one("nodes", index)
-        if index in seen:
+        if index in visited:
             raise ValueError(f"its node {index} has two parents or is its own")
-        seen.add(index)
+        visited.add(index)
         order.append(index)
         stack.extend(reversed(node.get("children", [])))
     return order

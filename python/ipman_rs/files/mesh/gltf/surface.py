@@ -163,8 +163,8 @@ class _Scene:
         if self.joints:
             notes.append(f"skin: posed by {text.count_of(len(self.joints), 'joint')} of the file")
         if self.morphs:
-            said = [f"{name} {weight:g}" for name, weight in self.morphs.items()]
-            notes.append(f"morph targets applied: {text.list_names(said)}")
+            weights = [f"{name} {weight:g}" for name, weight in self.morphs.items()]
+            notes.append(f"morph targets applied: {text.list_names(weights)}")
         if self.idle:
             notes.append(f"{text.count_of(self.idle, 'morph target')} of weight 0")
         if self.unskinned:
