@@ -1,4 +1,4 @@
-"""Joints made of vertices by a linear regressor, as the literature compares them: J (K, 3) = R (K, V) · V (V, 3).
+"""Joints from vertices by a linear regressor, as the literature reports them: J (K, 3) = R (K, V) · V (V, 3).
 
 The files are SPIN's, told apart by their number of rows: `J_regressor_h36m.npy` (17, V), Human3.6M's joints, and
 `J_regressor_extra.npy` (9, V), the joints that other data sets label and SMPL does not have.
@@ -25,7 +25,7 @@ _NAMES = {len(names): names for names in (HUMAN36M, EXTRA)}
 
 @dataclass(frozen=True, eq=False)
 class JointRegressor:
-    """`weights` (K, V) and the names (K,) of the joints that they make."""
+    """`weights` (K, V) and the names (K,) of their joints."""
 
     weights: NDArray[np.float64]
     names: tuple[str, ...]

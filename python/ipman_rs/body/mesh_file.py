@@ -1,4 +1,4 @@
-"""The vertices of a person's own mesh in a file, in the order of its body model."""
+"""Reads the vertices of a person's own mesh, which are in the order of the body model."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""BEDLAM: rendered people in motion, one `.npz` a scene, as the project's own preprocessing writes it.
+"""BEDLAM: rendered people in motion, one `.npz` per scene, as the project's own preprocessing writes it.
 
     20221010_3-10_500_batch01hand_zoom_suburb_d_6fps.npz …    in the folder, or in its processed_labels
 
-A row a person in an image: imgname `seq_000000/seq_000000_0125.png`, center (2,) px, scale = side of the box / 200,
+One row per person and image: imgname `seq_000000/seq_000000_0125.png`, center (2,) px, scale = side of the box / 200,
 gender, pose_world and pose_cam (165,) SMPL-X or (72,) SMPL, hands relative to the flat hand (load the body with
 flat_hand_mean=True), shape (10,), (11,) or (16,), trans_world and trans_cam (3,) m, cam_int (3, 3) px, cam_ext (4, 4),
 gtkps (K, 2 or 3) px. Arrays are mapped into memory (see `rows`); motion_info, Python objects, is not read.

@@ -41,9 +41,9 @@ CENTER_OF_MASS = ("centreofmass", "centerofmass", "com", "wholebodycom")  # free
 
 @dataclass(frozen=True, eq=False)
 class C3DFile:
-    """What a file holds: P points in T samples, in the file's own unit and axes, and A analogue channels beside them.
+    """The content of a C3D file: P points in T samples, in the file's unit and axes, and A analogue channels.
 
-    A point that was not seen is NaN. `outputs` and `markers` part the points into what a model computed and the rest.
+    A point that was not seen is NaN. `outputs` are the points that a model computed, `markers` the others.
     """
 
     names: tuple[str, ...]  # P, as the file has them, such as "SensorMat:M_1"

@@ -1,7 +1,7 @@
 """The bytes of a C3D file: its header, its parameters and its frames, as the format's manual (c3d.org) has them.
 
-Nothing is believed that the file says of itself: every length, count and place is compared with the file's size before
-it is used, so that a damaged file ends in an error, never in a crash, in made-up frames or in a loop without end.
+The file's own statements are not trusted: every length, count and offset is compared with the file's size before it is
+used, so that a damaged file gives an error and never a crash, invented frames or an endless loop.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class _Layout:
 
 
 def content(data: bytes) -> Content:
-    """What a file of these bytes holds. ValueError, saying what is wrong, if it is no C3D file, cut or damaged."""
+    """The content of a file of these bytes. ValueError, saying what is wrong, if it is no C3D file, cut or damaged."""
     if len(data) < BLOCK or data[1] != KEY:
         raise ValueError("expected a C3D file, got something else")
     begin = (data[0] - 1) * BLOCK
@@ -363,7 +363,7 @@ def _each(about: dict[str, list[Any]], name: str, channels: int, lacking: float)
 
 
 def parameter_values(about: dict[str, list[Any]], name: str) -> list[Any]:
-    """The values of a parameter and of those that go on with it: LABELS, LABELS2, LABELS3, …"""
+    """The values of a parameter and its continuations: LABELS, LABELS2, LABELS3, …"""
     values, more = list(about.get(name, [])), 2
     while f"{name}{more}" in about:
         values += about[f"{name}{more}"]

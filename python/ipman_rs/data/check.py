@@ -22,13 +22,13 @@ from .frames import Cameras, DataSet, Frames
 
 __getattr__ = old_names(__name__, {"demanded": "require_plausible", "of_frames": "check_frames"})
 
-SAMPLE = 256  # frames that are looked at
+SAMPLE = 256  # frames that are checked
 UNITS = (
     ("metres", "m", 1.0), ("millimetres", "mm", 1e-3), ("centimetres", "cm", 0.01), ("decimetres", "dm", 0.1),
     ("kilometres", "km", 1e3), ("inches", "in", 0.0254), ("feet", "ft", 0.3048), ("micrometres", "1e-6", 1e-6),
 )  # fmt: skip
 TALL = 1.9  # m: the diagonal of the box of an adult who stands
-UNLIKE = 2.5  # times as small: no other unit is told for it
+UNLIKE = 2.5  # times smaller: no other unit is suggested
 SMALL = 0.45  # m: newborn children span about so much
 BODY = (0.25, 3.5)  # m: extent of a body's joints or markers, rolled up or with raised arms
 WORLD = 100.0  # m: no body or camera is farther from the origin of its world
@@ -42,7 +42,7 @@ DS = TypeVar("DS", bound=DataSet)
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was found about data, and what to do about it; `option` of a command mends it where one does.
+    """One result of a check, with advice; `option` is the command's option that corrects it, if there is one.
 
     odd: unusual, but possible. missing: not there. wrong: cannot be a person, or cannot be right.
     """
@@ -72,12 +72,12 @@ def sample(data: DataSet, size: int = SAMPLE) -> Frames:
 
 
 def evenly(count: int, most: int = SAMPLE) -> NDArray[np.int64]:
-    """Up to `most` numbers from 0 to count − 1, evenly spaced: what is looked at of so many."""
+    """Up to `most` numbers from 0 to count − 1, evenly spaced."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
 
 
 def check_frames(frames: Frames) -> list[Finding]:
-    """All that can be told from the frames alone: whatever they have is judged, whatever they lack is passed over."""
+    """All checks that the frames allow; what they lack is not checked."""
     if not len(frames):
         return [Finding("wrong", "no frame at all", "the file is empty: is the download complete?")]
     findings = names(frames.names) + _lengths(frames)

@@ -103,8 +103,7 @@ class ForcePlates:
 
 
 def drop_unreadable_plates(plates: ForcePlates) -> ForcePlates:
-    """Without the plates of which no force is a number; notes name them, those that lack some samples, and a load that
-    is nobody's."""
+    """Without plates whose forces are all NaN. Notes name these, plates with missing samples, and implausible loads."""
     known = np.asarray(np.isfinite(plates.forces).all(axis=-1))  # (T, P)
     readable = np.asarray(known.any(axis=0))
     if not readable.any():
@@ -146,7 +145,7 @@ def read(path: str | os.PathLike[str], up: str | None = None) -> ForcePlates:
 
 
 def from_c3d(file: c3d.C3DFile, up: str | None = None) -> ForcePlates:
-    """As `read`."""
+    """The force plates of a C3D file that has been read; see `read`."""
     used = (whole_numbers(file, "USED") or [0])[0]
     if used < 1:
         raise ValueError(f"{file.source}: expected force plates (FORCE_PLATFORM), it has none")

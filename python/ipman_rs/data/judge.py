@@ -1,7 +1,7 @@
-"""The judge that every door asks: can what came in be a person, and which option mends it if not?
+"""Plausibility checks of all input: can it be a person, and if not, which option corrects it?
 
-Every function takes what it judges, a few hundred rows are enough, and gives findings. `admit` refuses what is wrong
-in one line that names the option that mends it, and hands back in words what is odd.
+Every function takes the rows that it judges (a few hundred are enough) and returns findings. `admit` refuses what is
+wrong, in one line that names the option to use, and returns in words what is unusual.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ Array = NDArray[np.floating[Any]]
 
 
 class NoPerson(ValueError):
-    """What came in cannot be a person; the message names the option that mends it."""
+    """The input cannot be a person; the message names the option that corrects it."""
 
 
 def admit(path: str | os.PathLike[str], findings: Iterable[Finding], force: bool = False) -> tuple[str, ...]:
-    """What is odd, in words. Raises NoPerson, naming the file, for what is wrong; with `force` that is odd, too."""
+    """What is unusual, in words. NoPerson, naming the file, for what is wrong; with `force` that counts as unusual."""
     findings = list(findings)
     wrong = [each for each in findings if each.level == "wrong"]
     if wrong and not force:
@@ -84,7 +84,7 @@ def bodies(vertices: Array, template: BodyTemplate, normal: Array, *, up_is_said
 
 
 def _sizes(vertices: Array) -> list[Finding]:
-    """Of bodies that span something else than the others."""
+    """Findings about single bodies of implausible size."""
     spans = np.linalg.norm(np.ptp(vertices, axis=1), axis=-1)
     odd = spans[(spans < BODY[0]) | (spans > BODY[1])]
     if not len(odd):
@@ -109,7 +109,7 @@ def far(what: str, places: Array) -> list[Finding]:
 
 
 def _height(vertices: Array, normal: Array) -> list[Finding]:
-    """Of bodies in a world whose origin is far below or above them."""
+    """Findings about bodies far above or below the origin of their world."""
     height = float(np.median((vertices @ Ground(normal).normal).min(axis=-1)))
     if abs(height) <= USUAL_HEIGHT:
         return []
@@ -119,7 +119,7 @@ def _height(vertices: Array, normal: Array) -> list[Finding]:
 
 
 def _stance(vertices: Array, template: BodyTemplate, normal: Array) -> list[Finding]:
-    """Of bodies whose parts have names: where the head is from the lower legs and from the torso, together."""
+    """The stance of bodies with named parts, from the directions of legs and torso to the head."""
     limbs = ("left_forearm", "right_forearm", "left_lower_leg", "right_lower_leg")
     points = {word: _of_parts(template, word) for word in ("head", "torso", *limbs)}
     if not all(len(index) for index in points.values()):
@@ -153,7 +153,7 @@ def _unit(ways: Array) -> Array:
 
 
 def _shape(vertices: Array, template: BodyTemplate, normal: Array) -> list[Finding]:
-    """Of bodies whose parts nobody knows: how low they are, and whether they end below as a head does."""
+    """The stance of bodies without named parts: whether they lie, and whether their lower end looks like a head."""
     first, normal = vertices[0], Ground(normal).normal
     height = first @ normal
     extent = np.ptp(first, axis=0)
@@ -169,7 +169,7 @@ def _shape(vertices: Array, template: BodyTemplate, normal: Array) -> list[Findi
 
 
 def _ends(points: Array, height: Array, normal: Array, end: str) -> int:
-    """How many pieces are left of a body where all but its lowest or highest eighth is cut off: 1, or 2 for more."""
+    """The number of pieces of the lowest or highest eighth of a body: 1, or 2 for more."""
     span = float(np.ptp(height))
     there = height < height.min() + span / 8 if end == "low" else height > height.max() - span / 8
     flat = points[there] - np.outer(height[there], normal)

@@ -139,8 +139,7 @@ def reverse_forces_on_plates(plates: ForcePlates) -> ForcePlates:
 
 
 def check_loads(plates: ForcePlates, times: Array) -> list[Finding]:
-    """Whether the plates tell anything of a recording with these times (T,): that both were at the same time, and that
-    some plate carried a load then."""
+    """Findings if the plates are of no use for a recording with these times (T,) s: no overlap in time, or no load."""
     begin, end = float(plates.times[0]), float(plates.times[-1])
     first, last = float(times[0]), float(times[-1])
     spans = f"forces t {begin:.2f} to {end:.2f} s, markers t {first:.2f} to {last:.2f} s"
@@ -353,8 +352,8 @@ def _check_forces(plates: ForcePlates, tracks: Tracks, name: str) -> list[Findin
 
 @dataclass(frozen=True)
 class CompanionFiles:
-    """What lies beside the markers' files: `pairs` of them, in which columns the forces of a file are, the recordings'
-    `names`, and what is wrong with files that cannot be read."""
+    """The files that belong to marker files: `pairs`, the columns of forces (`loads`) by file, the recordings' `names`,
+    and what is wrong with `unreadable` files."""
 
     pairs: pairing.Pairs
     loads: Mapping[Path, ExternalLoads]

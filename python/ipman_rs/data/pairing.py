@@ -26,21 +26,21 @@ Words = tuple[str, ...]
 
 
 def distinctive_words(name: str) -> Words:
-    """What of a file's or a folder's name says whose it is: "grf_walk-2" is ("walk", "2")."""
+    """The words of a name that do not describe the kind of file: "grf_walk-2" gives ("walk", "2")."""
     parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
     parts = tuple(re.findall(r"[^\W_]+", parted.lower()))
     return () if name.lower() in KINDS else tuple(word for word in parts if word not in KINDS)
 
 
 def is_static(name: str) -> bool:
-    """Whether a name says that somebody stands still."""
+    """Whether a name is that of a static trial."""
     return any(word in name.lower() for word in STILL)
 
 
 @dataclass(frozen=True)
 class ParsedPath:
-    """Where a file is below `root`: `owner`, the folders that say whose it is, and the `words` of its own name, or of
-    its folder's where its own has none."""
+    """The path of a file below `root`, parsed: `owner`, the folders that name a person, and the distinctive `words` of
+    its name, or of its folder's name if its own has none."""
 
     path: Path
     owner: Words
@@ -55,7 +55,7 @@ class ParsedPath:
         return cls(path, tuple(folders), own)
 
     def rank(self, other: ParsedPath) -> int | None:
-        """How well another file's name says that it belongs to this recording, 0 best; None: it does not say so."""
+        """How well another file's name matches this recording, 0 best; None: not at all."""
         if self.words == other.words and (self.words or self.path.parent == other.path.parent):
             return 0
         if self.words and other.words and _inside(self.words, other.words):
@@ -67,8 +67,8 @@ class ParsedPath:
                 return 2
         return 3 if other.words and _inside(other.words, self.words) else None
 
-    def akin(self, other: ParsedPath) -> bool:
-        """Whether their folders can be of one person."""
+    def may_share_person(self, other: ParsedPath) -> bool:
+        """Whether the folders of both allow that they are of one person."""
         shared = min(len(self.owner), len(other.owner))
         return self.owner[:shared] == other.owner[:shared]
 
@@ -121,7 +121,7 @@ def _by_name(
         able = sorted(
             ((rank, _steps(one.path, table.path), -len(one.path.stem)), one.path)
             for one in recordings
-            if one.akin(table)
+            if one.may_share_person(table)
             for rank in [min((r for r in map(one.rank, names) if r is not None), default=None)]
             if rank is not None
         )
@@ -181,7 +181,7 @@ def _only_candidate(
     which one that is."""
     for near, where in (
         (lambda other: other.path.parent == table.path.parent, "in its folder"),
-        (lambda other: other.akin(table), "there is"),
+        (lambda other: other.may_share_person(table), "there is"),
     ):
         able = [one for one in recordings if near(one)]
         if sum(map(near, tables)) > 1 or not able:
@@ -208,7 +208,7 @@ def _inside(few: Words, many: Words) -> bool:
 
 
 def _steps(one: Path, other: Path) -> int:
-    """From folder to folder."""
+    """The number of steps from folder to folder."""
     a, b = one.parent.parts, other.parent.parts
     shared = next((k for k, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
     return len(a) + len(b) - 2 * shared

@@ -1,4 +1,4 @@
-"""Arrays of an `.npz` file with a row a frame, mapped into memory: a row costs what its own bytes cost.
+"""Arrays of an `.npz` file with one row per frame, mapped into memory: only the rows that are used are read.
 
 numpy.savez stores its arrays as they are, so nothing is read before its rows are asked for, in a file of any length. A
 file of numpy.savez_compressed has to be unpacked: once, when it is opened, up to 4 GB, which stay in memory.
@@ -73,7 +73,7 @@ class RowFile:
         return texts
 
     def scan(self) -> Iterator[Finding]:
-        """Every number of the file, whether it is one."""
+        """Findings about NaN and infinity in all arrays of the file."""
         for name, array in self.arrays.items():
             if self.shapes[name] == TEXT:
                 continue

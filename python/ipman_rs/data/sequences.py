@@ -1,4 +1,4 @@
-"""Data sets whose sequences lie in files of their own: read when they are asked for, judged by a sample."""
+"""Data sets with one file per sequence: read on demand, checked by a sample."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from . import check
 from .frames import Frames, Rows
 from .joined import Joined, concatenate
 
-KEPT = 4  # sequences that stay in memory: rows are mostly asked for one after the other
-SAMPLED = 16  # sequences, and frames of each, that are looked at
-ENOUGH = 8  # sequences, of which not everybody lies: only then the way from feet to head tells where up is
+KEPT = 4  # sequences that stay in memory, because rows are mostly read in order
+SAMPLED = 16  # sequences, and frames of each, that are checked
+ENOUGH = 8  # sequences: in so many not everybody lies, so the direction from feet to head shows where up is
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def sequences(lengths: Sequence[int], read: Callable[[int], Frames], source: str
 
 
 def fill_missing(parts: Sequence[Frames]) -> list[Frames]:
-    """With NaN for what only others of the parts have measured, and as many force plates in each."""
+    """The parts with NaN for measurements that only other parts have, and the same number of force plates in each."""
     plates = max((part.forces.shape[1] for part in parts if part.forces is not None), default=0)
     return [_with_nothing(part, parts, plates) for part in parts]
 
@@ -97,8 +97,7 @@ def require_plausible_units(file: Path, frames: Frames) -> Frames:
 
 
 def check_sequences(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Finding]:
-    """What can be told of sequences that are read one after the other: what is not right in each, and of all, by a
-    sample."""
+    """Findings about sequences that are read one by one: what is wrong with each, and checks of a sample of all."""
     findings, samples = [], []
     for index, (name, read) in enumerate(parts):
         try:
@@ -119,7 +118,7 @@ def check_sequences(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[c
 
 
 def check_recording(name: str, frames: Frames) -> list[check.Finding]:
-    """What can be told of one recording, under its name."""
+    """Findings about one recording, with its name."""
     findings = check.check_frames(check.sample(frames))
     return [check.Finding(each.level, f"{name}: {each.what}", each.advice) for each in findings]
 

@@ -1,6 +1,6 @@
-"""Annotations in the form of SPIN: one `.npz` with a row a person, which many data sets of people are shared in.
+"""Annotations in the form of SPIN: one `.npz` with one row per person, in which many data sets are shared.
 
-imgname (N,), center (N, 2) px and scale (N,) = side of the square box / 200, and of the others those that there are:
+imgname (N,), center (N, 2) px and scale (N,) = side of the square box / 200, and any of the following:
 
     part (N, 24, 3)         x, y in pixels and 1 where labelled, of the joints JOINTS
     openpose (N, 25, 3)     x, y and confidence of OpenPose's BODY_25

@@ -1,4 +1,4 @@
-"""Recorded paths of markers."""
+"""Tracks: the recorded positions of markers over time."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def turn_up(tracks: Tracks, normal: Sequence[float]) -> Tracks:
 
 
 def visibility(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], list[str]]:
-    """Where markers (T, M, 3) were seen (T, M); and in words which numbers stand for one that was not."""
+    """Where markers (T, M, 3) were seen, (T, M); and notes on the numbers that mark a marker as not seen."""
     origin = (points == 0).all(-1)
     there = ~np.isnan(points).any(-1) & ~origin
     with np.errstate(invalid="ignore"):
@@ -313,7 +313,7 @@ def _and(people: Sequence[str], most: int = 4) -> str:
 
 
 def _scale(unit: str | float, points: Array, source: str) -> float:
-    """Metres a unit."""
+    """Metres per unit of length."""
     if not isinstance(unit, str):
         return float(unit)
     if unit:
@@ -330,7 +330,7 @@ def likely_unit(points: Array) -> str:
 
 
 def unit_note(unit: str | float) -> str:
-    """The note on a unit that a file does not say."""
+    """The note for a file that does not state its unit."""
     return f"its unit of length is not given: taken as {unit} (--units)"
 
 

@@ -1,4 +1,4 @@
-"""Files: which may be opened, JSON and YAML that anybody may have written, and writing that leaves whole files only."""
+"""Files: which may be opened, safe readers of untrusted JSON and YAML, and atomic writing."""
 
 from .json_file import parse_json as parse_json
 from .json_file import read_json as read_json

@@ -1,4 +1,4 @@
-"""Which paths may be opened: ordinary files. A pipe waits for ever for a writer, and a device never ends."""
+"""Only ordinary files are opened, because a pipe waits for a writer and a device never ends."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def shape_of(path: Path, name: str) -> tuple[int, ...]:
 
 
 def memory_map(path: Path, name: str) -> NDArray[Any]:
-    """Array `name` of `path` without reading it: the rows that are looked at come from the disk, however long it is.
+    """Array `name` of `path`, mapped into memory: rows are read from disk when they are used.
 
     numpy.savez stores its arrays as they are, so they can be mapped into memory in place, read-only (and, unlike with
     `read`, without a comparison of checksums). A packed one (numpy.savez_compressed) is read as a whole, once.
@@ -97,7 +97,7 @@ def memory_map(path: Path, name: str) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class ArrayLocation:
-    """Where an array lies in a file: from the byte `offset` on, "C" row after row or "F" column after column."""
+    """The location of an array in a file: from byte `offset` on, row by row ("C") or column by column ("F")."""
 
     offset: int
     shape: tuple[int, ...]
@@ -106,7 +106,7 @@ class ArrayLocation:
 
 
 def locate_array(path: Path, member: zipfile.ZipInfo | None = None) -> ArrayLocation:
-    """Where the array of an `.npy` file lies, or that of a member of an archive that is stored as it is.
+    """The location of the array of an `.npy` file, or of an uncompressed member of an archive.
 
     Raises:
         ValueError: it is damaged, holds Python objects, or the file lacks some of the bytes that it claims.

@@ -112,11 +112,11 @@ class ScalarRecord(Record):
 
 
 class InertObject(Record):
-    """A class that the file may name (`numpy.ndarray`, `object`) and a set, whose contents nobody needs."""
+    """Stands for a class that the file may name (`numpy.ndarray`, `object`), and for a set, without its contents."""
 
 
 class ForeignObject(Record):
-    """An object of some other program's class, such as its settings. Whatever is put into it is dropped."""
+    """Stands for an object of another program's class, such as its settings; its contents are dropped."""
 
     def append(self, _: Any) -> None: ...
 
@@ -262,7 +262,7 @@ class RestrictedUnpickler(_Interpreter):
 
 
 class TolerantUnpickler(RestrictedUnpickler):
-    """Classes of other programs become strangers, which do nothing; the standard library's functions stay refused."""
+    """Classes of other programs become inert objects; the standard library's functions stay refused."""
 
     def find_class(self, module: str, name: str) -> Callable[..., Any]:
         if (module, name) in ALLOWED:

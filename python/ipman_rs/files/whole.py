@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, whoever else writes into the folder and whenever the process ends."""
+"""Atomic writing: a file is complete or absent, whenever the process ends and whoever else writes there."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _PART = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{12}\.part")
 
 
 class atomic_write:
-    """A file that appears under its name when it is whole: a process that dies leaves the old one, or none.
+    """A file that appears under its name when it is complete: a killed process leaves the old file, or none.
 
     with atomic_write(path) as file: file.write(...)
 
-    It is written beside its place, under a name of its own, and then moved; a failure removes it. What a killed process
-    left of the same file is removed by the next that writes it: a living writer holds a lock.
+    It is written in the same folder under a temporary name and then renamed; a failure removes it. Leftovers of a
+    killed process are removed by the next writer of the same file; a living writer holds a lock.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:

@@ -1,4 +1,4 @@
-"""A recording's bodies beside what was measured of them."""
+"""Fitted bodies of a recording, compared with measurements."""
 
 from __future__ import annotations
 
@@ -30,9 +30,11 @@ ANYWHERE = 0.5  # m: a reference farther from the body is in other units or axes
 class MeasuredComparison:
     """T frames at `times`; `plates`, y up, and `reference`, a centre of mass (T, 3) m, at these times.
 
-    NaN where nothing was measured. `seen` (T,): where enough markers were seen to say where the body is. `judge`: whose
-    reference it is. `standing`: the person's mass, kg, by plates on which they stood still; NaN where nobody knows.
-    ValueError where what was measured is nowhere near the body: in other units or axes.
+    NaN where nothing was measured. `seen` (T,): frames with enough visible markers to locate the body. `judge`: the
+    source of the reference. `standing`: the person's mass, kg, by plates on which they stood still; NaN if unknown.
+
+    Raises:
+        ValueError: the measurements are far from the body, as in other units or axes.
     """
 
     name: str
@@ -120,7 +122,7 @@ class MeasuredComparison:
 
     @cached_property
     def lacking(self) -> Mask:
-        """(T, P): plates whose force is no number while another's is: nobody knows what is on them."""
+        """(T, P): plates whose force is NaN while that of another plate is not, so that their load is unknown."""
         if self.plates is None:
             return np.zeros((len(self.times), 0), bool)
         known = np.asarray(np.isfinite(self.plates.forces).all(axis=-1))
@@ -152,7 +154,7 @@ class MeasuredComparison:
 
     @cached_property
     def kind(self) -> str:
-        """What the person does, as `Movement.kind` says."""
+        """The kind of movement, see `Movement.kind`."""
         visible = np.ones(len(self.times), bool) if self.seen is None or not self.seen.any() else self.seen
         paths = (self.com, self.acceleration, self.computed.soles, self.forward)
         com, acceleration, soles, forward = (path[visible] for path in paths)

@@ -1,4 +1,4 @@
-"""What the engine says of bodies over time."""
+"""Masses, centres of mass and centres of pressure that the engine computes for bodies over time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 METHODS = ("exact", "pcom", "sample_mean", "face_area", "vertex_mean")
 GAMMAS = (5, 10, 20, 50, 100, 200)  # 1/m; the paper's is 10
 ALPHA, GAMMA = 100.0, 10.0
-SOLE = 0.03  # m: so thick are the soles of people who may wear shoes
+SOLE = 0.03  # m: thickness of the soles of people who may wear shoes
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ def computed(
     """The engine's figures of bodies, y up, vertices (T, V, 3) m; `plates` at the same times.
 
     Each body's ground for the pressure lies under its lowest vertex: people wear shoes, fitted bodies do not, and the
-    formula knows heights only. `progress` hears how many bodies are done.
+    formula depends on heights only. `progress(done)` is called with the number of finished bodies.
     """
     rows: list[Computed] = []
     done = 0

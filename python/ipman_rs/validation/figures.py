@@ -26,7 +26,7 @@ AXES = ("forward", "left", "up")
 
 
 def figures(comparison: MeasuredComparison) -> dict[str, Any]:
-    """All that `report` prints of a recording."""
+    """All values that `report` prints of a recording."""
     mass = comparison.computed.mass if comparison.seen is None else comparison.computed.mass[comparison.seen]
     return jsonable(
         {

@@ -1,7 +1,7 @@
-"""What a folder of measurements holds: recordings of markers, and the forces and centres of mass that belong to them.
+"""The trials in a folder: recordings of markers with the forces and centres of mass that belong to them.
 
-Which belong together `data.pairing` says, by their names and folders; what a file holds its columns say. A `.c3d` with
-force plates brings its own forces, and one with Plug-in Gait's CentreOfMass its own centre of mass.
+`data.pairing` decides by names and folders which files belong together; the columns of a file decide what it holds. A
+`.c3d` with force plates brings its own forces, and one with Plug-in Gait's CentreOfMass its own centre of mass.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a recorded person does: stands, walks, runs, jumps, or moves in place."""
+"""The kind of a recorded movement: standing, walking, running, a jump, or movement in place."""
 
 from __future__ import annotations
 

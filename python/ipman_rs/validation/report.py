@@ -1,4 +1,4 @@
-"""What `ipman validate` says, as tables in Markdown and as files of numbers.
+"""The report of `ipman validate`: tables in Markdown, and series of numbers.
 
 Records are what `figures.figures` gives of a recording, with `body` (its model's name) and `fit` (how it was fitted:
 `markers`, mean distance from them in m, `shape_from`, `converged`), and `flags`, what is odd about it.
@@ -32,7 +32,7 @@ MODELS = ("at rest: g(CoM)", "moving: ZMP of the CoM", "moving: ZMP of the parts
 
 
 def markdown(records: Sequence[Record], source: str, notes: Sequence[str], pictures: Sequence[str]) -> str:
-    """The page: what is odd, every table that has rows, what was assumed, and the pictures."""
+    """The page: what is unusual, all tables that have rows, notes, and pictures."""
     lines = [f"# Bodies fitted to markers, against measurements: {source}", ""]
     odd = [f"- {record['name']}: {flag}" for record in records for flag in record["flags"]]
     if odd:
@@ -91,7 +91,7 @@ def centers_of_mass(records: Iterable[Record]) -> Iterator[str]:
 
 
 def formulations(records: Iterable[Record]) -> Iterator[str]:
-    """A row a formulation, a column a recording, and the paper's figures."""
+    """One row per formulation, one column per recording, and the paper's values."""
     compared = list(_records_with(records, "com"))
     if not compared:
         return

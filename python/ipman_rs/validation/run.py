@@ -1,4 +1,4 @@
-"""The work of `ipman validate`: fit each recording, compare it with what was measured, write what came out."""
+"""The work of `ipman validate`: fits each recording, compares it with measurements, writes the results."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Plan:
 class MeasuredTrial:
     """A recording as it was measured: plates at their own times, the reference (T, 3) m at the markers'.
 
-    `idle`: what was measured beside the markers is of no use; the recording can only give its shape to others.
+    `idle`: its measurements cannot be used; the recording can only give its shape to others.
     """
 
     trial: Trial
@@ -79,7 +79,7 @@ class MeasuredTrial:
 
 @dataclass
 class RunLog:
-    """What is said beside the figures: notes, and the files that failed."""
+    """Notes and failed files of a run."""
 
     notes: list[str] = field(default_factory=list)
     failures: list[FileError] = field(default_factory=list)

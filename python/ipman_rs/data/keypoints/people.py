@@ -1,4 +1,4 @@
-"""What the readers of keypoint files share: people in images, and numbers that are checked one by one."""
+"""What the readers of keypoint files share: people in images, and checks of their numbers."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Person:
     world: Array | None = None  # (K, 4): x, y, z in metres and confidence
     track: int | str | None = None  # which person over time, where the file says
     notes: tuple[str, ...] = ()  # what was assumed
-    unused: tuple[str, ...] = ()  # what the file has and nobody reads
+    unused: tuple[str, ...] = ()  # entries of the file that are not read
 
 
 @dataclass
 class Image:
-    """The people found in one image; in the place of a person that cannot be used, why not."""
+    """The people found in one image; in place of an unusable person, the reason."""
 
     source: str
     people: list[Person | str]

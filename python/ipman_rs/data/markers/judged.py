@@ -1,4 +1,4 @@
-"""What the judge of all doors (`ipman_rs.data.judge`) asks of a recording of markers."""
+"""Plausibility checks of recorded markers, with the limits of `ipman_rs.data.judge`."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ def check_tracks(
     up_is_said: bool = False,
     ground: float | None = None,
 ) -> list[Finding]:
-    """What the judge of all doors says of a recording before its fit: names, coverage, size, place, stance, rate; and
-    where the floor is said to be at y = `ground` m, whether the markers are above it."""
+    """Findings about a recording before its fit: names, coverage, size, place, stance, rate; and, with a floor at y =
+    `ground` m, whether the markers are above it."""
     names, _ = seen_names(tracks)
     meant = meanings_of(names, own)
     unknown = [name for name in names if name not in meant]
@@ -209,7 +209,7 @@ def _mean(points: Array) -> Array:
 
 
 def check_coverage(known: Sequence[str], meanings: Mapping[str, Meaning]) -> list[Finding]:
-    """What the markers that were seen do not say of the body."""
+    """Findings about parts of the body without a marker that was seen."""
     regions = {region(meanings[name]) for name in known}
     if not regions & {"head", "trunk", "arms"}:
         message = "no marker above the pelvis was ever seen: trunk, arms, mass and centre of mass are the body's mean"

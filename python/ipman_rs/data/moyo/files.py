@@ -1,4 +1,4 @@
-"""Where the files of MoYo's sequences lie."""
+"""The paths of the files of MoYo's sequences."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SUFFIX = "_stageii.pkl"
 
 @dataclass(frozen=True)
 class SequenceFiles:
-    """The files of a sequence, of which only the body's must be there."""
+    """The files of a sequence; only that of the body must exist."""
 
     session: Path
     split: str

@@ -1,4 +1,4 @@
-"""What a mesh from a file needs before it is a surface: shared vertices, and neither loose nor repeated pieces.
+"""Repairs that make a surface of a mesh file: shared vertices, no loose vertices, no repeated faces.
 
 Every repair leaves a note, and `vertex_map` says where each vertex of the file went.
 """

@@ -1,4 +1,4 @@
-"""The lines of a text file of any encoding and line ends, and the names in it as a list for a note."""
+"""Lines of a text file of any encoding and line ends, and lists of names for notes."""
 
 from __future__ import annotations
 
