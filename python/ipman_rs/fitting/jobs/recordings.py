@@ -138,7 +138,7 @@ def _fit_markers(
 
     from ...data import markers
     from ...data.markers import own
-    from ...data.markers.judged import of_skin, of_tracks
+    from ...data.markers.judged import check_skin, check_tracks
     from .. import config, marker_fit
 
     preset, path = _preset(recording, settings), recording.paths[0]
@@ -146,7 +146,7 @@ def _fit_markers(
     body = ipt.BodyModel(settings.model)
     names = None if settings.markers is None else own.read(settings.markers, body.body)
     tracks = markers.read(path, settings.up, settings.subject, settings.units, settings.rate)
-    judged = of_tracks(tracks, names, settings.up is not None, settings.ground or 0.0)
+    judged = check_tracks(tracks, names, settings.up is not None, settings.ground or 0.0)
     flags = judge.admit(path, judged, settings.force)
     count = len(range(0, len(tracks), pace.every))
     with progress(f"fitting {recording.name}", count) as step:
@@ -155,7 +155,7 @@ def _fit_markers(
             body, tracks, chosen, **told, progress=lambda _stage, done: step.to(min(done, count))
         )
     findings, distances = marker_fit.judged_fit(found), found.skin_distances
-    flags = (*flags, *judge.admit(path, [*findings, *of_skin(distances)], settings.force))
+    flags = (*flags, *judge.admit(path, [*findings, *check_skin(distances)], settings.force))
     errors = found.errors
     each = {name: _mean(column) for name, column in zip(found.tracks.names, errors.T, strict=True)}
     sites = {name: site if isinstance(site, str) else asdict(site) for name, site in found.sites.items()}
