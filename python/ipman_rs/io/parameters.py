@@ -119,7 +119,7 @@ def _no_bodies(stored: _Npz) -> str:
         except ValueError as error:
             if "Python objects" in str(error):
                 return f"{name} holds Python objects, which are not loaded; save what is in it as plain arrays"
-    return f"holds {safe_npz.listed(stored.names)}; {_EXPECTED}"
+    return f"holds {safe_npz.list_arrays(stored.names)}; {_EXPECTED}"
 
 
 def _are_of_another_body(stored: _Npz, model: str) -> bool:
@@ -158,7 +158,7 @@ def _read_vertices(stored: _Npz, model: str, unit: float, rate: float | None) ->
         )
     mesh = repair.Mesh(vertices[0], faces)
     if match_body(faces, vertices.shape[1], model) is None:
-        mesh = repair.without_unused(repair.welded(mesh) if len(vertices) == 1 else mesh)
+        mesh = repair.drop_unused_vertices(repair.weld(mesh) if len(vertices) == 1 else mesh)
     if len(vertices) == 1:
         vertices = mesh.vertices[None]
     elif mesh.vertex_map is not None:
@@ -356,7 +356,7 @@ def _places(stored: _Npz, trans: np.ndarray | None, seconds: np.ndarray | None) 
     if trans is None:
         return []
     name = str(stored.name(*_TRANSLATIONS))
-    return check.place(name, trans[check.evenly(len(trans))]) or judge.speed(name, trans, seconds)
+    return check.near_origin(name, trans[check.evenly(len(trans))]) or judge.speed(name, trans, seconds)
 
 
 def _gender(stored: _Npz, body: Any, model: str) -> list[Finding]:

@@ -17,7 +17,7 @@ from ..analysis import PIECE
 from ..body.sequence import pieces
 from ..data import check, judge, separate_pieces
 from ..data.check import Finding
-from ..files import regular, safe_npz
+from ..files import regular_file, safe_npz
 from ..files.errors import FileError
 from ..io.meshes import read_mesh
 from ..io.parameters import read_npz
@@ -143,7 +143,7 @@ def _judged(recording: Recording, template: Any, normal: np.ndarray, up_is_said:
     findings = judge.bodies(few, template, normal, up_is_said=up_is_said)
     whole = few[np.isfinite(few).all(axis=(1, 2))]
     if recording.template is None and len(whole):  # a body model's own pieces are known
-        findings += separate_pieces.judged(whole[0], recording.faces, normal)
+        findings += separate_pieces.check_pieces(whole[0], recording.faces, normal)
     if not any(each.level == "wrong" for each in findings):
         weighed = few[check.evenly(len(few), WEIGHED)]
         findings += judge.masses(ip.mass_properties(weighed, template).mass, weighed)
@@ -152,13 +152,13 @@ def _judged(recording: Recording, template: Any, normal: np.ndarray, up_is_said:
 
 def _not_used(recording: Recording, read_elsewhere: Collection[str]) -> list[str]:
     names = [name for name in recording.unused if name not in read_elsewhere]
-    return [f"not used: {safe_npz.first(names, LISTED)}"] if names else []
+    return [f"not used: {safe_npz.first_arrays(names, LISTED)}"] if names else []
 
 
 def read(path: Path, request: Request) -> Recording:
     """The bodies in a file, by the ending of its name."""
     try:
-        regular(path)
+        regular_file(path)
     except ValueError as error:
         raise FileError(path, str(error)) from None
     if path.stat().st_size == 0:

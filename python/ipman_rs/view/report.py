@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ipman_rs.files import being_written, safe_names, write_whole
+from ipman_rs.files import atomic_write, safe_names, write_whole
 
 from ..study.study import MAX_LISTED_FRAMES, Study
 from .fitted import draw_fitted
@@ -71,7 +71,7 @@ def _has_timeline(study: Study) -> bool:
 def _write_study(study: Study, folder: Path) -> Iterator[str]:
     # Packing millions of numbers would take longer than finding them.
     save = np.savez_compressed if study.num_frames <= MAX_LISTED_FRAMES else np.savez
-    with being_written(folder / "report.npz") as file:
+    with atomic_write(folder / "report.npz") as file:
         save(file, allow_pickle=False, **study_arrays(study))
     yield "report.npz"
     if study.fitted is not None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...files import regular
+from ...files import regular_file
 from ...files.errors import FileError
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def read_items(path: Path, options: InputOptions) -> list[Item]:
     """The people of one file: one per image. Those of a photo are detected later. Raises FileError."""
     kind = path.suffix.lower()
     try:
-        regular(path)
+        regular_file(path)
     except ValueError as error:
         raise FileError(path, str(error)) from None
     if kind in IMAGES:
@@ -189,4 +189,4 @@ def identity(item: Item, options: str) -> str:
 
 
 def _bytes(path: Path | None) -> bytes:
-    return b"" if path is None else regular(path).read_bytes()
+    return b"" if path is None else regular_file(path).read_bytes()

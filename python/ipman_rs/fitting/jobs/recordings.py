@@ -137,7 +137,7 @@ def _fit_markers(
 
     from ...data import markers
     from ...data.markers import own
-    from ...data.markers.judged import of_skin, of_tracks
+    from ...data.markers.judged import check_skin, check_tracks
     from .. import config, marker_fit
 
     preset, path = _preset(recording, options), recording.paths[0]
@@ -145,7 +145,7 @@ def _fit_markers(
     body = ipt.BodyModel(options.model)
     names = None if options.markers is None else own.read(options.markers, body.body)
     tracks = markers.read(path, options.up, options.subject, options.units, options.rate)
-    issues = of_tracks(tracks, names, options.up is not None, options.ground or 0.0)
+    issues = check_tracks(tracks, names, options.up is not None, options.ground or 0.0)
     flags = judge.admit(path, issues, options.force)
     count = len(range(0, len(tracks), pace.every))
     with progress(f"fitting {recording.name}", count) as step:
@@ -154,7 +154,7 @@ def _fit_markers(
             progress=lambda _stage, done: step.to(min(done, count)),
         )  # fmt: skip
     findings, distances = marker_fit.judged_fit(fitted), fitted.skin_distances
-    flags = (*flags, *judge.admit(path, [*findings, *of_skin(distances)], options.force))
+    flags = (*flags, *judge.admit(path, [*findings, *check_skin(distances)], options.force))
     errors = fitted.errors
     by_marker = {name: _mean(column) for name, column in zip(fitted.tracks.names, errors.T, strict=True)}
     sites = {name: site if isinstance(site, str) else asdict(site) for name, site in fitted.sites.items()}
