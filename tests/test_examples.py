@@ -39,6 +39,7 @@ def numbers(pattern: str, text: str) -> list[float]:
     return [float(number) for number in re.findall(pattern, text)]
 
 
+@pytest.mark.slow
 def test_analyze_a_body():
     shown = example(1)
     (litres,) = numbers(r"tree: ([\d.]+) litres", shown)
@@ -58,11 +59,13 @@ def test_train_with_physics():
     assert margin[0] < 0 < margin[-1], "and stands"
 
 
+@pytest.mark.slow
 def test_your_own_mesh():
     parts, whole = re.findall(r"([\d.]+) l\b", example(3))
     assert parts == whole, "the parts add up to the volume that trimesh finds"
 
 
+@pytest.mark.slow
 def test_balance_and_gradients():
     shown = example(4)
     predicted, done = numbers(r"([+-][\d.]+) um", shown)
@@ -86,6 +89,7 @@ def test_under_a_page(path):
     assert len(path.read_text().splitlines()) <= 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("snippet", SNIPPETS, ids=range(len(SNIPPETS)))
 def test_readme(snippet):
     run(["-c", snippet], snippet)

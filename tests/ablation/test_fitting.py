@@ -30,6 +30,7 @@ def known(drawn):
     return truth.Truth.of(drawn)
 
 
+@pytest.mark.slow
 def test_people_are_out_of_reach(known):
     """The best betas leave 5 to 20 mm of their resting surfaces, and next to nothing of a body of the fitter's own."""
     assert 5 < truth.floors(known)["shape"] < 20

@@ -181,6 +181,7 @@ def ipman(*arguments, **options):
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **options)
 
 
+@pytest.mark.slow
 def test_the_real_program(tmp_path):
     (tmp_path / "box.ply").write_bytes(PLY)
     good = ipman("analyze", tmp_path / "box.ply", "--json")

@@ -206,6 +206,7 @@ def test_image_of_one_pixel(fit, tmp_path, standing):
     assert (said.folder / "tiny" / "overlay.png").is_file()
 
 
+@pytest.mark.slow
 def test_resume(fit, tmp_path, standing):
     files.write(tmp_path / "a.json", standing)
     files.write(tmp_path / "b.json", files.seen("tree"))

@@ -49,6 +49,7 @@ def test_the_guard_sees_what_it_guards_against(page, tmp_path):
     assert any("ReferenceError" in text for text in page.complaints)
 
 
+@pytest.mark.slow
 def test_poses(page, tmp_path, lite_body):
     names = ("standing", "tree", "lean_past_toes")
     vertices = np.stack([ip.body.posed(lite_body, name) for name in names])

@@ -12,11 +12,11 @@ import pytest
 import ipman_rs as ip
 from ipman_rs import view
 from ipman_rs.cli.options import PRESETS
+from ipman_rs.files import safe_names
 from ipman_rs.study.camera import look_at
 from ipman_rs.view import colors
 from ipman_rs.view.geometry import pressure_at
 from ipman_rs.view.raster import rasterize
-from ipman_rs.view.report import safe_names
 from tests.helpers.cli_files import report, strict, walk_parameters
 
 
@@ -171,6 +171,7 @@ def test_json_of_all_presets_is_strict(run, tmp_path, lite_body, standing):
         assert record["ipman_rs"] == ip.__version__
 
 
+@pytest.mark.slow
 def test_help_needs_no_heavy_imports():
     script = "import sys\ntry:\n import ipman_rs.cli as c; c.main(['{}'])\nexcept SystemExit: pass\n"
     script += "print([m for m in ('matplotlib', 'trimesh', 'scipy', 'rich', 'jinja2', 'torch') if m in sys.modules])"

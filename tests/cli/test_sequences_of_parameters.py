@@ -102,6 +102,7 @@ def test_a_long_recording_is_listed_in_part(run, tmp_path, monkeypatch, no_pictu
         assert stored["vertices"].shape[0] == 5
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
 def test_ctrl_c_ends_a_long_analysis(tmp_path):
     np.savez(tmp_path / "long.npz", pose=np.zeros((300_000, 72), np.float32))

@@ -23,6 +23,7 @@ def poses(lite_body, tmp_path_factory):
     return path, vertices
 
 
+@pytest.mark.slow
 def test_table_and_files(run, poses, lite_body, tmp_path):
     path, vertices = poses
     done = run("simulate", path, "-o", tmp_path / "out", "--times", "0.1,2")
@@ -114,6 +115,7 @@ def test_bad_files_and_options(run, poses, tmp_path):
         assert run("simulate", poses[0], *option).code == 2
 
 
+@pytest.mark.slow
 def test_two_methods(run, poses, lite_body, tmp_path):
     """One method leans past its toes where the other squats; both have the body that is not finite."""
     path, vertices = poses

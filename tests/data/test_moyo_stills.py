@@ -103,6 +103,7 @@ def test_the_authors_list(sessions, tmp_path):
     ]
 
 
+@pytest.mark.slow
 def test_only_frames_that_a_camera_shows(sessions, tmp_path):
     miniature.cameras(sessions / miniature.HANDS, "220923")
     miniature.images(sessions / miniature.HANDS, FIRST + BOAT, range(3, 8), "val")
@@ -201,7 +202,7 @@ def test_her_template_is_posed_without_betas(sessions, bodies, her, tmp_path, en
     body = ip.load_body(bodies / "SMPLX_FEMALE.npz", flat_hand_mean=True, v_template=her)
     expected = body(frames.pose, None, frames.transl)
     np.testing.assert_allclose(posed.vertices, expected.vertices, atol=1e-6)  # float32 in the .ply
-    np.testing.assert_allclose(posed.own, expected.joints, atol=1e-6)
+    np.testing.assert_allclose(posed.model_joints, expected.joints, atol=1e-6)
     assert (
         np.abs(posed.vertices - Models(bodies).posed(data.open("moyo", sessions, frames="selected")[:]).vertices).max()
         > 0.05
@@ -224,6 +225,7 @@ def test_templates_that_cannot_be(sessions, bodies, her, tmp_path):
         Models(bodies).posed(frames)
 
 
+@pytest.mark.slow
 def test_the_table_of_the_paper_by_its_list_and_template(sessions, bodies, her, tmp_path):
     """The command line; the files go into what the figures are made of by their content, not their place."""
     file = ply(tmp_path / "mesh.ply", her, ip.load_body("anny-lite").faces)

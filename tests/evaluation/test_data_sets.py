@@ -49,6 +49,7 @@ def test_joints_alone_are_compared_by_name(table, name, module, number, tmp_path
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("table", ["biomech", "com"])
 def test_the_paper_s_biomechanics(table, tmp_path):
     """MoYo's own bodies against its mat and its centre of mass; the paper's figures stand above."""

@@ -117,6 +117,7 @@ def written_out(body, ground, there, truth, center, alpha, gamma):
     return max(ious), error, np.abs(image - truth).mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["paper", "released"])
 def test_moyo_by_the_protocol_written_out(mode):
     frames = 4
@@ -186,7 +187,7 @@ def test_moyo_where_nothing_is():
 
 def test_bad_input():
     samples, there = over(2, 10), mat(np.ones((2, HEIGHT, WIDTH)))
-    with pytest.raises(ValueError, match=r"pressure: expected one a sample, \(2, 10\), got \(2, 9\)"):
+    with pytest.raises(ValueError, match=r"pressure: expected one per sample, \(2, 10\), got \(2, 9\)"):
         pressure_map(samples, np.ones((2, 9)), there)
     with pytest.raises(ValueError, match=r"maps: expected two arrays of one shape \(\.\.\., H, W\)"):
         pressure_iou(np.ones((2, 3)), np.ones((3, 2)))

@@ -206,6 +206,7 @@ def test_killed_half_way_the_bits_are_the_same(yoga, models, tmp_path, preset, m
     assert found[0] == found[1]
 
 
+@pytest.mark.slow
 def test_other_options_are_not_mixed_in(yoga, models, tmp_path, preset):
     fit_moyo(yoga, models, tmp_path / "out", preset(PRESENTED), "--every", "2")
     words = "--data", "moyo", "--path", yoga.root, "--models", models

@@ -405,6 +405,7 @@ def test_contact_normals_gradients_and_rows():
     assert term.cost(cases.candidate(problem, **broken)).isnan().all()
 
 
+@pytest.mark.slow
 def test_a_fit_starts_where_its_preset_says():
     problem, _ = cases.smplx_observed(2)
     _, begun = start.begin(problem, config.load("ipman-o-star").start)

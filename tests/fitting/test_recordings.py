@@ -78,6 +78,7 @@ def test_squats(shared, squatting):
     assert np.abs(found.center.numpy()[:, 1] - heights).max() < 0.02
 
 
+@pytest.mark.slow
 def test_the_shape_is_that_of_the_other_recording(standing, squatting):
     betas = squatting.fit.variables["betas"]
     assert torch.equal(betas, standing.fit.variables["betas"][:1].expand_as(betas))

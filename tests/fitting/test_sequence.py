@@ -82,6 +82,7 @@ def test_what_was_recorded_is_found():
     assert (found.variables["betas"][0] - truth["betas"][0]).abs()[:2].max() < 0.5
 
 
+@pytest.mark.slow
 def test_smoothness_takes_away_jitter(problem, smooth):
     rough = fitted(problem, smoothness=0)
     slow = fitted(problem, smoothness=STRONG, order=1)

@@ -8,6 +8,8 @@ import trimesh
 
 import ipman_rs as ip
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def named(lite):

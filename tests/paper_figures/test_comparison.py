@@ -14,6 +14,8 @@ from ipman_rs import data
 from ipman_rs.cli import main
 from ipman_rs.fitting.jobs import outputs
 
+pytestmark = pytest.mark.slow
+
 
 def fitted(folder, name, body, pose, drop=0.0, **more):
     """A folder as `ipman predict` leaves it: a body in a named pose, `drop` m below its floor y = 0."""

@@ -82,6 +82,7 @@ def test_without_scikit_learn(figure, tmp_path, monkeypatch):
     assert said.err == "ipman: error: t-SNE needs scikit-learn: pip install 'ipman_rs[figures]'\n"
 
 
+@pytest.mark.slow
 def test_built_people(figure):
     said = figure("poses", "--people", 14, "--perplexity", 3)
     assert said.code == 0, said.err

@@ -21,6 +21,7 @@ def recording(tmp_path_factory):
     return spring_mat.write(tmp_path_factory.mktemp("made-up"))
 
 
+@pytest.mark.slow
 def test_the_numbers(figure, recording, contents):
     path, models = recording
     said = figure("pressure", "--path", path, "--models", models)
@@ -44,6 +45,7 @@ def test_the_numbers(figure, recording, contents):
     assert contents(said.folder) == contents(again.folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("pose", "aside"), [("standing", 0.9), ("lying", 0.0)])
 def test_the_picture(pose, aside, tmp_path):
     """The windows of both maps hold all centres, also of a body beside the mat, whose empty map says so; of a map along

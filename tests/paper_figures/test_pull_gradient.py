@@ -7,6 +7,8 @@ import pytest
 
 from ipman_rs.paper_figures.pull_gradient import engine_curve
 
+pytestmark = pytest.mark.slow
+
 HEIGHTS = np.linspace(0.0, 0.5, 101)
 
 

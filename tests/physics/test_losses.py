@@ -27,6 +27,7 @@ def test_stability(method, alpha, gamma, epsilon, blob, bodies):
         assert loss == pytest.approx(np.linalg.norm(apart), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_stability_of_people(anny, random_people):
     people = random_people(anny, 3, seed=6)
     got = ip.stability_loss(people, anny.template, ip.Ground())

@@ -125,6 +125,7 @@ def test_the_environment_sets_the_threads():
     assert results[0][1] == results[1][1]
 
 
+@pytest.mark.slow
 def test_the_environment_chooses_the_cpu_level():
     """Levels with fused operations give the same bits; the scalar level rounds differently."""
     script = "print(ip._core.simd_level(), digest(bodies.astype('f4')))"

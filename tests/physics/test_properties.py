@@ -180,6 +180,7 @@ VERBS = {
 TAME = (ValueError, TypeError, OverflowError)
 
 
+@pytest.mark.slow
 @settings(steady, max_examples=1000)
 @given(st.data())
 def test_no_arguments_break_the_core(data):
@@ -237,6 +238,7 @@ def test_no_arguments_break_support_and_status(data):
             call(BLOB._core, *words, threshold, vertices, normal, height)
 
 
+@pytest.mark.slow
 @settings(steady, max_examples=300)
 @given(st.data())
 def test_no_arguments_break_the_template(data):

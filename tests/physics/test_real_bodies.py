@@ -54,6 +54,7 @@ def test_y_down_is_y_up_on_the_turned_people(people):
         )
 
 
+@pytest.mark.slow
 def test_hull_and_margin_against_qhull(people):
     template, bodies, ground = people
     found = ip.base_of_support(bodies, template, ground)

@@ -29,6 +29,7 @@ def judged_margin(vertices, template, normal, height, threshold, method="pcom", 
     return oracles.signed_margin(contacts(vertices, template, normal, height, threshold, rule), centre)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ip.body.poses.NAMES)
 def test_named_poses_against_qhull_and_shapely(name, anny):
     vertices = ip.body.posed(anny, name)
@@ -76,6 +77,7 @@ def test_margins_on_sloping_ground(method, rule, blob):
         assert area_vector @ normal == pytest.approx(area, abs=1e-15)
 
 
+@pytest.mark.slow
 def test_programme_and_hull_agree_on_a_thousand_people(lite):
     """Random poses, leans and slopes of the embedded body with a few hundred contacts at most, and the paper's own
     programme, whether the centre is a convex combination of the contacts, by scipy on some of them."""

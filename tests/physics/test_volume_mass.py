@@ -35,6 +35,7 @@ def test_named_poses(name, pose, request):
     np.testing.assert_allclose(ip.center_of_mass(vertices, body.template, "exact"), solid.center, rtol=0, atol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["anny", "lite"])
 def test_random_people_whole_and_part_by_part(name, request, random_people):
     body = request.getfixturevalue(name)

@@ -14,6 +14,7 @@ from memory_limits import ending
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="other systems do not hold to a limit of address space")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case",
     [

@@ -28,6 +28,7 @@ def printed() -> str:
     return tables(data)
 
 
+@pytest.mark.slow
 def test_volumes_of_real_people(printed):
     rows = re.findall(r"\| img_subj\d+ \|.*\| ([\d.]+) \| (\S+) \| (\S+) m \| (\S+) \|", printed)
     assert len(rows) == 2
@@ -43,6 +44,7 @@ def test_force_plates(printed):
     assert float(walking) == pytest.approx(72.6, rel=0.01)  # the model's mass; its CoM knows nothing of the plates
 
 
+@pytest.mark.slow
 def test_without_the_data(tmp_path):
     printed = tables(tmp_path)
     assert "bodies: left out" in printed

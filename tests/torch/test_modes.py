@@ -54,6 +54,7 @@ def test_compile_with_a_numpy_ground_and_another_batch(tiny):
         assert torch.equal(f(vertices), ipt.stability_loss(vertices, tiny.template, tiny.ground))
 
 
+@pytest.mark.slow
 def test_compile_with_a_ground_made_inside(tiny):
     normals, heights = tiny.ground.normal.expand(3, 3), torch.linspace(-0.02, 0.02, 3)
 

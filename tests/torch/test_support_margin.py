@@ -36,6 +36,7 @@ def margin(vertices, template, ground, forced, **options):
         return ipt.support_margin(vertices, template, ground, **options)
 
 
+@pytest.mark.slow
 @PATHS
 def test_embedded_bodies_against_qhull(poses, forced):
     vertices = poses.vertices.clone()

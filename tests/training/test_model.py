@@ -170,6 +170,7 @@ def test_the_small_backbone_finds_a_spot():
     assert error.abs().mean() < 0.15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["resnet18", "mobilenet_v3_small", "timm/resnet10t"])
 def test_backbones_by_name(name):
     pytest.importorskip("timm" if name.startswith("timm") else "torchvision")
@@ -196,6 +197,7 @@ def test_spins_checkpoint(resnet, spin_weights, tmp_path):
     assert len(left) == len(spin_weights)
 
 
+@pytest.mark.slow
 def test_wrong_checkpoints(resnet, spin_weights, tmp_path):
     before = {name: value.clone() for name, value in resnet.state_dict().items()}
     path = tmp_path / "wrong.pt"

@@ -71,6 +71,7 @@ def whole(tmp_path_factory):
     return folder / "out"
 
 
+@pytest.mark.slow
 def test_a_run(whole):
     lines = curve(whole)
     assert [int(line["step"]) for line in lines] == list(range(24))

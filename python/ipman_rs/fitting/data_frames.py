@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel, formats, pose_arrays
 from ipman_rs.data.frames import Frames
-from ipman_rs.evaluation.tables.models import Bodies
+from ipman_rs.evaluation.tables.models import FrameBodies
 
 from ..data.keypoints.detections import Detections
 from .camera import Camera
@@ -104,7 +104,7 @@ def image_size(frame: Frames) -> Array | None:
     return None if frame.cameras is None else 2 * np.asarray(frame.cameras.intrinsics[0], float)[:2, 2]
 
 
-def presented_of(frame: Frames, own: Bodies, body: BodyModel) -> tuple[PresentedBody, World]:
+def presented_of(frame: Frames, own: FrameBodies, body: BodyModel) -> tuple[PresentedBody, World]:
     """The recorded pose of one frame, presented to `body`, and the world in which its root joint is the body's.
 
     own: the data set's own body of that frame. If it is of the same model, the presented floor is the data set's, and

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ipman_rs.body import BodyModel, embedded, formats, joints, pose_arrays
-from ipman_rs.files import read_json, regular, safe_npz, safe_pickle
+from ipman_rs.files import read_json, regular_file, safe_npz, safe_pickle
 from ipman_rs.ground import Ground
 
 Array = NDArray[Any]
@@ -62,7 +62,7 @@ def read(path: Path, body: BodyModel, frame: int | None = None, up: Axis | None 
     stored = _Stored.open(path)
     pieces = _hands_turned(stored, body)
     if not pieces:
-        listed = safe_npz.listed(stored.names)
+        listed = safe_npz.list_arrays(stored.names)
         raise ValueError(
             f"{stored.path}: holds {listed}; expected a pose such as global_orient with body_pose, or pose"
         )
@@ -103,7 +103,7 @@ def read_contact(path: Path, body: BodyModel) -> NDArray[np.int64]:
         stored = _Stored.open(path)
         found = stored.first("contact")
         if found is None:
-            raise ValueError(f"{path}: expected an array contact, it has {safe_npz.listed(stored.names)}")
+            raise ValueError(f"{path}: expected an array contact, it has {safe_npz.list_arrays(stored.names)}")
         return _indices(found, f"{path}: contact", body)
     content = read_json(path)
     try:
@@ -131,7 +131,7 @@ class _Stored:
 
     @classmethod
     def open(cls, path: Path) -> _Stored:
-        regular(path)
+        regular_file(path)
         if path.suffix.lower() == ".npz":
             return cls(path, safe_npz.names(path), lambda name: safe_npz.read(path, name))
         content = safe_pickle.read(path, "presented pose", "a pose of SMPL, SMPL-X or MoYo", tolerant=True)

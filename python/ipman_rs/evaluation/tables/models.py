@@ -1,4 +1,4 @@
-"""The body models that frames name: embedded ones, and SMPL, SMPL+H and SMPL-X files in a folder of the user's."""
+"""The body models of frames: embedded ones, and the user's files of SMPL, SMPL+H and SMPL-X."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ _ENDINGS = (".npz", ".pkl")
 
 
 @dataclass(frozen=True, eq=False)
-class Bodies:
-    """Posed bodies, or what the frames have of them; arrays (F, n, 3) m."""
+class FrameBodies:
+    """The posed bodies of F frames, as far as the frames have them; arrays (F, n, 3) m."""
 
     kind: str | None  # "smpl", "anny" …
     model: BodyModel | None  # whose faces and parts the vertices have
     vertices: NDArray[Any] | None
-    own: NDArray[Any] | None  # the joints of the posed body model
-    given: NDArray[Any] | None  # the joints that the frames name themselves: measured, or predicted without a body
-    given_names: tuple[str, ...]
-    without_model: str | None = None  # such as SMPLX_FEMALE: of a pose that has no model here, beside given joints
+    model_joints: NDArray[Any] | None  # of the posed body model
+    file_joints: NDArray[Any] | None  # that the frames name themselves: measured, or predicted without a body
+    file_joint_names: tuple[str, ...]
+    missing_model: str | None = None  # such as SMPLX_FEMALE: the model file that the poses need and that is not there
 
     @property
-    def own_names(self) -> tuple[str, ...]:
-        return () if self.own is None or self.model is None else self.model.joint_names
+    def model_joint_names(self) -> tuple[str, ...]:
+        return () if self.model_joints is None or self.model is None else self.model.joint_names
 
     @property
     def joints(self) -> NDArray[Any] | None:
-        """Some joints, by `joint_names`: the body's own before given ones."""
-        return self.given if self.own is None else self.own
+        """The joints named by `joint_names`: of the body model if there is one, else of the file."""
+        return self.file_joints if self.model_joints is None else self.model_joints
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        return self.given_names if self.own is None else self.own_names
+        return self.file_joint_names if self.model_joints is None else self.model_joint_names
 
 
 @dataclass(eq=False)
 class Models:
-    """`folder`: where model files are, anywhere below it, or None."""
+    """Body models, loaded when needed. folder: model files are anywhere below it; None: embedded ones only."""
 
     folder: Path | None = None
     _loaded: dict[tuple[str, str, int, str | None], BodyModel] = field(default_factory=dict)
@@ -88,20 +88,20 @@ class Models:
         return kind in embedded.NAMES or bool(self.files(kind))
 
     def files(self, kind: str) -> list[Path]:
-        """Of that kind, of any gender."""
-        found = [self._found(kind, gender) for gender in GENDERS]
-        return sorted({path for path in found if path is not None})
+        """The model files of a kind, of all genders."""
+        paths = [self._found(kind, gender) for gender in GENDERS]
+        return sorted({path for path in paths if path is not None})
 
-    def posed(self, frames: Frames) -> Bodies:
-        """Vertices and joints of the frames. ValueError where a pose does not fit its model, or where the pose is all
-        that there is and its model is not."""
+    def posed(self, frames: Frames) -> FrameBodies:
+        """Vertices and joints of the frames. ValueError if a pose does not match its model, or if frames have only a
+        pose and its model is missing."""
         vertices, own, kind = frames.vertices, None, frames.body
         needed = vertices is None and frames.joints is None
         model = None if kind is None or not (needed or self.has(kind)) else self.template_of(kind, _genders(frames)[0])
         if frames.pose is not None and kind is not None and model is not None and vertices is None:
             vertices, own = self._skinned(frames, kind)
         lacking = file_of(frames) if frames.pose is not None and vertices is None else None
-        return Bodies(kind, model, vertices, own, frames.joints, tuple(frames.joint_names or ()), lacking)
+        return FrameBodies(kind, model, vertices, own, frames.joints, tuple(frames.joint_names or ()), lacking)
 
     def _skinned(self, frames: Frames, kind: str) -> tuple[NDArray[Any], NDArray[Any]]:
         pose = np.asarray(frames.pose)
@@ -125,9 +125,9 @@ class Models:
         return vertices, joints
 
     def file(self, kind: str, gender: str) -> Path:
-        found = self._found(kind, gender)
-        if found is not None:
-            return found
+        path = self._found(kind, gender)
+        if path is not None:
+            return path
         where = "no folder is named by --models" if self.folder is None else f"there is none under {self.folder}"
         raise ValueError(f"the body {kind} ({gender}) needs its model file, {_stem(kind, gender)}.npz or .pkl: {where}")
 
@@ -150,5 +150,5 @@ def _stem(kind: str, gender: str) -> str:
 
 
 def _genders(frames: Frames) -> list[str]:
-    """Of the people, each once."""
+    """The genders of the people, without repetition."""
     return ["neutral"] if frames.genders is None or not len(frames) else np.unique(frames.genders).tolist()

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from ipman_rs.body import BodyModel, rotations
 from ipman_rs.data import DataSet, Frames
-from ipman_rs.files import regular
+from ipman_rs.files import regular_file
 
 from ..augment import Augmentation, Augmenting, Pixels, cut, follow, normalised, to_crop
 from ..posed_estimate import HIPS, REGRESSED
@@ -172,7 +172,7 @@ class Images:
             return Image.fromarray(own(row))
         if frame.images is None:
             raise BadSample(f"{frame.names[0]}: no image")
-        with Image.open(regular(self.folder / str(frame.images[0])), formats=("JPEG", "PNG")) as image:
+        with Image.open(regular_file(self.folder / str(frame.images[0])), formats=("JPEG", "PNG")) as image:
             return image.convert("RGB")
 
 
