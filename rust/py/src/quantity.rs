@@ -58,22 +58,8 @@ impl<T: Data, Q: quantity::Quantity> Evaluate<T> for Q {
     }
 }
 
-/// Loss terms in the precision `T`, which have a Jacobian besides.
-pub trait EvaluateTerms<T>: Send + Sync {
-    fn terms(&self, batch: &Batch<T>, pool: &Pool, jacobian: &mut [T]) -> ipman::Result<Pooled>;
-}
-
-impl<T: Data, Q: Terms> EvaluateTerms<T> for Q {
-    fn terms(&self, batch: &Batch<T>, pool: &Pool, jacobian: &mut [T]) -> ipman::Result<Pooled> {
-        pool.terms(batch, self, jacobian)
-    }
-}
-
 trait InBoth: Evaluate<f32> + Evaluate<f64> {}
 impl<Q: Evaluate<f32> + Evaluate<f64>> InBoth for Q {}
-
-trait TermsInBoth: EvaluateTerms<f32> + EvaluateTerms<f64> {}
-impl<Q: EvaluateTerms<f32> + EvaluateTerms<f64>> TermsInBoth for Q {}
 
 /// A quantity of one template. Its name and its options are read and checked here, once.
 #[pyclass(frozen, module = "ipman_rs._core")]
@@ -82,21 +68,18 @@ pub struct Quantity {
     num_outputs: usize,
     quantity: Arc<dyn InBoth>,
     /// The same object, if it is loss terms.
-    terms: Option<Arc<dyn TermsInBoth>>,
+    terms: Option<Arc<Terms>>,
 }
 
 /// Makes the object of a quantity.
 struct Checked<'a, 'py>(&'a Bound<'py, Template>);
 
 impl Checked<'_, '_> {
-    fn handle<Q: quantity::Quantity>(
-        self,
-        quantity: Arc<Q>,
-        terms: Option<Arc<dyn TermsInBoth>>,
-    ) -> ipman::Result<Quantity> {
+    fn handle<Q: quantity::Quantity>(self, quantity: Arc<Q>, terms: Option<Arc<Terms>>) -> ipman::Result<Quantity> {
         let template = &self.0.get().inner;
         quantity.check(template)?;
-        Ok(Quantity { template: self.0.clone().unbind(), num_outputs: quantity.num_outputs(template), quantity, terms })
+        let num_outputs = quantity.num_outputs(template);
+        Ok(Quantity { template: self.0.clone().unbind(), num_outputs, quantity, terms })
     }
 }
 
@@ -107,9 +90,9 @@ impl Visitor for Checked<'_, '_> {
         self.handle(Arc::new(quantity), None)
     }
 
-    fn visit_terms<Q: Terms>(self, quantity: Q) -> Self::Output {
-        let quantity = Arc::new(quantity);
-        self.handle(quantity.clone(), Some(quantity))
+    fn visit_terms(self, terms: Terms) -> Self::Output {
+        let terms = Arc::new(terms);
+        self.handle(terms.clone(), Some(terms))
     }
 }
 
@@ -246,8 +229,8 @@ impl Quantity {
         in_precision!(self, vertices, normal, height, |over| weighted::weighted(&over, &weights, &counted))
     }
 
-    /// (terms, shares, jacobian) of loss terms: the first two as in `weighted`; for each body the gradient of the first
-    /// term by the vertices, V·3 numbers, then those of pull and of push by the vertices' heights: (B, 5·V).
+    /// (terms, shares, jacobian) of loss terms: the first two as in `weighted`; for each body the gradients of its
+    /// numbers one after the other, V·3 numbers by the vertices, or V by their heights: (B, J).
     fn terms<'py>(
         &self,
         vertices: Vertices<'py>,
@@ -257,8 +240,26 @@ impl Quantity {
         reduction: &str,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let counted = Counted::new(valid, reduction)?;
-        let terms = self.terms.as_deref().ok_or_else(|| PyValueError::new_err("quantity: expected loss terms"))?;
+        let terms = self.loss_terms()?;
         in_precision!(self, vertices, normal, height, |over| weighted::terms(&over, terms, &counted))
+    }
+
+    /// The gradient (B, V, 3) of what `terms` gave, for its terms' upstream d_terms, (K,) or (B, K).
+    fn terms_backward<'py>(
+        &self,
+        jacobian: Bound<'py, PyAny>,
+        shares: Bound<'py, PyAny>,
+        d_terms: Bound<'py, PyAny>,
+        normal: Normals<'py>,
+    ) -> Reply<'py> {
+        let widths = self.loss_terms()?.widths();
+        weighted::terms_backward(&widths, jacobian, shares, d_terms, &normal)
+    }
+}
+
+impl Quantity {
+    fn loss_terms(&self) -> PyResult<&Terms> {
+        self.terms.as_deref().ok_or_else(|| PyValueError::new_err("quantity: expected loss terms"))
     }
 }
 
@@ -273,6 +274,10 @@ pub struct Over<'a, 'py, T: Element> {
 impl<'py, T: Data + Element> Over<'_, 'py, T> {
     pub fn py(&self) -> Python<'py> {
         self.vertices.py()
+    }
+
+    pub fn template(&self) -> &ipman::Template {
+        &self.of.template.get().inner
     }
 
     /// The shape of the values.

@@ -3,6 +3,7 @@
 use super::Batch;
 use super::groups::OnLanes;
 use crate::error::Result;
+use crate::losses::term::OwnGradient;
 use crate::losses::terms::Terms;
 use crate::memory;
 use crate::number::{Data, Dual, Real, Scalar, all_finite};
@@ -43,13 +44,13 @@ impl<T: Data> Batch<'_, T> {
         self.value_and_vjp_into(quantity, d_out, &mut out, d_vertices)
     }
 
-    /// The terms, and their Jacobian: for each body the gradient of the first term by the vertices, V·3 numbers, then
-    /// those of pull and of push by the vertices' heights, V each.
-    pub fn value_and_jacobian_into<Q: Terms>(&self, quantity: &Q, out: &mut [T], jacobian: &mut [T]) -> Result<()> {
-        quantity.check(self.template)?;
-        let (size, row) = (quantity.num_outputs(self.template), 5 * self.template.mesh.num_vertices);
+    /// The terms, and their Jacobian: for each body the gradient of each number, one after the other, by the vertices or
+    /// by their heights: V·[width](Terms::widths).
+    pub fn value_and_jacobian_into(&self, terms: &Terms, out: &mut [T], jacobian: &mut [T]) -> Result<()> {
+        terms.check(self.template)?;
+        let (size, row) = (terms.num_outputs(self.template), terms.jacobian_row(self.template));
         self.each([(out, size), (jacobian, row)], |group, [out, jacobian]| {
-            self.on_lanes(group, ForwardAndJacobian { template: self.template, quantity, size, out, jacobian });
+            self.on_lanes(group, ForwardAndJacobian { terms, size, out, jacobian });
         })
     }
 
@@ -162,25 +163,27 @@ impl<T: Data, Q: Quantity> OnLanes<T> for ForwardAndBackward<'_, T, Q> {
     }
 }
 
-struct ForwardAndJacobian<'a, T, Q> {
-    template: &'a Template,
-    quantity: &'a Q,
+struct ForwardAndJacobian<'a, T> {
+    terms: &'a Terms,
     size: usize,
     out: Vec<&'a mut [T]>,
     jacobian: Vec<&'a mut [T]>,
 }
 
-impl<T: Data, Q: Terms> OnLanes<T> for ForwardAndJacobian<'_, T, Q> {
+impl<T: Data> OnLanes<T> for ForwardAndJacobian<'_, T> {
     fn run<R: Real<Data = T>>(mut self, posed: &PosedBody<R>) {
-        let count = self.template.mesh.num_vertices;
         let mut out = memory::filled(R::zero(), self.size);
-        let mut d_first = memory::filled([R::zero(); 3], posed.points.len());
-        let (mut d_pull, mut d_push) = (memory::filled(R::zero(), count), memory::filled(R::zero(), count));
-        self.quantity.forward_and_jacobian(posed, &mut out, &mut d_first, [&mut d_pull, &mut d_push]);
-        self.template.closing.backward(&mut d_first);
+        let mut gradients = self.terms.forward_and_jacobian(posed, &mut out);
         R::write_rows(&out, &mut self.out);
         let mut start = 0;
-        for numbers in [d_first[..count].as_flattened(), &d_pull, &d_push] {
+        for gradient in &mut gradients {
+            let numbers = match gradient {
+                OwnGradient::Points(d_points) => {
+                    posed.template.closing.backward(d_points);
+                    d_points[..posed.template.mesh.num_vertices].as_flattened()
+                }
+                OwnGradient::Heights(d_heights) => d_heights,
+            };
             let rows = self.jacobian.iter_mut().map(|row| &mut row[start..start + numbers.len()]);
             R::write_rows(numbers, &mut rows.collect::<Vec<_>>());
             start += numbers.len();
