@@ -26,7 +26,7 @@ from ipman_rs import _core
 {use}
 body = ip.load_body("anny-lite")
 ground = ipt.Ground((0.1, 1.0, 0.05), 0.01)
-still = torch.from_numpy(np.stack([ip.body.posed(body, name) for name in ("standing", "one-leg")]))
+still = torch.from_numpy(np.stack([ip.body.posed(body, name) for name in ("standing", "one_leg")]))
 upstream = torch.tensor([0.5, -2.0, 3.0, 1.5], dtype=torch.float64)
 
 
@@ -58,7 +58,7 @@ assert all(torch.equal(with_height[name], value) for name, value in three.items(
 total = lambda vertices: loss.weighted(vertices, ground)[0]
 tiny = ip.BodyTemplate(*(array for array in {tetrahedron}), num_samples=50)
 loss = ipt.IntuitivePhysicsLoss(tiny, crouching)
-corner = torch.tensor({tetrahedron}[0]).requires_grad_()
+corner = torch.tensor({tetrahedron}[0], dtype=torch.float64).requires_grad_()
 assert torch.autograd.gradcheck(total, corner, check_forward_ad=True)
 assert torch.autograd.gradgradcheck(total, corner)
 """

@@ -1,7 +1,7 @@
 //! Reduction of a training step's terms over a batch, in one pass: their weighted total with its gradient, or each term
 //! with the Jacobian that its backward needs.
 
-use crate::batch::Batch;
+use crate::batch::{Batch, Evaluate};
 use crate::error::{Error, Result, unknown_choice};
 use crate::losses::terms::Terms;
 use crate::memory;
@@ -49,14 +49,14 @@ pub struct Pooled {
 impl Pool<'_> {
     /// The weighted total Σ λ · term with `weights` λ (one number, or one per body without reduction), and the terms.
     /// Writes the gradient of the total (of the sum of totals without reduction) by the vertices, B·V·3 numbers.
-    pub fn weighted<T: Data, Q: Quantity>(
+    pub fn weighted<T: Data>(
         &self,
         batch: &Batch<T>,
-        quantity: &Q,
+        quantity: &dyn Evaluate<T>,
         weights: &[f64],
         gradient: &mut [T],
     ) -> Result<(Vec<f64>, Pooled)> {
-        let (bodies, size) = (batch.len(), quantity.num_outputs(batch.template()));
+        let (bodies, size) = (batch.len(), quantity.size(batch.template()));
         if size != weights.len() {
             let expected = format!("{size} numbers, one per term");
             return Err(Error::Argument { name: "weights", expected, got: weights.len().to_string() });
@@ -69,7 +69,7 @@ impl Pool<'_> {
         let part = |i: usize| if self.valid(i / size) { T::of(weights[i % size] * provisional) } else { T::zero() };
         let buffers = || Ok((memory::collect((0..bodies * size).map(part)), memory::filled(T::zero(), bodies * size)));
         let (d_out, mut values) = memory::guarded(buffers)?;
-        batch.value_and_vjp_into(quantity, &d_out, &mut values, gradient)?;
+        quantity.value_and_vjp_into(batch, &d_out, &mut values, gradient)?;
 
         // Bodies whose term is NaN are known only now. The mean was taken over them, too: rescale its gradient.
         let (pooled, share) = self.pool(&values, size)?;

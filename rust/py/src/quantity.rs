@@ -6,10 +6,10 @@ use crate::error::python_error;
 use crate::template::Template;
 use crate::weighted::{self, Counted};
 use ipman::Batch;
+use ipman::batch::Evaluate;
 use ipman::losses::terms::Terms;
 use ipman::number::Data;
 use ipman::quantity;
-use ipman::reduction::{Pool, Pooled};
 use ipman::registry::{Visitor, named};
 use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn};
@@ -18,46 +18,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use std::sync::Arc;
 
-/// A quantity in the precision `T`. The core's trait has generic methods, so a quantity whose type is known only at run
-/// time needs this one.
-pub trait Evaluate<T>: Send + Sync {
-    fn value(&self, batch: &Batch<T>, out: &mut [T]) -> ipman::Result<()>;
-    fn vjp(&self, batch: &Batch<T>, d_out: &[T], d_vertices: &mut [T]) -> ipman::Result<()>;
-    fn jvp(&self, batch: &Batch<T>, d_vertices: &[T], out: &mut [T]) -> ipman::Result<()>;
-    fn hvp(&self, batch: &Batch<T>, d_out: &[T], d_vertices: &[T], out: &mut [T]) -> ipman::Result<()>;
-    fn value_and_vjp(&self, batch: &Batch<T>, d_out: &[T], out: &mut [T], d_vertices: &mut [T]) -> ipman::Result<()>;
-    fn weighted(&self, batch: &Batch<T>, pool: &Pool, weights: &[f64], d_vertices: &mut [T]) -> Weighted;
-}
-
-/// The totals, and the terms that they are made of.
-type Weighted = ipman::Result<(Vec<f64>, Pooled)>;
-
-impl<T: Data, Q: quantity::Quantity> Evaluate<T> for Q {
-    fn value(&self, batch: &Batch<T>, out: &mut [T]) -> ipman::Result<()> {
-        batch.value_into(self, out)
-    }
-
-    fn vjp(&self, batch: &Batch<T>, d_out: &[T], d_vertices: &mut [T]) -> ipman::Result<()> {
-        batch.vjp_into(self, d_out, d_vertices)
-    }
-
-    fn jvp(&self, batch: &Batch<T>, d_vertices: &[T], out: &mut [T]) -> ipman::Result<()> {
-        batch.jvp_into(self, d_vertices, out)
-    }
-
-    fn hvp(&self, batch: &Batch<T>, d_out: &[T], d_vertices: &[T], out: &mut [T]) -> ipman::Result<()> {
-        batch.vjp_jvp_into(self, d_out, d_vertices, out)
-    }
-
-    fn value_and_vjp(&self, batch: &Batch<T>, d_out: &[T], out: &mut [T], d_vertices: &mut [T]) -> ipman::Result<()> {
-        batch.value_and_vjp_into(self, d_out, out, d_vertices)
-    }
-
-    fn weighted(&self, batch: &Batch<T>, pool: &Pool, weights: &[f64], d_vertices: &mut [T]) -> Weighted {
-        pool.weighted(batch, self, weights, d_vertices)
-    }
-}
-
+/// A quantity in either precision.
 trait InBoth: Evaluate<f32> + Evaluate<f64> {}
 impl<Q: Evaluate<f32> + Evaluate<f64>> InBoth for Q {}
 
@@ -136,7 +97,7 @@ impl Quantity {
     /// The quantity of each body: vertices (B, V, 3) -> (B, K).
     fn value<'py>(&self, vertices: Vertices<'py>, normal: Normals<'py>, height: Heights<'py>) -> Reply<'py> {
         in_precision!(self, vertices, normal, height, |over| {
-            let (values, ()) = over.filled(&over.rows(), |quantity, batch, out| quantity.value(batch, out))?;
+            let (values, ()) = over.filled(&over.rows(), |quantity, batch, out| quantity.value_into(batch, out))?;
             Ok(values.into_any())
         })
     }
@@ -153,7 +114,7 @@ impl Quantity {
             let d_out = over.d_out(&d_out)?;
             let d_out = d_out.as_slice()?;
             let (gradient, ()) =
-                over.filled(over.vertices.shape(), |quantity, batch, out| quantity.vjp(batch, d_out, out))?;
+                over.filled(over.vertices.shape(), |quantity, batch, out| quantity.vjp_into(batch, d_out, out))?;
             Ok(gradient.into_any())
         })
     }
@@ -170,7 +131,7 @@ impl Quantity {
             let d_vertices = over.d_vertices(&d_vertices)?;
             let d_vertices = d_vertices.as_slice()?;
             let (slopes, ()) =
-                over.filled(&over.rows(), |quantity, batch, out| quantity.jvp(batch, d_vertices, out))?;
+                over.filled(&over.rows(), |quantity, batch, out| quantity.jvp_into(batch, d_vertices, out))?;
             Ok(slopes.into_any())
         })
     }
@@ -187,8 +148,9 @@ impl Quantity {
         in_precision!(self, vertices, normal, height, |over| {
             let (d_out, d_vertices) = (over.d_out(&d_out)?, over.d_vertices(&d_vertices)?);
             let (d_out, d_vertices) = (d_out.as_slice()?, d_vertices.as_slice()?);
-            let (product, ()) =
-                over.filled(over.vertices.shape(), |quantity, batch, out| quantity.hvp(batch, d_out, d_vertices, out))?;
+            let (product, ()) = over.filled(over.vertices.shape(), |quantity, batch, out| {
+                quantity.hvp_into(batch, d_out, d_vertices, out)
+            })?;
             Ok(product.into_any())
         })
     }
@@ -208,7 +170,7 @@ impl Quantity {
             let mut written = values.readwrite();
             let out = written.as_slice_mut()?;
             let (gradient, ()) = over.filled(over.vertices.shape(), |quantity, batch, d_vertices| {
-                quantity.value_and_vjp(batch, d_out, out, d_vertices)
+                quantity.value_and_vjp_into(batch, d_out, out, d_vertices)
             })?;
             (values, gradient).into_pyobject(over.py())
         })

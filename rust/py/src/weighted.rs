@@ -51,7 +51,7 @@ pub fn weighted<'py, T: Data + Element>(
     let pool = &counted.pool(bodies)?;
     let shape = over.vertices.shape();
     let (gradient, (totals, pooled)) =
-        over.filled(shape, |quantity, batch, gradient| quantity.weighted(batch, pool, weights, gradient))?;
+        over.filled(shape, |quantity, batch, gradient| pool.weighted(batch, quantity, weights, gradient))?;
     let batch = counted.batch(bodies);
     let terms = rounded::<T>(py, &[&batch[..], &[weights.len()]].concat(), pooled.terms)?;
     let shares = rounded::<T>(py, &[bodies], pooled.shares)?;
