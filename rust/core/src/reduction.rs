@@ -167,28 +167,28 @@ const VERTICES: usize = 256;
 fn add_up<T: Data>(by_points: &[(T, &[T])], by_heights: &[(T, &[T])], normal: [T; 3], gradient: &mut [T]) {
     let mut along = [T::zero(); VERTICES];
     for (block, gradient) in gradient.chunks_mut(3 * VERTICES).enumerate() {
-        weighted_sum(by_points, 3 * VERTICES * block, gradient);
-        if by_heights.is_empty() {
-            continue;
-        }
         let along = &mut along[..gradient.len() / 3];
         weighted_sum(by_heights, VERTICES * block, along);
-        for (d_point, &along) in gradient.as_chunks_mut::<3>().0.iter_mut().zip(&*along) {
-            for k in 0..3 {
-                d_point[k] = d_point[k] + along * normal[k];
+        weighted_sum(by_points, 3 * VERTICES * block, gradient);
+        if !by_heights.is_empty() {
+            for (d_point, &along) in gradient.as_chunks_mut::<3>().0.iter_mut().zip(&*along) {
+                for k in 0..3 {
+                    d_point[k] = d_point[k] + along * normal[k];
+                }
             }
         }
     }
 }
 
-/// Writes Σ factor · numbers, from `start` on.
+/// Writes Σ factor · numbers, from `start` on. The first product is not added to 0, for 0 + −0 would be +0.
 fn weighted_sum<T: Data>(parts: &[(T, &[T])], start: usize, out: &mut [T]) {
-    out.fill(T::zero());
-    for (k, &(factor, numbers)) in parts.iter().enumerate() {
-        let numbers = &numbers[start..start + out.len()];
-        for (out, &number) in out.iter_mut().zip(numbers) {
-            // 0 + −0 would be +0.
-            *out = if k == 0 { factor * number } else { *out + factor * number };
+    let Some((&(factor, numbers), rest)) = parts.split_first() else { return out.fill(T::zero()) };
+    for (out, &number) in out.iter_mut().zip(&numbers[start..]) {
+        *out = factor * number;
+    }
+    for &(factor, numbers) in rest {
+        for (out, &number) in out.iter_mut().zip(&numbers[start..]) {
+            *out = *out + factor * number;
         }
     }
 }
