@@ -20,8 +20,9 @@ ANALYSIS_COLUMNS: dict[str, int]
 GRAVITY: float
 """m/s²"""
 
-TERMS: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]]
-"""The terms that a loss may be made of, in their order: the names of the numbers, of the modes and of the options."""
+TERMS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]]
+"""The terms that a loss may be made of, in their order: the name as a quantity of its own, and the names of the numbers,
+of the modes and of the options."""
 
 _Float = TypeVar("_Float", np.float32, np.float64)
 

@@ -1,10 +1,8 @@
 //! The list of all quantities by name.
 
 use crate::error::{Error, Result};
-use crate::losses::balance::BalanceCost;
-use crate::losses::ground::GroundLoss;
-use crate::losses::stability::StabilityLoss;
-use crate::losses::term::Named;
+use crate::losses::AnyTerm;
+use crate::losses::term::{Term, TermVisitor};
 use crate::losses::terms::Terms;
 use crate::mass::{CenterOfMass, Method};
 use crate::mass_properties::MassProperties;
@@ -15,7 +13,8 @@ use crate::support::{Contact, ContactRule, SupportMargin};
 use crate::template::Template;
 use crate::volume::PartVolumes;
 
-/// Calls `visitor` with the quantity of this name and these options. A new quantity is registered here.
+/// Calls `visitor` with the quantity of this name and these options. A new quantity is registered here, but for the
+/// losses, which have a list of their own ([`crate::losses`]).
 pub fn named<V: Visitor>(template: &Template, name: &str, options: &[f64], visitor: V) -> Result<V::Output> {
     let unknown = || Error::UnknownQuantity(format!("{name} with {} options", options.len()));
     let words: Vec<&str> = name.split('.').collect();
@@ -34,16 +33,10 @@ pub fn named<V: Visitor>(template: &Template, name: &str, options: &[f64], visit
             let contact = Contact { rule: ContactRule::named(rule)?, threshold };
             visitor.visit(SupportMargin { contact, method: Method::named(m)? })
         }
-        (["stability_loss", modes @ ..], o) if is_described::<StabilityLoss>(modes, o) => {
-            visitor.visit(StabilityLoss::named(modes, o)?)
-        }
-        (["ground_loss", modes @ ..], o) if is_described::<GroundLoss>(modes, o) => {
-            visitor.visit(GroundLoss::named(modes, o)?)
-        }
-        (["balance_cost", modes @ ..], o) if is_described::<BalanceCost>(modes, o) => {
-            visitor.visit(BalanceCost::named(modes, o)?)
-        }
         (["terms", words @ ..], o) => visitor.visit_terms(Terms::named(words, o)?),
+        ([loss, modes @ ..], o) => {
+            return AnyTerm::visit_alone(loss, modes, o, Alone(visitor)).unwrap_or_else(|| Err(unknown()));
+        }
         _ => return Err(unknown()),
     })
 }
@@ -62,7 +55,13 @@ pub trait Visitor {
     }
 }
 
-/// Whether a loss takes so many modes and options.
-fn is_described<T: Named>(modes: &[&str], options: &[f64]) -> bool {
-    modes.len() == T::DESCRIPTION.modes.len() && options.len() == T::DESCRIPTION.options.len()
+/// A loss by itself, as any other quantity.
+struct Alone<V>(V);
+
+impl<V: Visitor> TermVisitor for Alone<V> {
+    type Output = V::Output;
+
+    fn visit<T: Term>(self, term: T) -> V::Output {
+        self.0.visit(term)
+    }
 }

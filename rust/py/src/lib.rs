@@ -46,12 +46,13 @@ mod _core {
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 
-    /// (numbers, modes, options) of each term by its name.
+    /// (quantity, numbers, modes, options) of each term by its name.
     fn terms(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         let terms = PyDict::new(py);
         for term in AnyTerm::DESCRIPTIONS {
             let names = |names: &[&str]| PyTuple::new(py, names);
-            terms.set_item(term.name, (names(term.numbers)?, names(term.modes)?, names(term.options)?))?;
+            let described = (term.quantity, names(term.numbers)?, names(term.modes)?, names(term.options)?);
+            terms.set_item(term.name, described)?;
         }
         Ok(terms)
     }

@@ -112,6 +112,7 @@ impl<R: Real> Sides<R> {
 impl Named for GroundLoss {
     const DESCRIPTION: &'static Description = &Description {
         name: "ground",
+        quantity: "ground_loss",
         numbers: &["pull", "push"],
         along_normal: true,
         modes: &["points", "curve"],

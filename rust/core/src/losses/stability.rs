@@ -44,6 +44,7 @@ pub fn distance_on_ground<R: Real>(posed: &PosedBody<R>, centre: &Centre<R>, cop
 impl Named for StabilityLoss {
     const DESCRIPTION: &'static Description = &Description {
         name: "stability",
+        quantity: "stability_loss",
         numbers: &["stability"],
         along_normal: false,
         modes: &["method"],

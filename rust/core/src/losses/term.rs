@@ -17,7 +17,10 @@ use std::slice::from_ref;
 /// The names by which a term is asked for.
 #[derive(Debug, PartialEq)]
 pub struct Description {
+    /// Among the terms of a loss.
     pub name: &'static str,
+    /// As a quantity of its own.
+    pub quantity: &'static str,
     /// The names of its numbers, in their order.
     pub numbers: &'static [&'static str],
     /// Whether the gradients of its numbers are along the ground's normal. Then they are given by the vertices' heights,
@@ -35,6 +38,12 @@ pub trait Named: Term + Sized {
 
     /// `modes` and `options` have the lengths of the description's.
     fn named(modes: &[&str], options: &[f64]) -> Result<Self>;
+}
+
+/// A computation on a term whose type depends on a name that is known only at run time.
+pub trait TermVisitor {
+    type Output;
+    fn visit<T: Term>(self, term: T) -> Self::Output;
 }
 
 /// The order of the calls is `begin`, `add` for each chunk of samples, `finish`, `backward`.

@@ -128,7 +128,7 @@ macro_rules! list_of_terms {
 
         const _: () = {
             use $crate::error::{Error, Result};
-            use $crate::losses::term::{ByHeights, Description, Gradient, Named, Shared, Term};
+            use $crate::losses::term::{ByHeights, Description, Gradient, Named, Shared, Term, TermVisitor};
             use $crate::number::Real;
             use $crate::points::PointChunk;
             use $crate::sampling::Row;
@@ -146,6 +146,23 @@ macro_rules! list_of_terms {
                         }
                     )*
                     Err(Error::UnknownQuantity(name.into()))
+                }
+
+                /// Calls `visitor` with the term that is this quantity, with as many modes and options; None for others.
+                pub fn visit_alone<V: TermVisitor>(
+                    quantity: &str,
+                    modes: &[&str],
+                    options: &[f64],
+                    visitor: V,
+                ) -> Option<Result<V::Output>> {
+                    $(
+                        let known = <$Type>::DESCRIPTION;
+                        let counts = (known.modes.len(), known.options.len());
+                        if quantity == known.quantity && (modes.len(), options.len()) == counts {
+                            return Some(<$Type>::named(modes, options).map(|term| visitor.visit(term)));
+                        }
+                    )*
+                    None
                 }
             }
 

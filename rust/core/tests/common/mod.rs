@@ -2,6 +2,8 @@
 #![allow(dead_code)]
 
 use ipman::Template;
+use ipman::losses::AnyTerm;
+use ipman::losses::term::Description;
 use std::collections::HashMap;
 
 pub type Vec3 = [f64; 3];
@@ -99,35 +101,65 @@ pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
 
 /// Every quantity with every option, and its constants.
 pub fn quantities() -> Vec<(String, Vec<f64>)> {
-    let (pressure, ground) = (vec![100.0, 10.0, 0.0], vec![1.0, 0.15, 10.0, 0.15]);
-    let balance = vec![100.0, 50.0, 0.02];
     let mut all = vec![
         ("part_volumes".to_string(), vec![]),
         ("mass_properties".to_string(), vec![985.0]),
         ("mass_properties".to_string(), vec![900.0, 1000.0, 1100.0, 1200.0]),
         ("sample_surface".to_string(), vec![]),
         ("pressure".to_string(), vec![100.0, 10.0]),
-        ("center_of_pressure".to_string(), pressure.clone()),
+        ("center_of_pressure".to_string(), vec![100.0, 10.0, 0.0]),
         ("center_of_pressure".to_string(), vec![100.0, 10.0, 1e-6]),
     ];
-    for method in ["pcom", "vertex_mean", "sample_mean", "face_area", "exact"] {
+    for method in words("method") {
         all.push((format!("center_of_mass.{method}"), vec![]));
-        all.push((format!("stability_loss.{method}"), pressure.clone()));
-        all.push((format!("balance_cost.log.{method}"), balance.clone()));
         for rule in ["paper", "released"] {
             all.push((format!("support_margin.{rule}.{method}"), vec![0.1]));
         }
     }
-    for wrap in ["saturate", "none"] {
-        all.push((format!("balance_cost.{wrap}.pcom"), balance.clone()));
+    let named = |name: &str| *AnyTerm::DESCRIPTIONS.iter().find(|term| term.name == name).unwrap();
+    for term in AnyTerm::DESCRIPTIONS {
+        all.extend(variants(term).into_iter().map(|modes| ([term.quantity, &modes].concat(), options(term))));
     }
-    for points in ["samples", "vertices"] {
-        for tanh in ["tanh_squared", "tanh_of_square"] {
-            all.push((format!("ground_loss.{points}.{tanh}"), ground.clone()));
-            let with = |first: &[f64]| [first, &ground].concat();
-            all.push((format!("terms.stability.pcom.ground.{points}.{tanh}"), with(&pressure)));
-            all.push((format!("terms.balance.log.pcom.ground.{points}.{tanh}"), with(&balance)));
+    let ground = named("ground");
+    for (first, mode) in [("stability", ".pcom"), ("balance", ".log.pcom")] {
+        for modes in variants(ground) {
+            let both = [options(named(first)), options(ground)].concat();
+            all.push((format!("terms.{first}{mode}.ground{modes}"), both));
         }
     }
     all
+}
+
+/// The words of a mode.
+fn words(mode: &str) -> &'static [&'static str] {
+    match mode {
+        "method" => &["pcom", "vertex_mean", "sample_mean", "face_area", "exact"],
+        "points" => &["samples", "vertices"],
+        "curve" => &["tanh_squared", "tanh_of_square"],
+        "wrap" => &["log", "saturate", "none"],
+        _ => panic!("words of the mode {mode}?"),
+    }
+}
+
+/// Every choice of a term's modes, as ".log.pcom".
+fn variants(term: &Description) -> Vec<String> {
+    let and = |all: Vec<String>, mode: &&str| {
+        all.iter().flat_map(|begun| words(mode).iter().map(move |word| format!("{begun}.{word}"))).collect()
+    };
+    term.modes.iter().fold(vec![String::new()], and)
+}
+
+/// A loss in the order of metres for each of a term's constants.
+fn options(term: &Description) -> Vec<f64> {
+    let value = |name: &&str| match *name {
+        "alpha" => 100.0,
+        "gamma" | "beta1" => 10.0,
+        "balance_gamma" => 50.0,
+        "epsilon" => 0.0,
+        "sigma" => 0.02,
+        "alpha1" => 1.0,
+        "alpha2" | "beta2" => 0.15,
+        _ => 0.5,
+    };
+    term.options.iter().map(value).collect()
 }

@@ -97,6 +97,7 @@ impl BalanceCost {
 impl Named for BalanceCost {
     const DESCRIPTION: &'static Description = &Description {
         name: "balance",
+        quantity: "balance_cost",
         numbers: &["balance"],
         along_normal: false,
         modes: &["wrap", "method"],
