@@ -283,7 +283,7 @@ def _settings(options: dict[str, Any]) -> Settings:
         chosen, most = config.load(options.pop("preset")), options.pop("iterations")
         if options["markers"] is not None:
             own.read(options["markers"], ip.load_body(options["model"]))  # before anything is fitted
-        return Settings(config=chosen if most is None else config.capped(chosen, most), **options)
+        return Settings(config=chosen if most is None else config.limit_iterations(chosen, most), **options)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
 

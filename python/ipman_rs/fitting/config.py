@@ -56,12 +56,12 @@ class Config:
         return self.start.get("search") == "camera"
 
 
-def weighs(config: Config, *terms: str) -> bool:
+def uses_terms(config: Config, *terms: str) -> bool:
     """Whether any stage has a weight for any of these terms."""
     return any(stage.weights.get(name, 0) > 0 for stage in config.stages for name in terms)
 
 
-def capped(config: Config, iterations: int) -> Config:
+def limit_iterations(config: Config, iterations: int) -> Config:
     """The same with stages that end after so many iterations at most."""
     stages = (
         replace(stage, options=replace(stage.options, iterations=min(stage.options.iterations, iterations)))

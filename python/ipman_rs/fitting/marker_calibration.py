@@ -18,7 +18,7 @@ FARTHEST = 5  # spreads: a marker that would have to move more was mixed up
 STEPS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
-def calibrated(
+def calibrate_sites(
     body: ipt.BodyModel,
     sites: Mapping[str, Point],
     bodies: tuple[Tensor, Tensor, Tensor],

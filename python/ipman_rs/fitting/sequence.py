@@ -27,10 +27,10 @@ from ipman_rs.checks import not_negative
 
 from ..torch.threads import one_thread
 from .config import Config, Stage
-from .fit import CHUNK, Fit, StageReport, judged, on_the_ground, run_stage
+from .fit import CHUNK, Fit, StageReport, run_stage, with_ground_under_body, with_static_mask
 from .objective import Objective
 from .problem import Problem
-from .solvers import Look, Options, minimise
+from .solvers import Evaluation, Options, minimise
 from .solvers.arrow import Arrow, solve
 from .solvers.levenberg import levenberg
 from .terms.smoothness import Smoothness
@@ -66,10 +66,10 @@ def fit_sequence(
         for number, stage in enumerate(config.stages):
             if stage.find_ground and not known:
                 problem = on_one_ground(problem, variables)
-            problem = judged(problem, variables)
+            problem = with_static_mask(problem, variables)
             if number == 0:
                 variables = warm_start(problem, variables, stage, config, rate, done, progress)
-            together = Together(problem, variables, stage, config, smooth)
+            together = SequenceObjective(problem, variables, stage, config, smooth)
             variables, report = together.solved(progress)
             reports.append(report)
     return Fit(problem, variables, reports)
@@ -77,7 +77,7 @@ def fit_sequence(
 
 def on_one_ground(problem: Problem, variables: Variables) -> Problem:
     """The problem with one level ground for all frames."""
-    each = on_the_ground(problem, variables).ground
+    each = with_ground_under_body(problem, variables).ground
     assert each is not None
     return replace(problem, ground=ipt.Ground(each.normal, each.height.nanmedian().expand(len(each.height))))
 
@@ -95,7 +95,7 @@ def warm_start(
     frames = problem.num_bodies
     done = torch.zeros(frames, dtype=torch.bool) if done is None else done
     results = {name: value.clone() for name, value in variables.items()}
-    seed = int(done.int().argmax() if done.any() else seen(problem).argmax())
+    seed = int(done.int().argmax() if done.any() else observed_weight(problem).argmax())
     stage = replace(stage, solver="levenberg")
     own = tuple(name for name in stage.free if name not in SHARED)
 
@@ -104,7 +104,7 @@ def warm_start(
         both = index.repeat(len(starts["pose"]) // len(index))
         found, report = run_stage(problem.rows(both), starts, replace(stage, free=free), config.terms)
         costs = np.nan_to_num(sum(report.terms.values()), nan=np.inf).reshape(-1, len(index))
-        costs[0, (seen(problem)[index] == 0).numpy()] = np.inf  # nothing speaks for the frame's own start
+        costs[0, (observed_weight(problem)[index] == 0).numpy()] = np.inf  # nothing speaks for the frame's own start
         winners = torch.from_numpy((len(costs) - 1 - costs[::-1].argmin(axis=0)) * len(index) + np.arange(len(index)))
         for name, value in found.items():
             results[name][index] = value[winners]
@@ -115,7 +115,7 @@ def warm_start(
     for name in SHARED:
         results[name][:] = results[name][seed].clone()
     ready = 1
-    for steps in rounds(seed, frames, max(1, round(KEY * rate))):
+    for steps in propagation_order(seed, frames, max(1, round(KEY * rate))):
         here, near = torch.tensor([step for step in steps if not done[step[0]]], dtype=torch.long).reshape(-1, 2).T
         if len(here) and own:
             starts = {name: torch.cat([value[here], value[near]]) for name, value in results.items()}
@@ -126,7 +126,7 @@ def warm_start(
     return results
 
 
-def rounds(seed: int, frames: int, stride: int) -> Iterator[list[tuple[int, int]]]:
+def propagation_order(seed: int, frames: int, stride: int) -> Iterator[list[tuple[int, int]]]:
     """Frames to be fitted side by side, each with the frame whose result it begins from: every `stride`-th frame, one
     after the other away from the seed, and then all the rest at once."""
     for direction in (1, -1):
@@ -142,7 +142,7 @@ def rounds(seed: int, frames: int, stride: int) -> Iterator[list[tuple[int, int]
         yield rest
 
 
-def seen(problem: Problem) -> Tensor:
+def observed_weight(problem: Problem) -> Tensor:
     """(T,): how much of the body was observed in each frame."""
     total = torch.zeros(problem.num_bodies, dtype=torch.float64)
     for confidence in (problem.confidence, problem.confidence_3d):
@@ -151,7 +151,7 @@ def seen(problem: Problem) -> Tensor:
     return total
 
 
-class Together:
+class SequenceObjective:
     """The objective of a stage over a whole recording. A point is every frame's own numbers, then the shared ones.
 
     Frames that are not finite where the stage begins are left out: they follow their neighbours.
@@ -190,11 +190,11 @@ class Together:
         own = point[: self.frames * self.size].reshape(self.frames, self.size)
         return np.concatenate([own, np.tile(point[self.frames * self.size :], (self.frames, 1))], axis=1)
 
-    def looks(self, rows: np.ndarray) -> list[Look]:
+    def looks(self, rows: np.ndarray) -> list[Evaluation]:
         """Each frame by itself."""
         return [look for chunk, part in self.parts for look in part.models(rows[chunk.start : chunk.stop])]
 
-    def look(self, point: np.ndarray) -> Look:
+    def look(self, point: np.ndarray) -> Evaluation:
         """All frames, with the smoothness between them."""
         rows, own = self.rows(point), slice(None, self.size)
         looks = [look for look, sound in zip(self.looks(rows), self.sound, strict=True) if sound]
@@ -209,7 +209,7 @@ class Together:
         blocks[0] += hessian[:, own, own]
         arrow = Arrow(blocks, hessian[:, own, self.size :], hessian[:, self.size :, self.size :].sum(axis=0))
         whole = np.concatenate([gradient[:, own].ravel(), gradient[:, self.size :].sum(axis=0)])
-        return Look(value, whole, arrow)
+        return Evaluation(value, whole, arrow)
 
     def _add_smoothness(self, rows: np.ndarray, gradient: np.ndarray, hessian: np.ndarray, blocks: np.ndarray) -> float:
         """Its value; its gradient 2 J Q x, and 2 J Q Jᵀ: own numbers into `blocks`, the rest into `hessian`."""

@@ -11,7 +11,7 @@ REACH = 0.10  # m: a body whose lowest point is higher than this above the groun
 LEAN = 0.15  # m: a body whose centre of mass is further than this outside its base of support is falling
 
 
-def static(
+def static_mask(
     vertices: Tensor,
     template: BodyTemplate,
     ground: ipt.Ground,

@@ -18,11 +18,11 @@ from ..jsonable import jsonable
 from ..progress import Progress, silent
 from ..status import Status, status_names
 from ..study import Study, study
-from ..study.study import evenly, marked
+from ..study.study import evenly_spaced_frames, flagged_name
 from ..view.filmstrip import draw_filmstrip
 from ..view.report import safe_names
 from . import FALLEN, VERDICT, Simulation, TipTest, simulate, tip_test
-from .inputs import Bodies
+from .inputs import GroundedBodies
 
 FRAMES = 6  # of a filmstrip
 
@@ -30,7 +30,7 @@ _UNKNOWN = Status.NON_FINITE | Status.NO_VOLUME | Status.NO_CONTACT | Status.NOT
 
 
 @dataclass(frozen=True)
-class Film:
+class FallFrames:
     """A fall in pictures: the frame of the file, poses (T, V, 3) and the seconds of each."""
 
     frame: int
@@ -49,7 +49,7 @@ class Fall:
     tip: TipTest
     run: Simulation | None
     notes: Sequence[str]
-    films: Sequence[Film]
+    films: Sequence[FallFrames]
     names: tuple[str, ...] | None = None
     flags: tuple[str, ...] = ()
 
@@ -98,7 +98,7 @@ class Fall:
         columns, stands, status = self._columns(), self.stands(), self.status()
         for frame in range(self.count):
             own = f" {frame}" if self.names is None else f" {self.names[frame]}"
-            name = marked(self.path.name + ("" if self.count == 1 else own), self.flags)
+            name = flagged_name(self.path.name + ("" if self.count == 1 else own), self.flags)
             unknown = status_names(status[frame] & _UNKNOWN)
             verdict = None if stands is None else ("yes" if stands[frame] else "no")
             yield name, [_number(value) for value in columns[:, frame]], ", ".join(unknown).lower() or verdict
@@ -115,11 +115,11 @@ class Fall:
         return self._title(), cells, share
 
     def _title(self) -> str:
-        return marked(f"{self.path.name} ({self.count} frames)", self.flags)
+        return flagged_name(f"{self.path.name} ({self.count} frames)", self.flags)
 
     def record(self) -> dict[str, Any]:
         """Plain numbers for JSON; of more than 10,000 frames evenly spaced ones."""
-        frames = evenly(self.count)
+        frames = evenly_spaced_frames(self.count)
         stands, status = self.stands(), self.status()
         known = (status & _UNKNOWN) == 0
         tip = {field.name: getattr(self.tip, field.name) for field in fields(TipTest) if field.name != "status"}
@@ -164,8 +164,8 @@ def _number(value: float) -> str:
     return f"{value:.2f}" if abs(value) < 10 else f"{value:.1f}" if abs(value) < 1000 else f"{value:.0f}"
 
 
-def fall(
-    bodies: Bodies,
+def run_falls(
+    bodies: GroundedBodies,
     films: int,
     engine: str,
     shape: str,
@@ -230,14 +230,16 @@ def _to_draw(result: Fall, most: int) -> list[int]:
     return sorted(set(known[np.linspace(0, len(known) - 1, most).round().astype(int)].tolist()))
 
 
-def _film(result: Fall, body: np.ndarray, frame: int, template: Any, ground: Any, options: dict[str, Any]) -> Film:
+def _film(
+    result: Fall, body: np.ndarray, frame: int, template: Any, ground: Any, options: dict[str, Any]
+) -> FallFrames:
     """The fall once more, looked at in even steps."""
     assert result.run is not None
     seconds = np.linspace(0.0, result.run.times[-1], FRAMES)
     run = simulate(body, template, ground, tuple(seconds), **options)
     labels = [f"{time:.2f} s" for time in run.times]
     name = result.path.stem if result.count == 1 else f"{result.path.stem} {frame}"
-    return Film(frame, study(name, run.posed(body), template, ground, labels=labels), tuple(run.times.tolist()))
+    return FallFrames(frame, study(name, run.posed(body), template, ground, labels=labels), tuple(run.times.tolist()))
 
 
 def write_falls(falls: Sequence[Fall], output: Path, record: str, progress: Progress = silent) -> None:

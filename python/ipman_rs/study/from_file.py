@@ -55,18 +55,18 @@ def analyze_file(path: Path, request: Request = _DEFAULT, progress: Progress = s
     Raises:
         FileError: the file cannot be read, or what it holds cannot be a person (`Request.force` lets it in).
     """
-    with odd_sizes() as found:
+    with collect_unit_warnings() as found:
         try:
             analysed = _analyzed(path, request, progress)
         except (ValueError, TypeError) as error:
             raise FileError(path, str(error)) from error
         except MemoryError as error:
             raise FileError(path, "needs more memory than there is; analyse fewer frames at once") from error
-    return replace(analysed, flags=with_sizes(analysed.flags, found))
+    return replace(analysed, flags=add_unit_warning(analysed.flags, found))
 
 
 @contextmanager
-def odd_sizes() -> Iterator[list[str]]:
+def collect_unit_warnings() -> Iterator[list[str]]:
     """What was said of bodies too large or too small for metres, instead of warnings."""
     said: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
@@ -76,7 +76,7 @@ def odd_sizes() -> Iterator[list[str]]:
     said += [str(warning.message) for warning in caught]
 
 
-def with_sizes(flags: Sequence[str], sizes: Sequence[str]) -> tuple[str, ...]:
+def add_unit_warning(flags: Sequence[str], sizes: Sequence[str]) -> tuple[str, ...]:
     """The flags, with the first of the odd sizes where nothing is said of sizes yet."""
     said = any(flag.startswith("vertices:") for flag in flags)
     return (*flags, *([] if said else sizes[:1]))

@@ -26,7 +26,7 @@ Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True, eq=False)
-class Figures:
+class PoseMetrics:
     """Errors: pelvis on pelvis. bose: the paper's, its centre of mass within the base of support at 10 cm, the hips
     where the true ones are. strict: the strict BoSE (`evaluation.bose`), but of the exact centre of mass. lowest: of
     the vertices above the floor. tilt: radians between true and estimated "up", seen from the pelvis."""
@@ -43,13 +43,13 @@ class Figures:
         np.savez_compressed(file, **vars(self))
 
     @classmethod
-    def load(cls, path: Path) -> Figures:
+    def load(cls, path: Path) -> PoseMetrics:
         with np.load(path, allow_pickle=False) as stored:
             return cls(**{field.name: stored[field.name] for field in dataclasses.fields(cls)})
 
 
 @torch.no_grad()
-def figures(estimate: Estimate, truth: Batch, posing: Posing) -> Figures:
+def pose_metrics(estimate: Estimate, truth: Batch, posing: Posing) -> PoseMetrics:
     """Of estimates for inputs that were not augmented, whose labels are true."""
     estimate, truth = _on_cpu(estimate), truth.to("cpu")
     posing = posing.to("cpu")
@@ -61,7 +61,7 @@ def figures(estimate: Estimate, truth: Batch, posing: Posing) -> Figures:
     strict = bose(vertices, template, ground, bose_mode="strict", method="exact")
     errors = body_errors(vertices, joints, true_vertices, true_joints)
     body, world = truth.has_body.numpy(), truth.has_world.numpy()
-    return Figures(
+    return PoseMetrics(
         mpjpe=np.where(body, errors.mpjpe.numpy(), np.nan),
         pa_mpjpe=np.where(body, errors.pa_mpjpe.numpy(), np.nan),
         pve=np.where(body, errors.pve.numpy(), np.nan),
@@ -98,7 +98,7 @@ COLUMNS = {
 }  # fmt: skip
 
 
-def columns(figures: Figures) -> dict[str, Array]:
+def columns(figures: PoseMetrics) -> dict[str, Array]:
     """The figures as tables show them, an entry a body: millimetres, degrees, and shares as 0 or 100 %."""
     return {
         "MPJPE": 1e3 * figures.mpjpe,

@@ -18,25 +18,25 @@ from torch import Tensor
 from ipman_rs.body import rotations
 
 from .batch import Batch
-from .world import seen_from
+from .world import world_to_camera
 
 Array = NDArray[np.floating]
-Lean = Literal["camera", "any"]
+TiltAxis = Literal["camera", "any"]
 
 SPREAD = 5 / 8  # of the mean angle
 
 
-def leaning(batch: Batch, degrees: float, seed: int, lean: Lean = "camera") -> Batch:
+def tilt_labels(batch: Batch, degrees: float, seed: int, lean: TiltAxis = "camera") -> Batch:
     """The batch with leaning labels. Image k of all leans have the same numbers drawn; 0 degrees change nothing."""
     if degrees == 0:
         return batch
-    seen = seen_from(batch).double()
+    seen = world_to_camera(batch).double()
     up = batch.up.double()
     turn = seen @ torch.from_numpy(_turns(seen.numpy(), up.numpy(), degrees, lean, seed)) @ seen.transpose(1, 2)
     return dataclasses.replace(batch, pose=_turned_root(batch.pose, turn), joints=_turned(batch.joints, turn))
 
 
-def _turns(seen: Array, up: Array, degrees: float, lean: Lean, seed: int) -> Array:
+def _turns(seen: Array, up: Array, degrees: float, lean: TiltAxis, seed: int) -> Array:
     """(n, 3, 3) turns about level axes of the world, for cameras (n, 3, 3)."""
     draw = np.random.default_rng(seed)
     heading = draw.uniform(0, 2 * np.pi, len(seen))

@@ -28,7 +28,7 @@ def to_world(points: Tensor, hips: Tensor, batch: Batch) -> Tensor:
     return turned + (side * batch.hips)[:, None]
 
 
-def seen_from(batch: Batch) -> Tensor:
+def world_to_camera(batch: Batch) -> Tensor:
     """World to camera (B, 3, 3) of the augmented images: of the mirrored world where they are flipped."""
     count = len(batch)
     origin = batch.camera.new_zeros(count, 3)

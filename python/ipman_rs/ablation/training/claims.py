@@ -51,7 +51,7 @@ CLAIMS = (
 )
 
 
-def judged(blocks: Sequence[dict[str, Any]]) -> list[tuple[Claim, list[tuple[Verdict, Sequence[float]]]]]:
+def judge_claims(blocks: Sequence[dict[str, Any]]) -> list[tuple[Claim, list[tuple[Verdict, Sequence[float]]]]]:
     """Every claim with its verdict and the interval, of each block of the record (each tilt)."""
     return [(claim, [_judged(claim, block) for block in blocks]) for claim in CLAIMS]
 

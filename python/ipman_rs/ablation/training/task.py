@@ -1,4 +1,4 @@
-"""What a regressor of the ablation sees: from keypoints (`keypoints.py`), or from rendered images (`pictures.py`)."""
+"""The tasks of the ablation: regression from keypoints (`from_keypoints.py`) or rendered images (`from_images.py`)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import torch
 from ...training.batch import Batch
 from ...training.model import HMR
 from ...training.posed_estimate import Posing
-from ...training.train_loop import Drill
+from ...training.train_loop import TrainingPlan
 
 Progress = Callable[[int, int], None]  # how many of how many are made
 
@@ -24,9 +24,9 @@ class Plan:
     """first: learning to see keypoints, once for each seed; None for none. base: training without physics, once for
     each seed and tilt. fine: what each row goes on with."""
 
-    base: Drill
-    fine: Drill
-    first: Drill | None = None
+    base: TrainingPlan
+    fine: TrainingPlan
+    first: TrainingPlan | None = None
 
 
 class Task(Protocol):
@@ -49,12 +49,12 @@ class Task(Protocol):
         """Draw or read the data, and keep them in files."""
         ...
 
-    def see(self, seed: int, plan: Drill, file: BinaryIO) -> None:
+    def fit_backbone(self, seed: int, plan: TrainingPlan, file: BinaryIO) -> None:
         """Learn to see keypoints; what `training` and `truth` need of it goes into a file."""
         ...
 
     def training(self, seen: Path | None) -> Batch:
-        """What is trained on: keypoints, with true labels. seen: the file of `see`, where the plan has that stage."""
+        """The training set: keypoints, true labels. seen: the file of `fit_backbone`, if the plan has that stage."""
         ...
 
     def truth(self, seen: Path | None) -> Batch:
@@ -65,7 +65,7 @@ class Task(Protocol):
         """Rows of `training` with inputs as the regressor takes them, with noise that is new at each step."""
         ...
 
-    def lifter(self, seed: int) -> HMR:
+    def lifting_network(self, seed: int) -> HMR:
         """The regressor from keypoints with the weights that a seed draws."""
         ...
 

@@ -23,14 +23,14 @@ from ...study import Fitted, Study, camera_of, study
 from .items import Item
 
 if TYPE_CHECKING:
-    from ..result import Result
+    from ..result import FitResult
 
 RECORD = "fit.json"
 _BEFORE = "before_"
 
 
 def write_item(
-    item: Item, result: Result, body: BodyModel, folder: Path, told: dict[str, Any], obj: bool
+    item: Item, result: FitResult, body: BodyModel, folder: Path, told: dict[str, Any], obj: bool
 ) -> dict[str, Any]:
     """Write one fitted body; the record that a later run reads back. Raises OSError."""
     arrays = result.arrays()

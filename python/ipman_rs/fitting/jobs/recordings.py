@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...data.markers import Point
     from ...study import Study
     from ..fit import Fit
-    from ..marker_fit import Person, Recorded
+    from ..marker_fit import MarkerFit, Person
     from .items import Item
     from .run import Settings
 
@@ -154,7 +154,7 @@ def _fit_markers(
         found = marker_fit.fit_tracks(
             body, tracks, chosen, **told, progress=lambda _stage, done: step.to(min(done, count))
         )
-    findings, distances = marker_fit.judged_fit(found), found.skin_distances
+    findings, distances = marker_fit.check_fit(found), found.skin_distances
     flags = (*flags, *judge.admit(path, [*findings, *of_skin(distances)], settings.force))
     errors = found.errors
     each = {name: _mean(column) for name, column in zip(found.tracks.names, errors.T, strict=True)}
@@ -179,7 +179,7 @@ def _own_notes(own: Mapping[str, object] | None, names: Sequence[str], settings:
     return [f"no marker is called {', '.join(none[:8])}{more}, as {settings.markers} has it (--markers)"]
 
 
-def _marker_notes(found: Recorded, settings: Settings) -> list[str]:
+def _marker_notes(found: MarkerFit, settings: Settings) -> list[str]:
     """What was done with the markers that is not odd."""
     notes = []
     if settings.up is not None:
@@ -227,7 +227,7 @@ def _fit_frames(recording: Recording, settings: Settings, pace: Pace, progress: 
     problem = problem_of(body, seen, settings, imitated)
     rate = pace.fps / pace.every
     with progress(f"fitting {recording.name}", len(kept)) as step:
-        problem, variables = start.begin(problem, settings.config.start)
+        problem, variables = start.initial_state(problem, settings.config.start)
         told = {"rate": rate, "progress": lambda _stage, done: step.to(min(done, len(kept)))}
         found = fit_sequence(problem, variables, settings.config, **told)
     assert problem.points is not None

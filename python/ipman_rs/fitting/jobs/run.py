@@ -16,13 +16,13 @@ from ...body import BodyModel
 from ...data.keypoints.detections import Detections, join
 from ...files.errors import FileError
 from ...progress import Progress, silent
-from .. import detected, presented, start
+from .. import detection_problem, presented, start
 from ..camera_file import KnownCamera
-from ..config import Config, weighs
+from ..config import Config, uses_terms
 from ..fit import fit
 from ..presented import PresentedBody
 from ..problem import Problem
-from ..result import Result, results
+from ..result import FitResult, fit_results
 from .items import Item, identity, look
 from .outputs import complete, write_item
 
@@ -95,11 +95,11 @@ def run(
 
 def _check(settings: Settings) -> None:
     config = settings.config
-    if settings.pose is None and weighs(config, "presented_pose", "presented_contact"):
+    if settings.pose is None and uses_terms(config, "presented_pose", "presented_contact"):
         raise ValueError(f"preset {config.name} imitates a pose: give its name or file with --pose")
     if settings.pose is None and (settings.contact or settings.pose_frame is not None or settings.pose_up):
         raise ValueError("--contact, --pose-frame and --pose-up say more of a --pose: give that, too")
-    if settings.height is None and settings.mass is None and weighs(config, "measured_shape"):
+    if settings.height is None and settings.mass is None and uses_terms(config, "measured_shape"):
         raise ValueError(f"preset {config.name} knows the person's size: give --height or --mass, or both")
 
 
@@ -124,17 +124,17 @@ def _batches(items: Iterable[Item], progress: Progress) -> Iterator[list[Item]]:
 
 def _fitted(
     batch: list[Item], settings: Settings, body: ipt.BodyModel, imitated: PresentedBody | None, progress: Progress
-) -> Iterator[tuple[Item, Result]]:
+) -> Iterator[tuple[Item, FitResult]]:
     kept = [item for item in batch if not _refused(item, body, settings.camera)]
     if not kept:
         return
     problem = problem_of(body, join([item.seen for item in kept if item.seen is not None]), settings, imitated)
     config = settings.config
     with progress(f"fitting {len(kept)}", len(kept) * len(config.stages)) as step:
-        problem, variables = start.begin(problem, config.start)
+        problem, variables = start.initial_state(problem, config.start)
         done = {stage.name: number * len(kept) for number, stage in enumerate(config.stages)}
         found = fit(problem, variables, config, lambda stage, ended: step.to(done[stage] + ended), trace=True)
-    for item, result in zip(kept, results(found, config, variables), strict=True):
+    for item, result in zip(kept, fit_results(found, config, variables), strict=True):
         if not result.finite:
             item.failure = "the fit found no finite body; check focal length, image size and points"
             continue
@@ -148,7 +148,7 @@ def problem_of(
     """What is known of each person that was seen, who imitates a pose, or none."""
     where = {"focal": settings.focal, "pitch": settings.pitch, "ground": settings.ground}
     where |= {} if settings.camera is None else {"camera": settings.camera}
-    problem = detected.problem(body, seen, **where, height=settings.height, mass=settings.mass)
+    problem = detection_problem.problem_from_detections(body, seen, **where, height=settings.height, mass=settings.mass)
     if imitated is None:
         return problem
     return presented.present(problem, [imitated], settings.config.moves_camera)
@@ -157,12 +157,12 @@ def problem_of(
 def _refused(item: Item, body: ipt.BodyModel, camera: KnownCamera | None) -> bool:
     """Whether too little is seen of an item; else its oddities become flags."""
     assert item.seen is not None
-    names = detected.shared_names(body, item.seen)
+    names = detection_problem.shared_names(body, item.seen)
     seen = item.seen.select(names)
-    item.failure = detected.too_little(names, seen.confidence[0])
+    item.failure = detection_problem.missing_keypoints(names, seen.confidence[0])
     if item.failure is not None:
         return True
     assert seen.image_size is not None
-    item.flags += detected.oddities(names, seen.points[0], seen.confidence[0], seen.image_size[0])
-    item.flags += [] if camera is None else detected.unlike(camera, seen.image_size[0])
+    item.flags += detection_problem.suspicious_keypoints(names, seen.points[0], seen.confidence[0], seen.image_size[0])
+    item.flags += [] if camera is None else detection_problem.camera_mismatch(camera, seen.image_size[0])
     return False

@@ -9,8 +9,8 @@ from __future__ import annotations
 from .drive import minimise
 from .lbfgs import lbfgs
 from .levenberg import levenberg
-from .outcome import Look, Options, Outcome
+from .outcome import Evaluation, Options, Outcome
 
 SOLVERS = {"lbfgs": lbfgs, "levenberg": levenberg}
 
-__all__ = ["SOLVERS", "Look", "Options", "Outcome", "minimise"]
+__all__ = ["SOLVERS", "Evaluation", "Options", "Outcome", "minimise"]

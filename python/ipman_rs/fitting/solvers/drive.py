@@ -6,11 +6,11 @@ from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
-from .outcome import Look, Options, Outcome, Vector
+from .outcome import Evaluation, Options, Outcome, Vector
 
-Solver = Generator[Vector, Look, Outcome]
+Solver = Generator[Vector, Evaluation, Outcome]
 # The bodies' indices and their points (n, P) -> what each looks like.
-Evaluate = Callable[[Sequence[int], Vector], Sequence[Look]]
+Evaluate = Callable[[Sequence[int], Vector], Sequence[Evaluation]]
 
 
 def minimise(

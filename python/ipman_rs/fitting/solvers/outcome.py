@@ -23,7 +23,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Look:
+class Evaluation:
     """The objective at a point: value, gradient (P,), and a model of the Hessian for solvers that ask: (P, P), or what
     their `solve` understands."""
 
