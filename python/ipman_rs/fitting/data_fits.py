@@ -1,10 +1,10 @@
-"""Fits of a data set's people, a frame each, in pieces that are done once and kept: predictions for `ipman evaluate`.
+"""Fits of a data set's people, frame by frame, saved piece by piece: predictions for `ipman evaluate`.
 
 Keypoints are the data set's, or those of files, or MediaPipe's in its images; cameras and ground are the data set's. A
 preset that imitates a pose is presented the frame's recorded pose (as in the paper), or one pose for all.
 
-A piece holds the fits of some frames (`evaluation.tables.resumable`): a run that was killed goes on where it was, to
-the same bits.
+A piece holds the fits of some frames (`evaluation.tables.resumable`): a killed run continues from the last saved
+piece, and its results are the same bits.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ Progress = Callable[[int], None]
 
 @dataclass(frozen=True)
 class PaperFit:
-    """What the paper fits of a data set, and the table of `ipman evaluate` that holds it."""
+    """The paper's fit of a data set: preset, split, and the table of `ipman evaluate` that reports it."""
 
     preset: str
     split: str
@@ -68,7 +68,7 @@ PAPER = {
 
 
 def source_of(name: str, path: str, split: str | None, options: Mapping[str, str | float]) -> Source:
-    """A data set; what is not said is as in the paper, if it fits that data set."""
+    """A data set; settings that are not given are the paper's, if the paper fits that data set."""
     paper = PAPER.get(name)
     if paper is None:
         return Source(name, path, split, tuple(options.items()))
@@ -77,7 +77,7 @@ def source_of(name: str, path: str, split: str | None, options: Mapping[str, str
 
 @dataclass(frozen=True)
 class DetectedFrame:
-    """A frame with what a detector saw of its person, and its world."""
+    """A frame with the keypoints detected in it and the gender of its body model."""
 
     frame: Frames
     detections: Detections

@@ -1,4 +1,4 @@
-"""Frames of a data set as a fit knows them, and the way back: fits live in worlds with y up, data sets in their own.
+"""Frames of a data set in the fit's axes, and fits back in the data set's: a fit's world has y up.
 
 A data set's world is turned so that its ground's normal is y. Where the body stays in the presented frame (IPMAN-O)
 it is moved, too, so that the presented body has its root joint where the fit's parameters have it: R^b = I, t^b = 0.
@@ -38,7 +38,7 @@ OTHERWISE = ("neck", "head", "head_top", "pelvis", "thorax", "spine", "jaw")
 
 @dataclass(frozen=True)
 class FitToWorld:
-    """The way from the fit's world to the data set's: X = Rᵀ (x + shift), R the turn (3, 3)."""
+    """Transformation from the fit's world to the data set's: X = Rᵀ (x + shift), R the rotation `turn` (3, 3)."""
 
     turn: Array
     shift: Array  # (3,) m

@@ -1,4 +1,4 @@
-"""From what a detector saw to a problem: cameras from focal length and pitch, and what is odd about each person."""
+"""The fitting problem of detected keypoints: cameras from focal length and pitch, and warnings about each person."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ POSSIBLE = {"focal": ("pixels", 0.0, math.inf), "height": ("metres", 0.4, 2.8), 
 
 
 def check_measurement(name: str, value: float) -> float:
-    """A focal length, height or mass. ValueError, with its unit, for what none can be."""
+    """A plausible focal length, height or mass. ValueError, with its unit, for an impossible one."""
     unit, least, largest = POSSIBLE[name]
     if not least < value < largest:
         within = "above 0" if largest == math.inf else f"between {least:g} and {largest:g}"
@@ -136,7 +136,7 @@ def missing_keypoints(names: Sequence[str], confidence: np.ndarray) -> str | Non
 def suspicious_keypoints(
     names: Sequence[str], points: np.ndarray, confidence: np.ndarray, size: np.ndarray
 ) -> list[str]:
-    """What a user should know of one person's points (K, 2): they may be wrong, or say little."""
+    """Warnings about one person's points (K, 2) that may be wrong, or that constrain the body poorly."""
     where = {name: points[k] for k, name in enumerate(names) if confidence[k] > SEEN}
     flags = []
     hips, shoulders = _pair(where, "hip"), _pair(where, "shoulder")
@@ -184,7 +184,7 @@ def _mirrored(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, 
 
 
 def camera_mismatch(camera: KnownCamera, size: np.ndarray) -> list[str]:
-    """What says that a known camera is of images of another size than (2,), width and height."""
+    """Warnings if a known camera seems to belong to images of another size than `size` (2,), width and height."""
     if camera.center is None:
         return []
     center = np.array(camera.center)

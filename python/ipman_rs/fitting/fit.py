@@ -26,7 +26,7 @@ CHUNK = 64  # bodies side by side: beyond, nothing gets faster and the Jacobian 
 
 @dataclass(frozen=True)
 class StageReport:
-    """How a stage went, an entry a body: reason (`solvers.Outcome`), iterations, and the terms' weighted costs.
+    """How a stage went, one entry per body: reason (`solvers.Outcome`), iterations, and the terms' weighted costs.
 
     `variables` are those that it ended with. `trace` has the costs of each body's successive best points, start and end
     included, if they were asked for.
@@ -42,7 +42,7 @@ class StageReport:
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted bodies: their variables (rows a body) and how each stage went."""
+    """Fitted bodies: their variables (one row per body) and how each stage went."""
 
     problem: Problem
     variables: Variables
@@ -90,7 +90,7 @@ def with_ground_under_body(problem: Problem, variables: Variables) -> Problem:
 
 
 def with_static_mask(problem: Problem, variables: Variables) -> Problem:
-    """The problem with the judgement which bodies are static now; the same where no ground is known."""
+    """Copy of the problem with `static` recomputed from the current bodies; unchanged if the ground is unknown."""
     if problem.ground is None:
         return problem
     with torch.no_grad():

@@ -34,13 +34,13 @@ from .problem import Problem
 from .sequence import fit_sequence
 from .start import start_at_points
 
-WEIGHED = 8  # bodies
-POSES = 24  # of the recording, spread over it, that say where the markers are
+WEIGHED = 8  # bodies whose mass is checked, about
+POSES = 24  # frames, evenly spaced over the recording, from which the markers' places are calibrated
 
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """What stays of somebody from one recording to the next: the shape (1, b), and where the markers are."""
+    """What recordings of one person share: the shape (1, b), and the places of the markers."""
 
     betas: Tensor
     sites: Mapping[str, markers.Point]
@@ -48,9 +48,9 @@ class Person:
 
 @dataclass(frozen=True, eq=False)
 class MarkerFit:
-    """The fit of T frames. `tracks` are their known markers (M), at these `sites` of the body; `unknown` are those that
-    nobody knows the place of, `unseen` those that are in the file and were never seen. `meanings`: of the tracks'
-    names."""
+    """The fit of T frames. `tracks` are the M markers with known places, the `sites` on the body; `unknown` are the
+    names of markers without a known place, `unseen` those of markers in the file that were never observed.
+    `meanings`: of the tracks' names."""
 
     fit: Fit
     tracks: markers.Tracks
@@ -137,7 +137,7 @@ def fit_tracks(
 
 
 def check_fit(recorded: MarkerFit) -> list[Finding]:
-    """What it says of the fit: the markers' mean distance from their places, and the person's mass."""
+    """Findings about the fit: the markers' mean distance from their places, and the person's mass."""
     with torch.no_grad():
         vertices = recorded.fit.candidate.vertices[:: max(1, len(recorded.tracks) // WEIGHED)]
         mass = np.asarray(ipt.mass_properties(vertices, recorded.fit.problem.body.template).mass)

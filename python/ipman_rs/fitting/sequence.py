@@ -6,7 +6,7 @@
 2. Every stage together. One Levenberg-Marquardt for the whole recording: own pose and place of every frame, one shape,
    and the smoothness, which ties each frame to the next two. Its Hessian is a band with a border (`solvers.arrow`), so
    an iteration is as long as the recording, and nothing is alternated. Presets of another solver are solved like this,
-   too. Some 0.4 MB a frame.
+   too. It takes about 0.4 MB per frame.
 
 The ground, where it is not known and a stage asks for it, lies level at the median over the frames of the lowest
 vertex: a person who jumps now and then does not move it.
@@ -91,7 +91,7 @@ def warm_start(
     done: Tensor | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Tensor]:
-    """Every frame fitted by itself, beginning near a neighbour; what is shared is the same in all of them."""
+    """Fit every frame separately, starting from a neighbour's result; shared variables are equal in all frames."""
     frames = problem.num_bodies
     done = torch.zeros(frames, dtype=torch.bool) if done is None else done
     results = {name: value.clone() for name, value in variables.items()}
@@ -100,7 +100,7 @@ def warm_start(
     own = tuple(name for name in stage.free if name not in SHARED)
 
     def fit_frames(index: Tensor, starts: Variables, free: tuple[str, ...]) -> None:
-        """From one start a frame, or from two, one half of the rows after the other."""
+        """From one start per frame; or from two, the second ones in the second half of the rows."""
         both = index.repeat(len(starts["pose"]) // len(index))
         found, report = run_stage(problem.rows(both), starts, replace(stage, free=free), config.terms)
         costs = np.nan_to_num(sum(report.terms.values()), nan=np.inf).reshape(-1, len(index))
@@ -127,8 +127,9 @@ def warm_start(
 
 
 def propagation_order(seed: int, frames: int, stride: int) -> Iterator[list[tuple[int, int]]]:
-    """Frames to be fitted side by side, each with the frame whose result it begins from: every `stride`-th frame, one
-    after the other away from the seed, and then all the rest at once."""
+    """The order of the warm start: lists of frames that are fitted together, each with the frame it starts from.
+
+    First every `stride`-th frame, one after the other away from the seed, then all the others at once."""
     for direction in (1, -1):
         for frame in range(seed + direction * stride, frames if direction > 0 else -1, direction * stride):
             yield [(frame, frame - direction * stride)]
@@ -143,7 +144,7 @@ def propagation_order(seed: int, frames: int, stride: int) -> Iterator[list[tupl
 
 
 def observed_weight(problem: Problem) -> Tensor:
-    """(T,): how much of the body was observed in each frame."""
+    """The summed confidence (T,) of the points observed in each frame."""
     total = torch.zeros(problem.num_bodies, dtype=torch.float64)
     for confidence in (problem.confidence, problem.confidence_3d):
         if confidence is not None:

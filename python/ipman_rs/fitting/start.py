@@ -50,8 +50,8 @@ TRIED = 8  # placed poses that are fitted for a few iterations
 
 
 def initial_state(problem: Problem, start: Mapping[str, Any]) -> tuple[Problem, dict[str, Tensor]]:
-    """Where a fit by a preset with this `start` begins: the problem, its ground known where the camera moves around the
-    body, and the variables. ValueError for an unknown option."""
+    """Problem and variables with which a fit begins, by a preset's `start`. If the camera moves around the body, the
+    returned problem has a ground. ValueError for an unknown option."""
     how, given = search_of(start), search_options(start)
     if how == "points":
         return problem, start_at_points(problem)

@@ -1,4 +1,4 @@
-"""Which bodies stand still enough for balance and ground to mean anything: a jumping or tipping one is left alone."""
+"""Bodies in static contact, to which the balance and ground terms apply; jumping or tipping ones are exempt."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def _draw_row(
 
 
 def caption(about: dict[str, Any]) -> str:
-    """One line of the figures of a body, in mm."""
+    """One line of a body's measured quantities, in mm."""
     parts = [f"CoM–CoP {1e3 * about['com_cop_m']:.0f} mm"]
     if about["margin_m"] is None:
         parts += ["no contact"]

@@ -1,6 +1,6 @@
-"""What a figure leaves in a folder: NAME.png and NAME.svg, its numbers in NAME.json, and what they are made of.
+"""The files of a figure: NAME.png and NAME.svg, its numbers in NAME.json, and the data behind them.
 
-The same figure is written to the same bytes, and a file appears under its name when it is whole.
+The same figure is written to the same bytes, and a file gets its name when it is complete.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Posed bodies of a data set on their ground, a piece of the frames at a time."""
+"""Posed bodies of a data set on their ground, read piece by piece."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The t-SNE of body poses of one or several data sets: near each other are poses that are alike.
+"""The t-SNE of body poses of one or several data sets: similar poses lie near each other.
 
 A pose is the rotation matrices of the 21 joints of the body that the SMPL family shares; where a body faces, its shape,
 hands and face do not count. Needs scikit-learn (the extra figures).

@@ -1,4 +1,4 @@
-"""Stiff bodies: how firmly they stand (`tip_test`), and what becomes of them when they are let go (`simulate`).
+"""Rigid bodies: how firmly they stand (`tip_test`), and whether they fall when they are dropped (`simulate`).
 
 `compare` says which of two methods has the more stable bodies.
 """

@@ -1,4 +1,4 @@
-"""The bodies that `ipman simulate` lets go: a file as `ipman analyze` reads it, predictions, or a folder of fits.
+"""The bodies that `ipman simulate` drops: a file as `ipman analyze` reads it, predictions, or a folder of fits.
 
 Predictions and fits bring a ground of their own; `--up` or `--ground` take its place.
 """
@@ -29,7 +29,7 @@ PREDICTIONS = "predictions.npz"  # what `ipman predict --data` and `ipman fit --
 @dataclass(frozen=True)
 class GroundedBodies:
     """T bodies of a file on a ground, which is one for all or one for each. names: (T,) where they have any; flags:
-    what is odd about them."""
+    warnings about them."""
 
     path: Path
     recording: Recording
@@ -45,7 +45,7 @@ class GroundedBodies:
 
 
 def read_bodies(path: Path, request: Request, progress: Progress = silent) -> GroundedBodies:
-    """The bodies of a file or folder; what is odd about them stands in `flags`. Raises FileError."""
+    """The bodies of a file or folder; warnings about them are in `flags`. Raises FileError."""
     try:
         with collect_unit_warnings() as sizes:
             if path.is_dir() and not (path / PREDICTIONS).is_file():
@@ -83,7 +83,7 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def _with_model(path: Path, request: Request, arrays: dict[str, np.ndarray]) -> Request:
-    """With the body that the file names. One whose files are not included must be named by the user."""
+    """The request with the body model that the file names. Of one that is not included the user must name the file."""
     named = next((str(arrays[key]) for key in ("body", "model") if key in arrays), None)
     if request.model is not None or named is None:
         return request

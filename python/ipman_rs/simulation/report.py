@@ -1,4 +1,4 @@
-"""The bodies of one file, tested and let go: the table, the records and the filmstrips of `ipman simulate`."""
+"""Tip test and simulated falls of the bodies of one file: table, records and filmstrips of `ipman simulate`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _UNKNOWN = Status.NON_FINITE | Status.NO_VOLUME | Status.NO_CONTACT | Status.NOT
 
 @dataclass(frozen=True)
 class FallFrames:
-    """A fall in pictures: the frame of the file, poses (T, V, 3) and the seconds of each."""
+    """The frames of one fall's filmstrip: the frame of the file, poses (T, V, 3) and the seconds of each."""
 
     frame: int
     study: Study
@@ -40,9 +40,9 @@ class FallFrames:
 
 @dataclass(frozen=True)
 class Fall:
-    """The tip test of each of the T bodies of a file, what became of them (None where that was not asked for), films.
+    """The tip tests of the T bodies of a file, their simulation (None if not requested), and the filmstrips' frames.
 
-    names: of the bodies, where the file names them. flags: what is odd about them.
+    names: of the bodies, where the file names them. flags: warnings about them.
     """
 
     path: Path
@@ -104,7 +104,7 @@ class Fall:
             yield name, [_number(value) for value in columns[:, frame]], ", ".join(unknown).lower() or verdict
 
     def summary(self) -> tuple[str, list[str], str | None]:
-        """Medians of those that are known."""
+        """Medians of the finite values."""
         known = (self.status() & _UNKNOWN) == 0
         if not known.any():
             return self._title(), ["–"] * len(self.titles()), None
@@ -233,7 +233,7 @@ def _to_draw(result: Fall, most: int) -> list[int]:
 def _film(
     result: Fall, body: np.ndarray, frame: int, template: Any, ground: Any, options: dict[str, Any]
 ) -> FallFrames:
-    """The fall once more, looked at in even steps."""
+    """The fall simulated once more, with outputs in even steps."""
     assert result.run is not None
     seconds = np.linspace(0.0, result.run.times[-1], FRAMES)
     run = simulate(body, template, ground, tuple(seconds), **options)

@@ -26,7 +26,7 @@ from ..io.recording import Recording
 from ..progress import Progress, silent
 from .study import Study, study
 
-SAMPLED_VERTICES = 800_000  # of the bodies that are judged: 65 of the embedded one, a fraction of a second
+SAMPLED_VERTICES = 800_000  # of the bodies that are checked: 65 of the embedded one, a fraction of a second
 WEIGHED = 16  # bodies
 LISTED = 12  # names of arrays
 
@@ -50,7 +50,7 @@ _DEFAULT = Request()
 
 
 def analyze_file(path: Path, request: Request = _DEFAULT, progress: Progress = silent) -> Study:
-    """The study of the bodies in one file; what is odd about them stands in its flags.
+    """The study of the bodies in one file; warnings about them are in its flags.
 
     Raises:
         FileError: the file cannot be read, or what it holds cannot be a person (`Request.force` lets it in).
@@ -67,7 +67,7 @@ def analyze_file(path: Path, request: Request = _DEFAULT, progress: Progress = s
 
 @contextmanager
 def collect_unit_warnings() -> Iterator[list[str]]:
-    """What was said of bodies too large or too small for metres, instead of warnings."""
+    """Collects the `UnitsWarning`s about bodies too large or too small for metres as text, instead of warning."""
     said: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("ignore")
@@ -77,7 +77,7 @@ def collect_unit_warnings() -> Iterator[list[str]]:
 
 
 def add_unit_warning(flags: Sequence[str], sizes: Sequence[str]) -> tuple[str, ...]:
-    """The flags, with the first of the odd sizes where nothing is said of sizes yet."""
+    """The flags, with the first unit warning unless a flag already concerns the vertices."""
     said = any(flag.startswith("vertices:") for flag in flags)
     return (*flags, *([] if said else sizes[:1]))
 
@@ -102,7 +102,7 @@ def on_ground(
     read_elsewhere: Collection[str] = (),
     progress: Progress = silent,
 ) -> tuple[Recording, Any, ip.Ground, list[str]]:
-    """The bodies of a file, judged, their template and ground, and what was assumed. Raises FileError.
+    """The bodies of a file, checked, their template and ground, and what was assumed. Raises FileError.
 
     own: the ground that the file itself gives. read_elsewhere: arrays of the file that the caller reads.
     """

@@ -236,7 +236,7 @@ def _outline(body: np.ndarray, template: Any, ground: Any, preset: str) -> np.nd
 
 
 def evenly_spaced_frames(num_frames: int) -> np.ndarray:
-    """All frames of a sequence that is not long, else evenly spaced ones, first and last included."""
+    """All frames of a short sequence, else evenly spaced ones, first and last included."""
     if num_frames <= MAX_LISTED_FRAMES:
         return np.arange(num_frames)
     return np.unique(np.linspace(0, num_frames - 1, MAX_LISTED_FRAMES).round().astype(np.int64))
@@ -267,5 +267,5 @@ def key_frames(num_frames: int, num_vertices: int) -> np.ndarray:
 
 
 def flagged_name(name: str, flags: Sequence[str]) -> str:
-    """A name in a table, with a sign where something is odd; what it is stands below."""
+    """A name in a table, marked with ! if there are flags, which are listed below the table."""
     return f"{name} !" if flags else name

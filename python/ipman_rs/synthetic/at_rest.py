@@ -1,8 +1,8 @@
 """People at rest on the floor y = 0, and the same people tipped over or in the air.
 
 A named pose (`ipman_rs.body.poses`) is perturbed joint by joint, and the stiff body is laid on the floor: of the facets
-of its convex hull over which its exact centre of mass lies, it rests on the one that needs the least tilt. Who would
-have to tilt too far, or does not stand by the samples within 1 cm of the floor, is drawn again.
+of its convex hull over which its exact centre of mass lies, it rests on the one that needs the least tilt. A
+body that would have to tilt too far, or is not supported by its samples within 1 cm of the floor, is drawn again.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ TIPPED, RAISED = (15.0, 30.0), (0.15, 0.40)  # degrees, m
 
 @dataclasses.dataclass(frozen=True)
 class PosedPerson:
-    """A posed person: body and template, full_pose (24, 3), transl (3,), and so vertices (V, 3) and joints (24, 3)."""
+    """A posed person: body model and template, full_pose (24, 3), transl (3,), and from these vertices (V, 3) and joints
+    (24, 3)."""
 
     person: BodyModel
     template: ip.BodyTemplate

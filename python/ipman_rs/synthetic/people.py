@@ -35,7 +35,7 @@ PASSES, POWERS = 8, (0.7, 1.5)
 
 
 def person(draw: Draw) -> BodyModel:
-    """A body without betas of its own."""
+    """A copy of the body model of fixed shape, without betas."""
     model = load_body("anny")
     betas = (BETAS * draw.standard_normal(model.num_betas)).clip(-LARGEST_BETA, LARGEST_BETA)
     vertices, joints = reshape(model, betas, draw)

@@ -1,8 +1,8 @@
 """Static people of the embedded body `anny-lite` on the floor y = 0.
 
 Named poses (`ipman_rs.body.poses`), mirrored or not, with every joint perturbed, are laid on the floor as in
-`fitting.benchmark.scenes`: they rest on a facet of their hull over which the exact centre of mass lies, and what
-touches within 1 cm supports it. Others are drawn again.
+`synthetic.at_rest`: they rest on a facet of their hull over which the exact centre of mass lies, supported by the
+samples within 1 cm of the floor. Others are drawn again.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ Draw = np.random.Generator
 
 BODY = "anny-lite"
 BETAS, LARGEST_BETA = 0.7, 1.5
-SPREADS = (12.0, 6.0, 4.0)  # as those of `fitting.benchmark.scenes`
+SPREADS = (12.0, 6.0, 4.0)  # degrees, as `at_rest.SPREADS`
 
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """n people: family (n,), pose (n, 24, 3), the root's turn in the world first, betas (n, 10), transl (n, 3) m."""
+    """n people: family (n,), pose (n, 24, 3) with the root in the world, betas (n, 10), transl (n, 3) m."""
 
     family: NDArray[np.str_]
     pose: Array
@@ -54,7 +54,7 @@ class Population:
 
 
 def draw_population(count: int, seed: int, progress: Callable[[int], None] | None = None) -> Population:
-    """`count` people, the families in turn; each depends on the seed and its number alone."""
+    """Draw `count` people, cycling through the families; each depends only on the seed and its index."""
     rows = []
     for index in range(count):
         family = list(FAMILIES)[index % len(FAMILIES)]

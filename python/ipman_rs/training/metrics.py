@@ -1,6 +1,6 @@
-"""The figures of estimated bodies in the world against true ones, an entry a body; metres where nothing is said.
+"""Metrics of estimated bodies in the world against true ones, one entry per body; in metres unless stated otherwise.
 
-NaN where there is no truth: errors and tilt need labelled parameters, what concerns the ground needs the world.
+NaN without ground truth: errors and tilt need labelled parameters, ground metrics need the world.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class PoseMetrics:
 
 @torch.no_grad()
 def pose_metrics(estimate: Estimate, truth: Batch, posing: Posing) -> PoseMetrics:
-    """Of estimates for inputs that were not augmented, whose labels are true."""
+    """Metrics of estimates for inputs that were not augmented and have true labels."""
     estimate, truth = _on_cpu(estimate), truth.to("cpu")
     posing = posing.to("cpu")
     known = Estimate(_columns(truth.pose), truth.betas, estimate.camera)
@@ -99,7 +99,7 @@ COLUMNS = {
 
 
 def columns(figures: PoseMetrics) -> dict[str, Array]:
-    """The figures as tables show them, an entry a body: millimetres, degrees, and shares as 0 or 100 %."""
+    """The metrics in the units of the tables, one entry per body: millimetres, degrees, and shares as 0 or 100 %."""
     return {
         "MPJPE": 1e3 * figures.mpjpe,
         "PA-MPJPE": 1e3 * figures.pa_mpjpe,

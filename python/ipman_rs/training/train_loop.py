@@ -1,4 +1,4 @@
-"""A training run in a loop of twenty lines: what is compared gets the same batches in the same order."""
+"""A training loop for ablations: all compared runs see identical batches in the same order."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class TrainingPlan:
 def run_plan(
     model: nn.Module, loss: Callable[[Batch], Tensor], data: Batch, noisy: Noisy, plan: TrainingPlan, seed: int
 ) -> None:
-    """Train in place. Which images a step draws, and their noise, depend on the seed and the step alone."""
+    """Train the model in place. A step's images and their noise depend only on the seed and the step."""
     optimizer = torch.optim.Adam(model.parameters(), lr=plan.rate)
     schedule = cosine_decay(optimizer, plan.rate, plan.steps)
     generator = torch.Generator().manual_seed(seed)

@@ -1,4 +1,4 @@
-"""Small pictures without words, for the cells of a figure: pixels (height, width, 3) uint8."""
+"""Small pictures without text, for the cells of a figure: pixels (height, width, 3) uint8."""
 
 from __future__ import annotations
 

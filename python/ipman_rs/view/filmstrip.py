@@ -1,4 +1,4 @@
-"""A filmstrip: one body at several times side by side, seen from the side to which it does not fall."""
+"""A filmstrip: one body at several times side by side, seen across the direction of its fall."""
 
 from __future__ import annotations
 

@@ -231,7 +231,7 @@ def _write_title(axes: Axes, study: Study, frame: int) -> None:
 
 
 def frame_caption(study: Study, frame: int) -> tuple[str, str]:
-    """Title and one line of figures of a frame."""
+    """Title of a frame and one line of its measured quantities."""
     value = {key: column[frame] for key, column in study.numbers.items()}
     title = study.name if study.num_frames == 1 else f"{study.name} · {study.label(frame)}"
     if not np.isfinite(value["mass"]):
@@ -279,8 +279,8 @@ def write_legend(figure: Figure, study: Study, top: float) -> None:
 
 
 def fix_layout(picture: Figure, dpi: float) -> None:
-    """Lays a figure out for a picture of that dpi, and ends that. The solver of matplotlib's layout is not the same in
-    the last digit each time, and an SVG names its clips after all digits."""
+    """Lay a figure out for a picture of that dpi, and freeze the layout: matplotlib's solver differs in the last digit
+    between calls, and an SVG names its clips after all digits."""
     if picture.get_layout_engine() is None:
         return
     picture.set_dpi(dpi)

@@ -1,4 +1,4 @@
-"""The figures of fitted bodies against what is true of the people, an entry a body; metres where nothing is said."""
+"""Metrics of fitted bodies against the true people, one entry per body; in metres unless stated otherwise."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""What a fit is told of people: points in an image, and
+"""The observations that a fit gets of a person: points in an image, and
 
 calibrated   the camera and the floor in the world; no pose (IPMAN-O*)
 regressed    as calibrated, but fits begin where a network's estimate might be, and not at a search over yaws
-presented    a pose that the person imitates, true but for some degrees a number, with its floor; height and mass; the
-             camera and its focal length are unknown (IPMAN-O)
+presented    a pose that the person imitates, true up to noise of some degrees per number, with its floor; height and
+             mass; the camera and its focal length are unknown (IPMAN-O)
 
 Points are those that MediaPipe has, moved by 1 % of the person's height in the image (standard deviation of each
 coordinate), one in thirty by 5 %, and one in ten not seen.
@@ -104,7 +104,7 @@ def _touching(pose: Array) -> Tensor:
 
 
 def cameras(truth: Truth, draw: np.random.Generator) -> Camera:
-    """One a person, from anywhere around, looking at the middle of the body."""
+    """One camera per person, at any azimuth, looking at the middle of the body."""
     count = len(truth)
     middle = (truth.surface.max(axis=1) + truth.surface.min(axis=1)) / 2
     heading, distance = draw.uniform(0, 2 * np.pi, count), draw.uniform(*DISTANCE, count)

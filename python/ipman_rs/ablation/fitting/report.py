@@ -85,7 +85,7 @@ def page(record: dict[str, Any]) -> str:
 
 
 def columns(figures: FitMetrics, baseline: FitMetrics) -> dict[str, Array]:
-    """The figures as tables show them, an entry a body: millimetres, and shares as 0 or 100 %."""
+    """The metrics in the units of the tables, one entry per body: millimetres, and shares as 0 or 100 %."""
     return {
         "MPJPE": 1e3 * figures.mpjpe,
         "PA-MPJPE": 1e3 * figures.pa_mpjpe,

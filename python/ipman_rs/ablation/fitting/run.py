@@ -1,4 +1,4 @@
-"""The fits of all rows of all blocks. What is done is kept in a folder, and not done again."""
+"""The fits of all rows of all blocks. Finished fits are saved in a folder and reused."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ CONTROLS = ("baseline", "both", "ours", "ours without physics")
 
 @dataclass(frozen=True)
 class Block:
-    """People, what is told of them, and the rows. told: None (the camera and the floor), "regressed" (a start, too), or
-    the degrees of noise of a presented pose."""
+    """People, their observations, and the rows. told: None (camera and floor), "regressed" (a start, too), or the
+    degrees of noise of a presented pose."""
 
     name: str
     kind: str
@@ -56,7 +56,7 @@ def blocks() -> list[Block]:
 
 @dataclass(frozen=True)
 class VariantResult:
-    """One row of a block. seconds: of one processor core, a body."""
+    """One row of a block. seconds: on one processor core, per body."""
 
     row: Variant
     figures: FitMetrics
@@ -95,7 +95,7 @@ class Benchmark:
         return self.bodies if kind == "balanced" else self.controls
 
     def truth(self, kind: str, progress: Callable[[int], None] | None = None) -> Truth:
-        """The people of a kind; `progress` is told how many are drawn."""
+        """The people of a kind; `progress` is called with the number drawn so far."""
         self.folder.mkdir(parents=True, exist_ok=True)
         count = self.count(kind)
         path = self.folder / f"people-{self.split}-{kind}-{count}.npz"

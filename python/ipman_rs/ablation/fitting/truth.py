@@ -1,4 +1,4 @@
-"""What is true of the people of scenes, as arrays: a row each."""
+"""The true bodies of posed people, as arrays with one row per person."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def correspondence() -> tuple[NDArray[np.int64], Array]:
 
 
 def error_floors(truth: Truth) -> dict[str, float]:
-    """Millimetres that no fit can be blamed for. correspondence: of the mean body in the zero pose, fitted body against
+    """Errors, mm, that no fit can avoid. correspondence: of the mean body in the zero pose, fitted body against
     corresponding points; shape: what is left of the people's resting surfaces after the best betas and translation."""
     lite: BodyModel = load_body(FITTED)
     mean = np.asarray(lite().vertices)

@@ -1,4 +1,4 @@
-"""What is compared: presets, less some of their terms."""
+"""The variants compared: presets, some without some of their terms."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 """The ablation on images that `ipman data render` drew: the small backbone learns where keypoints are, and the
-regressor from keypoints is trained on what it finds."""
+regressor from keypoints is trained on its detections."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class ImageTask:
         return dataclasses.replace(crops, inputs=detect_keypoints(eye, crops))
 
     def noisy(self, batch: Batch, generator: torch.Generator) -> Batch:
-        """As they are: what is seen has errors of its own."""
+        """No added noise: detected keypoints already contain errors."""
         return batch
 
     def lifting_network(self, seed: int) -> HMR:
@@ -149,7 +149,7 @@ def jitter(crops: Batch, generator: torch.Generator) -> Batch:
 
 @torch.no_grad()
 def detect_keypoints(eye: Small, crops: Batch) -> Tensor:
-    """Keypoints (B, K, 3), confidence 1, where their maps have their mean."""
+    """Keypoints (B, K, 3) at the means of their maps, with confidence 1."""
     eye.eval()
     places = torch.cat([mean_positions(eye.maps(part)[0]) for part in crops.inputs.split(AT_ONCE)])
     places = places[:, : crops.keypoints.shape[1]]

@@ -129,7 +129,7 @@ def _signed(value: float, digits: int = 1) -> str:
 
 
 def _write_csv(found: Found, path: Path) -> None:
-    """A line a body, row and seed."""
+    """One line per body, row and seed."""
     file = io.StringIO(newline="")
     lines = csv.writer(file)
     lines.writerow(["labels", "row", "seed", "body", *COLUMNS])

@@ -1,4 +1,4 @@
-"""Training of all rows on all labels, in several processes. What is done is kept in a folder, and not done again."""
+"""Training of all rows on all labels, in several processes. Finished jobs are saved in a folder and reused."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class VariantResult:
 
 @dataclass(frozen=True)
 class Job:
-    """Training of a row; of what all rows go on from (row: None); or first learning to see (tilt: None, too)."""
+    """Training of a row; of the model from which all rows start (row: None); or of the backbone (tilt: None, too)."""
 
     seed: int
     tilt: float | None = None
@@ -116,14 +116,14 @@ class Benchmark:
                 raise
 
     def _can_begin(self, job: Job) -> bool:
-        """Whether what it goes on from is there."""
+        """Whether the file that it starts from exists."""
         if job.row is not None:
             return self._place(replace(job, row=None)).exists()
         seen = self._seen(job.seed)
         return job.tilt is None or seen is None or seen.exists()
 
     def _train(self, job: Job, tilt: float, file: BinaryIO) -> None:
-        """The file gets weights, or figures of a row."""
+        """Writes weights, or the metrics of a row, into the file."""
         model, data, posing = self.task.lifting_network(job.seed), self._data(job.seed, tilt), self.task.posing()
         if job.row is not None:
             model.load_state_dict(torch.load(self._place(replace(job, row=None)), weights_only=True))

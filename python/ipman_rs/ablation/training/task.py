@@ -21,8 +21,8 @@ Progress = Callable[[int, int], None]  # how many of how many are made
 
 @dataclass(frozen=True)
 class Plan:
-    """first: learning to see keypoints, once for each seed; None for none. base: training without physics, once for
-    each seed and tilt. fine: what each row goes on with."""
+    """first: training of the backbone on keypoints, once for each seed; None for none. base: training without physics,
+    once for each seed and tilt. fine: the fine-tuning of each row."""
 
     base: TrainingPlan
     fine: TrainingPlan
@@ -38,19 +38,19 @@ class Task(Protocol):
         ...
 
     def trained_on(self) -> dict[str, Any]:
-        """All that decides the data that is trained on, for the page and for the names of kept results."""
+        """The settings that determine the training data, for the page and for the names of saved results."""
         ...
 
     def tested_on(self) -> dict[str, Any]:
-        """The same of the data that figures are taken of."""
+        """The settings that determine the test data."""
         ...
 
     def make(self, progress: Progress | None = None) -> None:
-        """Draw or read the data, and keep them in files."""
+        """Draw or read the data, and save them in files."""
         ...
 
     def fit_backbone(self, seed: int, plan: TrainingPlan, file: BinaryIO) -> None:
-        """Learn to see keypoints; what `training` and `truth` need of it goes into a file."""
+        """Train the backbone to detect keypoints; the file gets what `training` and `truth` need of it."""
         ...
 
     def training(self, seen: Path | None) -> Batch:
@@ -58,7 +58,7 @@ class Task(Protocol):
         ...
 
     def truth(self, seen: Path | None) -> Batch:
-        """What figures are taken of: inputs as the regressor takes them, true labels, static people."""
+        """The test set: inputs of the regressor, true labels, static people."""
         ...
 
     def noisy(self, batch: Batch, generator: torch.Generator) -> Batch:
@@ -73,5 +73,5 @@ class Task(Protocol):
 
 
 def key_of(told: Any) -> str:
-    """A short name of all that decides a result."""
+    """A short hash of the settings that determine a result."""
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]

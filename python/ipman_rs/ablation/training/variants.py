@@ -1,4 +1,4 @@
-"""What is compared, read from `settings.yaml`."""
+"""The variants compared, read from `settings.yaml`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many solvers, one a body, fed by an objective that is evaluated for all of them at once."""
+"""Runs one solver per body; the objective is evaluated for all of them in one batch."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def minimise(
     options: Options,
     progress: Callable[[int], None] | None = None,
 ) -> list[Outcome]:
-    """One outcome a row of `starts` (B, P). `progress` is told how many have ended."""
+    """One `Outcome` per row of `starts` (B, P). `progress` is called with the number of bodies that have finished."""
     running = {body: solver(start, options) for body, start in enumerate(starts)}
     points = {body: next(generator) for body, generator in running.items()}
     outcomes: dict[int, Outcome] = {}

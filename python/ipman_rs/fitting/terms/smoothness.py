@@ -3,7 +3,7 @@
 With order 1 it is the velocity. The points are all joints and the named points of the skin, in the world: so nothing
 depends on how rotations are written down, and a turn through 180° is as smooth as any other.
 
-It ties frames together, so it is none of `TERMS`, whose rows know nothing of each other; `sequence` adds it.
+It couples frames, so it is not one of `TERMS`, whose rows are independent of each other; `sequence` adds it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From light to the bytes of an image: exposure, blur, noise."""
+"""The camera's sensor, from linear light to the pixels of an image: exposure, blur, noise."""
 
 from __future__ import annotations
 

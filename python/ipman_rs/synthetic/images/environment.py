@@ -1,4 +1,4 @@
-"""What is around a person: the floor y = 0, walls or the sky, and the light. Colours are linear light, float32."""
+"""The surroundings of a person: the floor y = 0, walls or the sky, and the light. Colours are linear light, float32."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The picture of a person on a floor: rays into the scene; Embree says what they meet, without GPU or display."""
+"""The picture of a person on a floor: rays are cast into the scene by Embree, without GPU or display."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One image with all that is known about it, drawn from a seed, a split and a number."""
+"""One image with its labels, drawn from a seed, a split and an index."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Sample:
 
 
 def draw_sample(settings: RenderSettings, split: str, index: int) -> Sample:
-    """The same one whenever, wherever and in whatever order it is drawn."""
+    """Draw sample `index` of a split; it is the same in whatever order and process it is drawn."""
     seed = [settings.seed, SPLITS.index(split), index]
     draw = np.random.default_rng(seed)
     family = list(FAMILIES)[index % len(FAMILIES)]
@@ -88,7 +88,7 @@ def draw_sample(settings: RenderSettings, split: str, index: int) -> Sample:
 
 
 def round_camera(camera: ImageCamera) -> ImageCamera:
-    """The camera as it is written, so that labels and picture agree."""
+    """The camera in float32, as it is written, so that labels and image agree."""
     written = (float32(value).astype(float) for value in (camera.rotation, camera.translation, camera.intrinsics))
     return ImageCamera(camera.size, *written)
 

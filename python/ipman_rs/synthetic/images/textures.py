@@ -107,12 +107,12 @@ def draw_texture(
 
 
 def float32(values: ArrayLike) -> Array:
-    """In single precision, which is enough for colours and twice as fast."""
+    """As float32, which is precise enough for colours and twice as fast."""
     return np.asarray(values, np.float32)
 
 
 def linear_color(hue: float, saturation: float, value: float) -> Array:
-    """A colour (3,) in linear light, of numbers from 0 to 1 as screens take them."""
+    """A colour (3,) in linear light, from hue, saturation and value between 0 and 1."""
     from colorsys import hsv_to_rgb
 
     return np.array(hsv_to_rgb(hue, saturation, value)) ** 2.2

@@ -1,5 +1,5 @@
-"""Writing images in shards. A shard has its name only once it is whole, and is never written again: a run that was
-killed goes on behind it."""
+"""Writing images in shards. A shard gets its name only when it is complete and is never rewritten: a killed run
+continues after it."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def index_of(settings: RenderSettings, counts: dict[str, int], shards: list[Shar
 
 
 def begin_run(folder: Path, index: dict[str, Any]) -> None:
-    """Write the index into a new or empty folder, or see that a run begun there is this one."""
+    """Write the index into a new or empty folder; in a folder with one, check that it is of the same run."""
     path = folder / INDEX
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{folder}: expected a folder, got a file")

@@ -1,4 +1,4 @@
-"""The terms of training, one a file, and their sum with the weights of SPIN and of the paper."""
+"""The terms of the training loss, one per file, and their sum with the weights of SPIN and of the paper."""
 
 from ...renamed import old_names
 from .body_parameters import betas_loss, pose_loss

@@ -1,4 +1,4 @@
-"""What a training run is told: a YAML file, and numbers on the command line that take precedence."""
+"""The configuration of a training run: a YAML file, and entries on the command line, which take precedence."""
 
 from __future__ import annotations
 

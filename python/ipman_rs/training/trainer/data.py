@@ -66,7 +66,7 @@ def training_loader(settings: config.Config, body: BodyModel, start: int, rank: 
 
 
 class ResumableLoader(DataLoader):
-    """Tells Lightning that it may go on in the middle: where, `Steps` is told when the loader is made."""
+    """A loader that Lightning may resume in the middle; `Steps` gets the position when the loader is made."""
 
     def state_dict(self) -> dict[str, Any]:
         return {}

@@ -59,7 +59,7 @@ class Training(lightning.LightningModule):
         return data.validation_loaders(self.settings, self.body, self.global_rank, self.trainer.world_size)
 
     def on_train_batch_start(self, batch: Batch, batch_idx: int) -> None:
-        # Dropout depends on the step and the process alone: an interrupted run goes on as if it had not been one.
+        # Dropout depends only on the step and the process, so that a resumed run equals an uninterrupted one.
         seed = np.random.SeedSequence([self.settings.seed, self.global_step, self.global_rank])
         torch.manual_seed(int(seed.generate_state(1, np.uint64)[0] >> 1))
 

@@ -1,4 +1,4 @@
-"""A training run in a folder: begun, or gone on with where it was."""
+"""A training run in a folder: started, or continued from its last checkpoint."""
 
 from __future__ import annotations
 
