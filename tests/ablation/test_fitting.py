@@ -89,7 +89,7 @@ def test_the_camera_sees_the_person(known):
     assert (turns[:, 1, 1] < -0.5).all()
     task = observations.calibrated_task(known, 0)
     landmarks = torch.from_numpy(known.landmarks)
-    there = truth.known(load_body(truth.FITTED))
+    there = truth.landmark_names(load_body(truth.FITTED))
     points = task.camera.project(landmarks[:, [there.index(name) for name in task.problem.landmarks.names]])
     assert (points - task.problem.points).norm(dim=-1).median() < 25
     assert task.problem.confidence.unique().tolist() == [0.0, 1.0]

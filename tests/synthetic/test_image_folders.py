@@ -308,7 +308,7 @@ def test_worker_that_dies(tmp_path, monkeypatch):
     def die(*_):
         raise BrokenProcessPool("a child process terminated abruptly")
 
-    monkeypatch.setattr(writer, "drawn", die)
+    monkeypatch.setattr(writer, "draw_files", die)
     done = CliRunner().invoke(main, command(tmp_path / "out", 1))
     assert done.exit_code == 1
     assert "a process ended too early" in done.output

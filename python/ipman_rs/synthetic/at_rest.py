@@ -42,8 +42,8 @@ TIPPED, RAISED = (15.0, 30.0), (0.15, 0.40)  # degrees, m
 
 @dataclasses.dataclass(frozen=True)
 class PosedPerson:
-    """A posed person: body model and template, full_pose (24, 3), transl (3,), and from these vertices (V, 3) and joints
-    (24, 3)."""
+    """A posed person: body model and template, full_pose (24, 3), transl (3,), and from these vertices (V, 3) and
+    joints (24, 3)."""
 
     person: BodyModel
     template: ip.BodyTemplate
