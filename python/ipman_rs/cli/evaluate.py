@@ -105,7 +105,7 @@ def evaluate(
 
 
 def _jobs(predictions: tuple[Path, ...], output: Path, given: dict[str, Any]) -> tuple[Table | None, list[Job]]:
-    from ..evaluation.tables.job import Job, Source, methods
+    from ..evaluation.tables.job import Job, Source, method_names
     from ..evaluation.tables.paper import TABLES as PAPER
 
     table = None if given["table"] is None else PAPER[given["table"]]
@@ -127,7 +127,7 @@ def _jobs(predictions: tuple[Path, ...], output: Path, given: dict[str, Any]) ->
         "force": given["force"],
         "folder": str(output),
     }
-    names = methods(predictions)
+    names = method_names(predictions)
     return table, [Job(name, str(path), source, **shared) for name, path in zip(names, predictions, strict=True)]
 
 
@@ -171,13 +171,13 @@ def _measure(jobs: list[Job], shard: Shard, ray: bool) -> None:
 
 def _report(jobs: list[Job], table: Table | None, output: Path) -> None:
     from ..evaluation.tables import report
-    from ..evaluation.tables.summary import difference, measured
+    from ..evaluation.tables.summary import difference, summarise
     from . import console
 
     frames = sum(len(job.data) for job in jobs)
     with console.progress("adding up", 2 * frames - len(jobs[0].data)) as step:
         count = _counter(step)
-        found = [measured(job, count) for job in jobs]
+        found = [summarise(job, count) for job in jobs]
         differences = [difference(job, jobs[0], count) for job in jobs[1:]]
     source = jobs[0].source
     title = table.title if table else f"{' and '.join(job.name for job in jobs)} on {source.name}"

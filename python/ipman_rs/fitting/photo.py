@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files import regular
+from ipman_rs.files import regular_file
 
 from ..data.keypoints import mediapipe
 from ..data.keypoints.detections import Array, Detections, join
@@ -71,7 +71,7 @@ def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     """The pixels (height, width, 3) of an image, turned as its EXIF says. ValueError if unreadable or tiny."""
     from PIL import Image, ImageOps
 
-    regular(path)
+    regular_file(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)

@@ -1,6 +1,6 @@
 """Static people of the embedded body `anny-lite` on the floor y = 0.
 
-Named poses (`ipman_rs.body.poses`), mirrored or not, with every joint perturbed, are laid on the floor as in
+Named poses (`ipman_rs.body.poses`), mirrored or not, with every joint perturb, are laid on the floor as in
 `synthetic.at_rest`: they rest on a facet of their hull over which the exact centre of mass lies, supported by the
 samples within 1 cm of the floor. Others are drawn again.
 """
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ipman_rs.body import joints, load_body, poses
-from ipman_rs.files import being_written
+from ipman_rs.files import atomic_write
 from ipman_rs.synthetic.at_rest import FAMILIES, TRIES, perturb, settle
 
 Array = NDArray[np.floating]
@@ -44,7 +44,7 @@ class Population:
         return Population(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
     def save(self, path: Path) -> None:
-        with being_written(path) as file:
+        with atomic_write(path) as file:
             np.savez_compressed(file, **vars(self))
 
     @classmethod

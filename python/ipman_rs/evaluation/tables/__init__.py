@@ -1,20 +1,24 @@
 """Predictions against a data set, and the tables of the paper: what `ipman evaluate` does."""
 
+from ipman_rs.renamed import old_names
+
 from .job import Job, Shard, Source
 from .paper import TABLES, Table
 from .predictions import Predictions, read
-from .summary import Difference, Measured, difference, measured
+from .summary import Difference, MethodSummary, difference, summarise
 
 __all__ = [
     "TABLES",
     "Difference",
     "Job",
-    "Measured",
+    "MethodSummary",
     "Predictions",
     "Shard",
     "Source",
     "Table",
     "difference",
-    "measured",
     "read",
+    "summarise",
 ]
+
+__getattr__ = old_names(__name__, {"Measured": "MethodSummary", "measured": "summarise"})
