@@ -119,12 +119,12 @@ def train(
     from concurrent.futures.process import BrokenProcessPool
 
     from ..ablation.training import report
-    from ..ablation.training.from_images import Pictures
-    from ..ablation.training.from_keypoints import Keypoints
+    from ..ablation.training.from_images import ImageTask
+    from ..ablation.training.from_keypoints import KeypointTask
     from ..ablation.training.run import TILTS, Benchmark
     from . import console
 
-    task = Keypoints(output, people, bodies, split) if images is None else Pictures(output, images, split, others)
+    task = KeypointTask(output, people, bodies, split) if images is None else ImageTask(output, images, split, others)
     run = Benchmark(output, task, seeds, part, lean)
     chosen = tuple(dict.fromkeys(tilts)) or TILTS[task.name]
     try:

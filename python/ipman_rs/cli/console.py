@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..files.errors import one_line
-from ..study.study import Study, marked
+from ..study.study import Study, flagged_name
 
 
 def error(text: str) -> None:
@@ -99,7 +99,7 @@ def print_table(studies: Sequence[Study]) -> None:
 def _row(study: Study, frames: int | slice) -> list[Text]:
     value = {key: np.atleast_1d(column[frames]) for key, column in study.numbers.items() if column.ndim == 1}
     single = isinstance(frames, int)
-    name = marked(study.label(frames) if single else f"{study.name} ({study.num_frames} frames)", study.flags)
+    name = flagged_name(study.label(frames) if single else f"{study.name} ({study.num_frames} frames)", study.flags)
     stable = value["bose"].astype(bool)
     if single:
         said = "yes" if stable[0] else ("no" if value["has_contact"][0] else "no contact")

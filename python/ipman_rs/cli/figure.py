@@ -355,7 +355,7 @@ def compare(
             found = made.comparison(found_by, people, most, preset, step.to)
         _write(found, output)
     rows = [
-        [person, method, made.words(about)]
+        [person, method, made.caption(about)]
         for person, each in found.numbers["people"].items()
         for method, about in each.items()
     ]

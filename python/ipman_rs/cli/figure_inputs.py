@@ -22,7 +22,7 @@ def one_body(body: str, frame: int | None, request: dict[str, Any]) -> tuple[Any
     """Vertices, template, ground and name; `request`: the fields of `study.from_file.Request`."""
     import ipman_rs as ip
 
-    from ..study.from_file import Request, odd_sizes, on_ground, with_sizes
+    from ..study.from_file import Request, add_unit_warning, collect_unit_warnings, on_ground
     from . import console
 
     if body in ip.body.poses.NAMES and not Path(body).exists():
@@ -37,9 +37,9 @@ def one_body(body: str, frame: int | None, request: dict[str, Any]) -> tuple[Any
         )
     path = Path(body)
     try:
-        with odd_sizes() as sizes:
+        with collect_unit_warnings() as sizes:
             recording, template, floor, _ = on_ground(path, Request(**request))
-        console.warn_of(path, with_sizes(recording.flags, sizes))
+        console.warn_of(path, add_unit_warning(recording.flags, sizes))
     except (ValueError, TypeError) as error:
         raise FileError(path, str(error)) from error
     count, frame = len(recording.vertices), frame or 0

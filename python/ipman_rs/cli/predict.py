@@ -15,7 +15,7 @@ from .options import of_unknown_camera
 
 if TYPE_CHECKING:
     from ..fitting.photo import Box
-    from ..training.predict import Trained
+    from ..training.predict import TrainedModel
     from ..view import Study
 
 
@@ -80,9 +80,9 @@ def predict(
     if seen["box"] and seen["whole"]:
         raise click.UsageError("expected --box or --whole, not both")
     try:
-        from ..training.predict import Trained
+        from ..training.predict import TrainedModel
 
-        trained = Trained.load(checkpoint)
+        trained = TrainedModel.load(checkpoint)
     except ImportError as error:
         console.error(f"{error.name} is needed: pip install 'ipman_rs[train]'")
         sys.exit(1)
@@ -122,7 +122,7 @@ def predict(
 
 
 def _write_predictions(
-    trained: Trained, name: str, path: Path, split: str | None, images: Path, regressor: Path | None, output: Path
+    trained: TrainedModel, name: str, path: Path, split: str | None, images: Path, regressor: Path | None, output: Path
 ) -> None:
     import ipman_rs.data
 
@@ -159,7 +159,12 @@ def _boxes(given: Box | None, whole: bool) -> AbstractContextManager[Callable[[P
 
 
 def _predicted(
-    trained: Trained, path: Path, box_of: Callable[[Path, Any], Box], output: Path, pictured: bool, seen: dict[str, Any]
+    trained: TrainedModel,
+    path: Path,
+    box_of: Callable[[Path, Any], Box],
+    output: Path,
+    pictured: bool,
+    seen: dict[str, Any],
 ) -> Study:
     """The analysed body of one image, whose files are written. FileError if it cannot be read or has an empty box."""
     from dataclasses import replace

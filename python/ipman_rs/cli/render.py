@@ -54,7 +54,7 @@ def render(
     """
     from concurrent.futures.process import BrokenProcessPool
 
-    from ..synthetic.images.samples import Settings
+    from ..synthetic.images.samples import RenderSettings
     from ..synthetic.images.writer import write
     from . import console
 
@@ -63,7 +63,7 @@ def render(
         "val": images // 10 if val is None else val,
         "test": images // 10 if test is None else test,
     }
-    settings = Settings(seed, size, body, moving)
+    settings = RenderSettings(seed, size, body, moving)
     try:
         with console.progress("rendering", sum(counts.values())) as step:
             drawn = write(output, settings, counts, shard_size, workers, step.to)

@@ -15,7 +15,7 @@ from ..files.errors import FileError, one_line
 from .options import GROUND, TIMES, UP, of_files
 
 if TYPE_CHECKING:
-    from ..simulation.inputs import Bodies
+    from ..simulation.inputs import GroundedBodies
     from ..simulation.report import Fall
 
 MOST_ROWS = 40
@@ -115,7 +115,7 @@ def simulate(
         write_comparison,
     )
     from ..simulation.inputs import read_bodies
-    from ..simulation.report import fall, write_falls
+    from ..simulation.report import run_falls, write_falls
     from ..study.from_file import Request
     from . import console
 
@@ -140,7 +140,7 @@ def simulate(
         except ImportError as error:
             raise click.ClickException(str(error)) from error
 
-    def opened(path: Path) -> Bodies:
+    def opened(path: Path) -> GroundedBodies:
         read = read_bodies(path, request, console.progress)
         console.warn_of(path, read.flags)
         return read
@@ -149,16 +149,16 @@ def simulate(
     if against is None:
         for path in bodies:
             with reported():
-                falls.append(fall(opened(path), films, **options, progress=console.progress))
+                falls.append(run_falls(opened(path), films, **options, progress=console.progress))
     else:  # what cannot be compared is not simulated
-        both: list[Bodies] = []
+        both: list[GroundedBodies] = []
         for path in (*bodies, against):
             with reported():
                 both.append(opened(path))
         with reported():
             if not failures:
                 pairs(*both)
-                falls += [fall(each, films, **options, progress=console.progress) for each in both]
+                falls += [run_falls(each, films, **options, progress=console.progress) for each in both]
                 compared = compare_falls(*falls)
     record: dict[str, Any] = {"bodies": [one.record() for one in falls]}
     if compared is not None:
