@@ -4,12 +4,12 @@ The functions here take numpy arrays; `ipman_rs.torch` has the same names on ten
 Importing this package needs numpy alone.
 """
 
-from ipman_rs import body, presets
+from ipman_rs import body, losses, presets
 from ipman_rs._core import __version__, get_num_threads, set_num_threads
 from ipman_rs.analysis import Analysis, analyze, analyze_poses
 from ipman_rs.body import load_body
 from ipman_rs.ground import Ground
-from ipman_rs.losses import balance_cost, ground_loss, stability_loss
+from ipman_rs.losses import *  # noqa: F403 - its __all__
 from ipman_rs.mass import center_of_mass
 from ipman_rs.pressure import binary_center_of_pressure, center_of_pressure, pressure
 from ipman_rs.sampling import sample_surface
@@ -32,7 +32,6 @@ __all__ = [
     "__version__",
     "analyze",
     "analyze_poses",
-    "balance_cost",
     "base_of_support",
     "binary_center_of_pressure",
     "body",
@@ -41,7 +40,6 @@ __all__ = [
     "center_of_mass",
     "center_of_pressure",
     "get_num_threads",
-    "ground_loss",
     "load_body",
     "mass_properties",
     "part_volumes",
@@ -52,6 +50,6 @@ __all__ = [
     "self_contact_distance",
     "self_penetration",
     "set_num_threads",
-    "stability_loss",
     "support_margin",
+    *losses.__all__,
 ]

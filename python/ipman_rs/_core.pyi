@@ -21,8 +21,8 @@ GRAVITY: float
 """m/s²"""
 
 TERMS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]]
-"""The terms that a loss may be made of, in their order: the name as a quantity of its own, and the names of the numbers,
-of the modes and of the options."""
+"""The terms of a loss, in their order: the name as a quantity of its own, and the names of the numbers, of the modes
+and of the options."""
 
 _Float = TypeVar("_Float", np.float32, np.float64)
 

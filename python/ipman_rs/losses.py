@@ -12,6 +12,8 @@ from ipman_rs.ground import Ground
 from ipman_rs.quantities import Curve, Method, Points, Wrap
 from ipman_rs.template import BodyTemplate
 
+__all__ = ["balance_cost", "ground_loss", "stability_loss"]  # what `ipman_rs` has of this module
+
 
 def stability_loss(
     vertices: ArrayLike,

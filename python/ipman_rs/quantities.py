@@ -131,10 +131,11 @@ def balance_cost(alpha: float, gamma: float, sigma: float, wrap: Wrap, method: M
 class Term(NamedTuple):
     """A term that `IntuitivePhysicsLoss` may have.
 
-    numbers: their names, such as ("pull", "push"); each has a weight.
+    quantity: its name as a quantity of its own. numbers: their names, such as ("pull", "push"); each has a weight.
     modes: the arguments that choose its variant; options: its constants, by their names in a preset.
     """
 
+    quantity: str
     numbers: tuple[str, ...]
     modes: tuple[str, ...]
     options: tuple[str, ...]

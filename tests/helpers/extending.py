@@ -32,7 +32,7 @@ class Page:
         files, edits = {}, {}
         for path, step in _STEP.findall(text):
             blocks = _BLOCK.findall(step)
-            if [language for language, _ in blocks] == ["python"]:
+            if [language for language, _ in blocks] in (["python"], ["rust"]):
                 files[path] = blocks[0][1]
             else:
                 assert {language for language, _ in blocks} == {"diff"}, path
@@ -43,8 +43,8 @@ class Page:
     def carry_out(self, folder: Path) -> Path:
         """A copy of what the page changes, in `folder`, with its files and edits."""
         unwanted = shutil.ignore_patterns("__pycache__")
-        shutil.copytree(ROOT / "python", folder / "python", ignore=unwanted)
-        shutil.copytree(ROOT / "tests" / "helpers", folder / "tests" / "helpers", ignore=unwanted)
+        for name in ("python", "tests/helpers"):
+            shutil.copytree(ROOT / name, folder / name, ignore=unwanted, dirs_exist_ok=True)
         for name in ("pyproject.toml", "tests/__init__.py", "tests/conftest.py", *self.edits):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, folder / name)
@@ -56,9 +56,9 @@ class Page:
             text = (folder / path).read_text()
             for block in blocks:
                 lines = block.splitlines(keepends=True)
-                before = "".join(line[1:] for line in lines if line[0] == " ")
+                before = "".join(line[1:] for line in lines if line[0] in " -")
                 assert text.count(before) == 1, f"{path} has these lines {text.count(before)} times:\n{before}"
-                text = text.replace(before, "".join(line[1:] for line in lines))
+                text = text.replace(before, "".join(line[1:] for line in lines if line[0] in " +"))
             (folder / path).write_text(text)
         return folder
 

@@ -6,6 +6,7 @@ import itertools
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ import trimesh
 import ipman_rs as ip
 import ipman_rs.torch as ipt
 from ipman_rs import _core
-from ipman_rs.quantities import Quantity
+from ipman_rs.quantities import MODES, TERMS, Quantity
 from ipman_rs.torch.dispatch import evaluate
 from tests.helpers import model_arrays
 
@@ -52,6 +53,16 @@ class Case:
 
 
 GROUND_OPTIONS = (1.0, 0.15, 10.0, 0.15)
+# A loss in the order of metres for each of the losses' constants; a constant that is not here is 0.5.
+CONSTANTS = {
+    **dict(zip(("alpha1", "alpha2", "beta1", "beta2"), GROUND_OPTIONS, strict=True)),
+    "alpha": 100.0, "gamma": 10.0, "epsilon": 0.0, "balance_gamma": 50.0, "sigma": 0.02,
+}  # fmt: skip
+LOSSES = [
+    Case(".".join([term.quantity, *words]), tuple(CONSTANTS.get(name, 0.5) for name in term.options))
+    for term in TERMS.values()
+    for words in itertools.product(*(get_args(MODES[mode]) for mode in term.modes))
+]
 SINGLE = [
     Case("part_volumes"),
     Case("mass_properties", (985.0,)),
@@ -61,14 +72,8 @@ SINGLE = [
     Case("center_of_pressure", (100.0, 10.0, 0.0)),
     Case("center_of_pressure", (100.0, 10.0, 1e-6)),
     *(Case(f"support_margin.{contact}.{method}", (0.1,)) for contact in ("paper", "released") for method in METHODS),
-    *(Case(f"stability_loss.{method}", (100.0, 10.0, 0.0)) for method in METHODS),
     Case("stability_loss.pcom", (70.0, 10.0, 1e-6)),
-    *(Case(f"ground_loss.{points}.{shape}", GROUND_OPTIONS) for points, shape in GROUND_TERMS),
-    *(
-        Case(f"balance_cost.{wrap}.{method}", (100.0, 50.0, 0.02))
-        for wrap in ("log", "saturate", "none")
-        for method in METHODS
-    ),
+    *LOSSES,
 ]
 FUSED = [
     *(
@@ -97,10 +102,10 @@ MAIN = [
     Case("terms.balance.log.pcom.ground.samples.tanh_squared", (100.0, 50.0, 0.02, *GROUND_OPTIONS)),
     Case("terms.balance.saturate.face_area.ground.vertices.tanh_squared", (100.0, 50.0, 0.02, *GROUND_OPTIONS)),
 ]
-# One of each room.
-ROOMS = [
-    next(case for case in SINGLE + FUSED if case.quantity.startswith(room))
-    for room in (
+# One quantity of each kind.
+KINDS = [
+    next(case for case in SINGLE + FUSED if case.quantity.startswith(kind))
+    for kind in (
         "part_volumes",
         "mass_properties",
         "sample_surface",
@@ -108,9 +113,7 @@ ROOMS = [
         "pressure",
         "center_of_pressure",
         "support_margin",
-        "stability_loss",
-        "ground_loss",
-        "balance_cost",
+        *(term.quantity for term in TERMS.values()),
         "terms.stability",
         "terms.balance",
     )
@@ -118,7 +121,7 @@ ROOMS = [
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    for name, cases in (("case", SINGLE + FUSED), ("main_case", MAIN), ("room", ROOMS)):
+    for name, cases in (("case", SINGLE + FUSED), ("main_case", MAIN), ("kind", KINDS)):
         if name in metafunc.fixturenames:
             metafunc.parametrize(name, cases, ids=str)
 

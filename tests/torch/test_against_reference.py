@@ -62,7 +62,7 @@ def test_every_mode_on_a_tiny_body(case, tiny):
 
 
 @pytest.mark.parametrize("verb", ["jvp", "hessian-vector product"])
-def test_other_verbs(room, tiny, verb):
+def test_other_verbs(kind, tiny, verb):
     vertices = tiny.vertices
     direction = torch.randn(vertices.shape, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
 
@@ -71,5 +71,5 @@ def test_other_verbs(room, tiny, verb):
             return torch.func.jvp(f, (vertices,), (direction,))[1]
         return torch.func.jvp(torch.func.grad(lambda v: f(v).sin().sum()), (vertices,), (direction,))[1]
 
-    ours, theirs = derivative(lambda v: room(v, tiny)), derivative(lambda v: room.reference(v, tiny))
+    ours, theirs = derivative(lambda v: kind(v, tiny)), derivative(lambda v: kind.reference(v, tiny))
     assert relative(ours, theirs) < 1e-10

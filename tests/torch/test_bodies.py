@@ -16,11 +16,11 @@ F64 = torch.float64
 
 @pytest.mark.parametrize("shape", [(), (1,), (4,), (2, 3), (0,), (2, 0), (1, 2, 1)])
 @pytest.mark.parametrize("forced", [False, True])
-def test_batch_dimensions_are_free(room, tiny, shape, forced):
-    f = room.reference if forced else room
+def test_batch_dimensions_are_free(kind, tiny, shape, forced):
+    f = kind.reference if forced else kind
     vertices = tiny.vertices[0].expand(*shape, -1, -1).clone().requires_grad_()
     value = f(vertices, tiny)
-    assert value.shape == (*shape, room.size(tiny))
+    assert value.shape == (*shape, kind.size(tiny))
     value.sum().backward()
     assert vertices.grad.shape == vertices.shape
     assert (value == f(tiny.vertices[0], tiny)).all()
@@ -39,13 +39,13 @@ def test_one_ground_a_body(tiny):
 
 
 @pytest.mark.parametrize("dtype", [torch.float64, torch.float32])
-def test_same_bits_at_any_place_and_for_any_number_of_threads(room, tiny, dtype):
+def test_same_bits_at_any_place_and_for_any_number_of_threads(kind, tiny, dtype):
     vertices = tiny.vertices.to(dtype)
     batch = torch.cat([vertices[1:], vertices, vertices[:1].expand(30, -1, -1)])
 
     def both(v):
         v = v.clone().requires_grad_()
-        value = room(v, tiny)
+        value = kind(v, tiny)
         return value.detach(), torch.autograd.grad(value.sum(), v)[0]
 
     threads = ip.get_num_threads()
@@ -68,8 +68,8 @@ def test_same_bits_at_any_place_and_for_any_number_of_threads(room, tiny, dtype)
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("forced", [False, True])
-def test_a_broken_body_stays_alone(room, tiny, bad, forced):
-    f = room.reference if forced else room
+def test_a_broken_body_stays_alone(kind, tiny, bad, forced):
+    f = kind.reference if forced else kind
     sound, broken = tiny.vertices.clone(), tiny.vertices.clone()
     broken[1, 5, 2] = bad
     results = []
@@ -93,18 +93,18 @@ def test_a_broken_body_stays_alone(room, tiny, bad, forced):
 @pytest.mark.parametrize("lift", [100.0, -1.0, 1e-3])
 @pytest.mark.parametrize("dtype", [torch.float64, torch.float32])
 @pytest.mark.parametrize("forced", [False, True])
-def test_hovering_and_sunk_bodies_are_finite(room, tiny, lift, dtype, forced):
+def test_hovering_and_sunk_bodies_are_finite(kind, tiny, lift, dtype, forced):
     """No underflow to 0/0, no overflow: finite values and gradients, but for the margin without contact."""
-    f = room.reference if forced else room
+    f = kind.reference if forced else kind
     vertices = (tiny.vertices + lift * tiny.ground.normal).to(dtype).requires_grad_()
     value = f(vertices, tiny)
-    if room.quantity.startswith("support_margin") and lift == 100.0:
+    if kind.quantity.startswith("support_margin") and lift == 100.0:
         assert (value == -math.inf).all()
     else:
         assert value.isfinite().all()
     torch.where(value.isfinite(), value, 0).sum().backward()
     assert vertices.grad.isfinite().all()
-    exact = room.reference((tiny.vertices + lift * tiny.ground.normal).to(dtype).double(), tiny)
+    exact = kind.reference((tiny.vertices + lift * tiny.ground.normal).to(dtype).double(), tiny)
     # 100 m away a float32 coordinate is known to 4 µm, and e^{−γh} with γ = 50 to 2e-4.
     tolerance = 1e-10 if dtype == F64 else (2e-3 if lift == 100.0 else 1e-4)
     # The core's e^x ends at the smallest normal number, not at 0.

@@ -20,10 +20,10 @@ def test_gradcheck(case, tiny):
     )
 
 
-def test_gradcheck_entry_by_entry(room, tiny):
-    """The slow mode, entry by entry, for one quantity of each room."""
+def test_gradcheck_entry_by_entry(kind, tiny):
+    """The slow mode, entry by entry, for one quantity of each kind."""
     vertices = tiny.vertices[:1].clone().requires_grad_()
-    assert gradcheck(lambda v: room(v, tiny), (vertices,), check_forward_ad=True)
+    assert gradcheck(lambda v: kind(v, tiny), (vertices,), check_forward_ad=True)
 
 
 def test_gradgradcheck(main_case, tiny):
@@ -35,14 +35,14 @@ def test_gradgradcheck(main_case, tiny):
 
 
 @pytest.mark.slow
-def test_hessian_four_ways(room, tiny):
+def test_hessian_four_ways(kind, tiny):
     """func.hessian (forward over reverse), reverse over reverse, reverse over forward, and the reference agree."""
     vertices = tiny.vertices[0]
 
     def f(v):
-        return room(v, tiny).square().sum()
+        return kind(v, tiny).square().sum()
 
-    expected = torch.func.hessian(lambda v: room.reference(v, tiny).square().sum())(vertices)
+    expected = torch.func.hessian(lambda v: kind.reference(v, tiny).square().sum())(vertices)
     scale = expected.abs().max() + 1e-300
     for name, hessian in (
         ("forward over reverse", torch.func.hessian(f)(vertices)),
@@ -54,19 +54,19 @@ def test_hessian_four_ways(room, tiny):
         assert ((hessian - expected).abs().max() / scale).item() < 1e-9, name
 
 
-def test_jacobians_agree(room, tiny):
+def test_jacobians_agree(kind, tiny):
     vertices = tiny.vertices[:2]
-    forward = torch.func.jacfwd(lambda v: room(v, tiny))(vertices)
-    reverse = torch.func.jacrev(lambda v: room(v, tiny))(vertices)
+    forward = torch.func.jacfwd(lambda v: kind(v, tiny))(vertices)
+    reverse = torch.func.jacrev(lambda v: kind(v, tiny))(vertices)
     torch.testing.assert_close(forward, reverse, rtol=1e-9, atol=1e-9 * reverse.abs().max().item())
 
 
-def test_per_body_gradients(room, tiny):
+def test_per_body_gradients(kind, tiny):
     """vmap over bodies of func.grad is the gradient of the sum, body by body."""
     vertices = tiny.vertices
 
     def scalar(v):
-        return room(v, tiny).square().sum()
+        return kind(v, tiny).square().sum()
 
     mapped = torch.func.vmap(torch.func.grad(scalar))(vertices)
     together = torch.func.grad(scalar)(vertices)
@@ -86,10 +86,10 @@ def test_vmap_over_the_ground(tiny):
     assert torch.equal(mapped, torch.stack([loss(height) for height in heights]))
 
 
-def test_vmap_along_another_axis(room, tiny):
+def test_vmap_along_another_axis(kind, tiny):
     vertices = tiny.vertices
-    mapped = torch.func.vmap(lambda v: room(v, tiny), in_dims=1, out_dims=1)(vertices.transpose(0, 1))
-    assert torch.equal(mapped.movedim(1, 0), torch.stack([room(v, tiny) for v in vertices]))
+    mapped = torch.func.vmap(lambda v: kind(v, tiny), in_dims=1, out_dims=1)(vertices.transpose(0, 1))
+    assert torch.equal(mapped.movedim(1, 0), torch.stack([kind(v, tiny) for v in vertices]))
 
 
 def test_third_derivatives_are_refused(tiny):

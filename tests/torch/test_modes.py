@@ -25,11 +25,11 @@ def fresh_compiler():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", ["compiled core", "reference"])
-def test_compile_fullgraph(room, tiny, path):
+def test_compile_fullgraph(kind, tiny, path):
     """One graph, forward and backward, on both paths. The backend is the tracer alone: no C++ compiler is needed."""
     forced = ipt.dispatch._reference_path
 
-    quantity = room.on(tiny)
+    quantity = kind.on(tiny)
 
     def f(v):
         return evaluate(v, tiny.template, tiny.ground, quantity)
@@ -82,62 +82,62 @@ def test_compile_inductor(tiny):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("verb", ["value", "vjp", "jvp", "hvp", "value_and_vjp"])
-def test_opcheck(room, tiny, verb):
+def test_opcheck(kind, tiny, verb):
     vertices, batch = tiny.vertices, len(tiny.vertices)
     normal, height = tiny.ground.normal.expand(batch, 3), tiny.ground.height.expand(batch)
-    d_out = torch.randn(batch, room.size(tiny), dtype=torch.float64)
+    d_out = torch.randn(batch, kind.size(tiny), dtype=torch.float64)
     more = {"vjp": [d_out], "jvp": [vertices], "hvp": [d_out, vertices], "value_and_vjp": [d_out]}.get(verb, [])
-    arguments = (vertices, normal, height, *more, tiny.template._key, room.quantity, list(room.options))
+    arguments = (vertices, normal, height, *more, tiny.template._key, kind.quantity, list(kind.options))
     torch.library.opcheck(getattr(torch.ops.ipman_rs, verb).default, arguments)
 
 
-def test_autocast_computes_in_single_precision(room, tiny):
+def test_autocast_computes_in_single_precision(kind, tiny):
     """float32 stays as it is; half goes through float32 and comes back."""
     vertices = tiny.vertices.float()
-    plain = room(vertices, tiny)
+    plain = kind(vertices, tiny)
     with torch.autocast("cpu", torch.bfloat16):
-        assert torch.equal(room(vertices, tiny), plain)
+        assert torch.equal(kind(vertices, tiny), plain)
         half = vertices.bfloat16()
-        assert torch.equal(room(half, tiny), room(half.float(), tiny).bfloat16())
+        assert torch.equal(kind(half, tiny), kind(half.float(), tiny).bfloat16())
     with torch.autocast("cpu", torch.bfloat16), ipt.dispatch._reference_path():
-        torch.testing.assert_close(room(vertices, tiny), plain, rtol=1e-4, atol=1e-4 * plain.abs().max().item())
+        torch.testing.assert_close(kind(vertices, tiny), plain, rtol=1e-4, atol=1e-4 * plain.abs().max().item())
 
 
 @pytest.mark.parametrize("dtype", [torch.float64, torch.float32, torch.bfloat16, torch.float16])
-def test_dtype_of_values_and_gradients(room, tiny, dtype):
+def test_dtype_of_values_and_gradients(kind, tiny, dtype):
     vertices = tiny.vertices.clone().to(dtype).requires_grad_()
-    value = room(vertices, tiny)
+    value = kind(vertices, tiny)
     assert value.dtype == dtype
     value.float().nan_to_num(posinf=0, neginf=0).sum().backward()
     assert vertices.grad.dtype == dtype
     assert vertices.grad.isfinite().all()
 
 
-def test_outputs_share_no_memory_with_inputs(room, tiny):
+def test_outputs_share_no_memory_with_inputs(kind, tiny):
     vertices = tiny.vertices.clone().requires_grad_()
-    value = room(vertices, tiny)
+    value = kind(vertices, tiny)
     d_out = torch.ones_like(value)
     (gradient,) = torch.autograd.grad(value, vertices, d_out)
     places = [tensor.untyped_storage().data_ptr() for tensor in (vertices, value, d_out, gradient)]
     assert len(set(places)) == len(places)
 
 
-def test_strange_memory(room, tiny):
+def test_strange_memory(kind, tiny):
     """Non-contiguous vertices, a zero-stride upstream gradient, a negated view."""
-    expected, slope = room(tiny.vertices, tiny), gradient_of(lambda v: room(v, tiny), tiny.vertices)
+    expected, slope = kind(tiny.vertices, tiny), gradient_of(lambda v: kind(v, tiny), tiny.vertices)
     strided = tiny.vertices.transpose(0, 2).contiguous().transpose(0, 2)
     assert not strided.is_contiguous()
-    assert torch.equal(room(strided, tiny), expected)
-    assert torch.equal(gradient_of(lambda v: room(v, tiny), strided), slope)
+    assert torch.equal(kind(strided, tiny), expected)
+    assert torch.equal(gradient_of(lambda v: kind(v, tiny), strided), slope)
 
     vertices = tiny.vertices.clone().requires_grad_()
-    (ones,) = torch.autograd.grad(room(vertices, tiny), vertices, torch.ones_like(expected))
-    (zero_stride,) = torch.autograd.grad(room(vertices, tiny).sum(), vertices)
+    (ones,) = torch.autograd.grad(kind(vertices, tiny), vertices, torch.ones_like(expected))
+    (zero_stride,) = torch.autograd.grad(kind(vertices, tiny).sum(), vertices)
     assert torch.equal(ones, zero_stride)
 
     negated = torch.conj(torch.complex(torch.zeros_like(tiny.vertices), -tiny.vertices)).imag
     assert negated.is_neg()
-    assert torch.equal(room(negated, tiny), expected)
+    assert torch.equal(kind(negated, tiny), expected)
 
 
 def test_a_template_lives_until_the_backward(tiny):

@@ -14,9 +14,7 @@ from .analysis import body_status as body_status
 from .body import BodyModel as BodyModel
 from .camera import camera_to_world as camera_to_world
 from .ground import Ground as Ground
-from .losses import balance_cost as balance_cost
-from .losses import ground_loss as ground_loss
-from .losses import stability_loss as stability_loss
+from .losses import *  # noqa: F403 - its __all__
 from .mass import center_of_mass as center_of_mass
 from .physics_loss import IntuitivePhysicsLoss as IntuitivePhysicsLoss
 from .pressure import center_of_pressure as center_of_pressure

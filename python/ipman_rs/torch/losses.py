@@ -11,6 +11,8 @@ from ipman_rs.quantities import Curve, Method, Points, Wrap
 from .dispatch import evaluate
 from .ground import Ground
 
+__all__ = ["balance_cost", "ground_loss", "stability_loss"]  # what `ipman_rs.torch` has of this module
+
 
 def stability_loss(
     vertices: Tensor,

@@ -1,4 +1,4 @@
-"""From a quantity's name to its formula: the one list that a new quantity joins."""
+"""From a quantity's name to its formula: the list that a new quantity joins, and that of a new loss."""
 
 from __future__ import annotations
 
@@ -53,6 +53,13 @@ def _pull_and_push(*args: Any) -> Tensor:
     return torch.stack(ground_loss(*args), dim=-1)
 
 
+# Of each loss, its numbers (B, K), by its name among the terms of `IntuitivePhysicsLoss`.
+TERMS: dict[str, Formula] = {
+    "stability": lambda body, plane, o, method: _column(stability_loss, body, plane, *o, method),
+    "balance": lambda body, plane, o, wrap, method: _column(balance_cost, body, plane, *o, wrap, method),
+    "ground": lambda body, plane, o, points, curve: _pull_and_push(body, plane, *o, points, curve),
+}
+
 FORMULAS: dict[str, Formula] = {
     "part_volumes": lambda body, _, __: part_volumes(body),
     "mass_properties": lambda body, _, density: mass_properties(body, density).flatten(1),
@@ -61,17 +68,8 @@ FORMULAS: dict[str, Formula] = {
     "pressure": lambda body, plane, o: pressure(body, plane, *o),
     "center_of_pressure": lambda body, plane, o: center_of_pressure(body, plane, *o),
     "support_margin": lambda body, plane, o, contact, method: _column(support_margin, body, plane, *o, method, contact),
-    "stability_loss": lambda body, plane, o, method: _column(stability_loss, body, plane, *o, method),
-    "ground_loss": lambda body, plane, o, points, curve: _pull_and_push(body, plane, *o, points, curve),
-    "balance_cost": lambda body, plane, o, wrap, method: _column(balance_cost, body, plane, *o, wrap, method),
     "terms": lambda body, plane, o, *words: _terms(body, plane, o, words),
-}
-
-# Of each term that `IntuitivePhysicsLoss` may have, its numbers (B, K).
-TERMS: dict[str, Formula] = {
-    "stability": FORMULAS["stability_loss"],
-    "balance": FORMULAS["balance_cost"],
-    "ground": FORMULAS["ground_loss"],
+    **{DESCRIBED[name].quantity: formula for name, formula in TERMS.items()},
 }
 
 

@@ -1,4 +1,4 @@
-"""docs/extending/a_term_of_the_fused_loss.md, carried out in a copy of the repository."""
+"""docs/extending/adding_a_loss.md and a_term_of_the_fused_loss.md, carried out in a copy of the repository."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.extending import ROOT, Page, run
+
 pytest.importorskip("torch")
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "extending" / "a_term_of_the_fused_loss.md"
-RUST, PYTHON = Path("rust/core/src/losses"), Path("python/ipman_rs/torch/reference")
+TERM = (ROOT / "docs/extending/a_term_of_the_fused_loss.md").read_text()
+OF_A_TERM = 2  # of the loss's edits
 
 # The values and the gradients of all terms, from the core and from the reference, on a body that leans over its ground.
 COMPARE = """
@@ -61,6 +62,9 @@ loss = ipt.IntuitivePhysicsLoss(tiny, crouching)
 corner = torch.tensor({tetrahedron}[0], dtype=torch.float64).requires_grad_()
 assert torch.autograd.gradcheck(total, corner, check_forward_ad=True)
 assert torch.autograd.gradgradcheck(total, corner)
+alone = ipt.height_loss(still, body.template, ground)
+assert torch.equal(alone, with_height["height"])
+assert np.array_equal(ip.height_loss(still.numpy(), body.template, ip.Ground((0.1, 1.0, 0.05), 0.01)), alone.numpy())
 """
 TETRAHEDRON = (
     "([[0.0, 0.01, 0.0], [1.0, 0.0, 0.1], [0.1, 0.02, 1.0], [0.2, 1.0, 0.3]], "
@@ -68,54 +72,43 @@ TETRAHEDRON = (
 )
 
 
-def blocks() -> list[str]:
-    """The blocks of code of the page, in its order."""
-    return re.findall(r"```(?:rust|python)\n(.*?)```", PAGE.read_text(), re.DOTALL)
-
-
-def after(file: Path, line: str, added: str) -> None:
-    """Inserts text after a line that stands there once."""
-    text = file.read_text()
-    assert text.count(line) == 1, (file, line)
-    file.write_text(text.replace(line, line + added))
-
-
-def test_every_path_is_there():
-    """But for the two files that the reader is to write."""
-    paths = re.findall(r"`((?:rust|python|tests)/[\w/.]+)`", PAGE.read_text())
-    missing = {path for path in paths if not (ROOT / path).exists()}
-    assert missing == {str(RUST / "height.rs"), str(PYTHON / "height.py")}
+def test_as_many_files_as_the_pages_say():
+    page = Page.read("adding_a_loss.md")
+    assert (len(page.files), len(page.edits)) == page.claim == (2, 5)
+    assert [path for path in page.files if (ROOT / path).exists()] == []
+    said = re.search(r"(\d+) new files and (\d+) edits", TERM)
+    assert said is not None
+    assert (int(said[1]), int(said[2])) == (len(page.files), OF_A_TERM)
+    named = set(re.findall(r"`((?:rust|python)/[\w/.]+)`", TERM.split("## What the")[0]))
+    assert named == {*page.files, *list(page.edits)[:OF_A_TERM]}
 
 
 @pytest.mark.slow
-def test_the_page_adds_a_term(tmp_path):
+def test_the_pages_add_a_loss_that_is_a_term(tmp_path):
     if shutil.which("cargo") is None:
         pytest.skip("cargo is not installed")
-    formula, module, listed, reference, imported, named, use = blocks()
+    page = Page.read("adding_a_loss.md")
     for name in ("Cargo.toml", "Cargo.lock"):
         shutil.copy(ROOT / name, tmp_path)
-    for name in ("rust", "python"):
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("*.so", "__pycache__"))
-
-    (tmp_path / RUST / "height.rs").write_text(formula)
-    after(tmp_path / RUST / "mod.rs", "pub mod ground;\n", module)
-    after(tmp_path / RUST / "mod.rs", "    Ground(ground::GroundLoss),\n", listed)
-    (tmp_path / PYTHON / "height.py").write_text(reference)
-    after(tmp_path / PYTHON / "quantities.py", "from .ground import ground_loss\n", imported)
-    after(tmp_path / PYTHON / "quantities.py", '    "ground": FORMULAS["ground_loss"],\n', named)
+    for name in ("rust", "tests"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
+    copy = page.carry_out(tmp_path)
 
     # In the folder of the repository's own builds, where the crates that ours depend on are compiled already.
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     build = ["cargo", "build", "--release", "--locked", "-p", "ipman-py", "--target-dir", str(target)]
-    done = subprocess.run(build, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(build, cwd=copy, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     library = {"darwin": "lib_core.dylib", "win32": "_core.dll"}.get(sys.platform, "lib_core.so")
     extension = "_core.pyd" if sys.platform == "win32" else "_core.abi3.so"
-    shutil.copy(target / "release" / library, tmp_path / "python" / "ipman_rs" / extension)
+    shutil.copy(target / "release" / library, copy / "python" / "ipman_rs" / extension)
 
-    script = COMPARE.format(use=use, tetrahedron=TETRAHEDRON)
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "python"), "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+    (use,) = re.findall(r"```python\n(.*?)```", TERM, re.DOTALL)
+    run(copy, "-c", COMPARE.format(use=use, tetrahedron=TETRAHEDRON))
+    ((_, command),) = page.tries
+    python, *words = command.split()
+    assert python == "python"
+    said = run(copy, *words, "-q", "-p", "no:cacheprovider", "-m", "not slow")
+    passed = re.search(r"(\d+) passed", said)
+    assert passed is not None
+    assert int(passed[1]) > 50  # some in each of the five modes
