@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from .errors import one_line_errors
 from .options import PRESETS, Setting, degrees, force, units
 
 if TYPE_CHECKING:
-    from ..evaluation.tables.job import Job, Shard
-    from ..evaluation.tables.paper import Table
+    from ..evaluation.tables import Evaluation
 
 # Kept equal to `ipman_rs.evaluation.tables.paper.TABLES` by a test.
 TABLES = ("rich", "h36m", "moyo", "biomech", "com", "3dpw", "push-pull", "rich-o-star")
@@ -86,121 +85,39 @@ def evaluate(
 
     Exit code: 0 when all is well (also of a shard), 1 when something could not be read or measured, 2 for wrong usage.
     """
-    from . import console
-
     if ray and shard:
         raise click.UsageError("--ray does all shards: leave out --shard")
-    try:
-        table, jobs = _jobs(predictions, output, given)
-        _evaluate(jobs, table, output, shard, ray)
-    except (ValueError, ImportError) as error:
-        console.error(str(error))
-        sys.exit(1)
-    except MemoryError:
-        console.error("there is not enough memory; is something else running? What is done is kept")
-        sys.exit(1)
-    except OSError as error:
-        console.error(f"{error.filename or output}: {error.strerror or error}; what is done is kept")
-        sys.exit(1)
+    with one_line_errors(output, "what is done is kept"):
+        from ..evaluation.tables import TABLES as PAPER
+        from ..evaluation.tables import evaluation
+
+        name = given["data"] or (None if given["table"] is None else PAPER[given["table"]].data)
+        if name is None:
+            raise click.UsageError("Missing option '--data', the data set, or '--table', one of the paper's.")
+        if given["path"] is None:
+            raise click.UsageError(f"Missing option '--path', where {name} is.")
+        given["options"] = dict(given["options"])
+        _evaluate(evaluation(predictions, output, unit=given.pop("units"), **given), shard, ray)
 
 
-def _jobs(predictions: tuple[Path, ...], output: Path, given: dict[str, Any]) -> tuple[Table | None, list[Job]]:
-    from ..evaluation.tables.job import Job, Source, methods
-    from ..evaluation.tables.paper import TABLES as PAPER
-
-    table = None if given["table"] is None else PAPER[given["table"]]
-    name = given["data"] or (table.data if table else None)
-    if name is None:
-        raise click.UsageError("Missing option '--data', the data set, or '--table', one of the paper's.")
-    if given["path"] is None:
-        raise click.UsageError(f"Missing option '--path', where {name} is.")
-    split = given["split"] or (table.split if table is not None and name == table.data else None)
-    defaults = table.options if table is not None and name == table.data else {}
-    source = Source(name, str(given["path"]), split, tuple({**defaults, **dict(given["options"])}.items()))
-    shared = {
-        "models": None if given["models"] is None else str(given["models"]),
-        "regressors": tuple(str(path) for path in given["regressors"]),
-        "preset": given["preset"],
-        "partial": given["partial"],
-        "unit": given["units"],
-        "degrees": given["degrees"],
-        "force": given["force"],
-        "folder": str(output),
-    }
-    names = methods(predictions)
-    return table, [Job(name, str(path), source, **shared) for name, path in zip(names, predictions, strict=True)]
-
-
-def _evaluate(jobs: list[Job], table: Table | None, output: Path, shard: tuple[int, int] | None, ray: bool) -> None:
-    from ..evaluation.tables.job import Shard
+def _evaluate(whole: Evaluation, shard: tuple[int, int] | None, ray: bool) -> None:
+    from ..evaluation.tables import Shard, report
     from . import console
 
-    for job in jobs:
-        job.begin()
-        for number in job.damaged():
-            console.warn(f"{job.file(number)}: is not whole, or of another evaluation; it is measured again")
-        for flag in job.flags:
-            console.warn(f"{job.predictions}: {flag}")
-    _measure(jobs, Shard(*shard) if shard else Shard(), ray)
-    missing = sum(len(job.missing()) for job in jobs)
-    if missing:
-        every = sum(job.pieces for job in jobs)
-        console.say(f"{every - missing} of {every} pieces are there; the other shards have the rest")
-        return
-    _report(jobs, table, output)
-
-
-def _measure(jobs: list[Job], shard: Shard, ray: bool) -> None:
-    from . import console
-
-    todo = sum(job.frames(number) for job in jobs for number in shard.of(job.pieces) if not job.done(number))
+    for warning in whole.begin():
+        console.warn(warning)
     begun = time.perf_counter()
-    with console.progress("measuring", todo) as step:
-        count = _counter(step)
-        if ray:
-            from ..evaluation.tables import on_ray
-
-            on_ray.run(jobs, count)
-        else:
-            for job in jobs:
-                job.run(shard, count)
+    done = whole.measure(Shard(*shard) if shard else Shard(), ray, console.progress)
     seconds = time.perf_counter() - begun
-    if todo:
-        console.say(f"{todo:,} frames in {seconds:.1f} s: {todo / seconds:,.0f} a second")
-
-
-def _report(jobs: list[Job], table: Table | None, output: Path) -> None:
-    from ..evaluation.tables import report
-    from ..evaluation.tables.summary import difference, measured
-    from . import console
-
-    frames = sum(len(job.data) for job in jobs)
-    with console.progress("adding up", 2 * frames - len(jobs[0].data)) as step:
-        count = _counter(step)
-        found = [measured(job, count) for job in jobs]
-        differences = [difference(job, jobs[0], count) for job in jobs[1:]]
-    source = jobs[0].source
-    title = table.title if table else f"{' and '.join(job.name for job in jobs)} on {source.name}"
-    parts = [source.name, *([source.split] if source.split else []), *(f"{k}={v}" for k, v in source.options)]
-    where = f"Data: {', '.join(parts)}, {len(jobs[0].data):,} frames ({source.path})."
-    definitions = {job.name: job.definition for job in jobs}
-    flags = {job.name: job.flags for job in jobs}
-    made = report.Report(title, where, found, differences, table, definitions, flags)
-    with console.progress("writing", frames) as step:
-        written = report.write(made, output, jobs, _counter(step))
-    console.print_rows(*report.rows(made))
+    if done:
+        console.say(f"{done:,} frames in {seconds:.1f} s: {done / seconds:,.0f} a second")
+    if whole.missing:
+        here = whole.pieces - whole.missing
+        console.say(f"{here} of {whole.pieces} pieces are there; the other shards have the rest")
+        return
+    summary = whole.report(console.progress)
+    written = whole.write(summary, console.progress)
+    console.print_rows(*report.rows(summary))
     if not any(path.suffix == ".parquet" for path in written):
         console.say("frames.parquet is left out: it needs pyarrow (pip install 'ipman_rs[evaluate]')")
     console.say(f"report: {written[0].resolve()}")
-
-
-def _counter(step: Any) -> Any:
-    """`count(n)`: n more are done."""
-    done = 0
-
-    def count(more: int) -> None:
-        nonlocal done
-        done += more
-        step.to(done)
-
-    return count

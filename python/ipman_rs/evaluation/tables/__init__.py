@@ -3,11 +3,13 @@
 from .job import Job, Shard, Source
 from .paper import TABLES, Table
 from .predictions import Predictions, read
+from .run import Evaluation, evaluate, evaluation
 from .summary import Difference, Measured, difference, measured
 
 __all__ = [
     "TABLES",
     "Difference",
+    "Evaluation",
     "Job",
     "Measured",
     "Predictions",
@@ -15,6 +17,8 @@ __all__ = [
     "Source",
     "Table",
     "difference",
+    "evaluate",
+    "evaluation",
     "measured",
     "read",
 ]
