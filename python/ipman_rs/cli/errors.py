@@ -11,22 +11,23 @@ from ..files.errors import FileError
 
 
 @contextmanager
-def one_line_errors(output: Path, advice: str = "") -> Iterator[None]:
+def one_line_errors(output: Path, advice: str = "", memory: str = "") -> Iterator[None]:
     """Ends the command where something could not be read or written, or something is missing.
 
-    advice: after what is wrong with a disk or with memory, such as what is kept.
+    advice: after what is wrong with a disk or with memory, such as what is kept. memory: after the latter alone.
     """
     from concurrent.futures.process import BrokenProcessPool
 
     from . import console
 
     end = f"; {advice}" if advice else ""
+    fewer = f"; {memory}" if memory else end
     try:
         yield
     except (FileError, ValueError, ImportError) as error:
         console.error(str(error))
     except MemoryError:
-        console.error(f"there is not enough memory{end}")
+        console.error(f"there is not enough memory{fewer}")
     except BrokenProcessPool:
         console.error("a process ended too early, for want of memory perhaps; the same command, with fewer -j, goes on")
     except OSError as error:
