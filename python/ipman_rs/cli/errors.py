@@ -48,3 +48,12 @@ def writing(output: Path, what: str = "") -> Iterator[None]:
         said = f"{what} cannot be written" if what else "cannot be written"
         console.error(f"{output}: {said} ({error.strerror or error}); choose another folder")
         sys.exit(1)
+
+
+@contextmanager
+def extra(name: str) -> Iterator[None]:
+    """ImportError that names the extra with what cannot be imported."""
+    try:
+        yield
+    except ImportError as error:
+        raise ImportError(f"{error.name} is needed: pip install 'ipman_rs[{name}]'") from error

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .errors import one_line_errors
+from .errors import extra, one_line_errors
 from .options import of_unknown_camera
 
 if TYPE_CHECKING:
@@ -80,11 +80,9 @@ def predict(
     if box and whole:
         raise click.UsageError("expected --box or --whole, not both")
     with one_line_errors(output):
-        try:
+        with extra("train"):
             from ..training import predicted_images as library
             from ..training.predict import Trained
-        except ImportError as error:
-            raise ImportError(f"{error.name} is needed: pip install 'ipman_rs[train]'") from error
         trained = Trained.load(checkpoint)
         if data is not None and path is not None:
             of_data = {"split": split, "images": image_folder, "regressor": regressor, "progress": console.progress}
