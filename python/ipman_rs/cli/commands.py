@@ -110,22 +110,13 @@ main.add_command(figure)
 @_preset
 def demo(output: Path, preset: str) -> None:
     """Analyse the named poses of the built-in body: a table here, the report in the output folder."""
-    import numpy as np
-
     import ipman_rs as ip
 
-    from .. import view
+    from ..study.named_poses import named_poses
     from . import console
     from .report import write
 
-    body = ip.load_body("anny")
-    names = ip.body.poses.NAMES
-    with console.progress("posing and measuring", len(names)) as step:
-        vertices = np.stack([ip.body.posed(body, name) for name in names])
-        study = view.study(
-            "Named poses", vertices, body.template, ip.Ground.y_up(), preset, labels=names, progress=step.to,
-            source="the built-in body “anny”, y up, standing on the plane y = 0",
-        )  # fmt: skip
+    study = named_poses(ip.load_body("anny"), preset, console.progress)
     page = write([study], output, [])
     console.print_table([study])
     console.say(f"report: {page}")

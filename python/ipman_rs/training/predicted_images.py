@@ -22,7 +22,7 @@ from ipman_rs.io import write_mesh
 from ipman_rs.progress import Progress, silent
 from ipman_rs.study import Fitted, Study, camera_of, study
 
-from .predict import Trained
+from .predict import Trained as Trained
 
 Box = tuple[float, float, float, float]  # x, y, width, height in pixels
 BoxOf = Callable[[Path, NDArray[np.uint8]], Box]  # of an image's path and pixels (h, w, 3)
