@@ -25,6 +25,7 @@ BLOCKS = {  # command -> page, and which of its blocks
     "data render": ("rendered", 0),
     "data check": ("data", 0),
     "validate": ("data", 1),
+    "fit": ("fitting", 0),
     "train": ("training", 0),
     "predict": ("training", 1),
     "benchmark": ("training", 2),
@@ -167,3 +168,13 @@ def test_benchmark(run, tmp_path):
     assert run("benchmark", smaller).strip() == "out/training_benchmark.md"
     record = json.loads((tmp_path / "out/training_benchmark.json").read_text())
     assert [each["tilt"] for each in record["blocks"]] == [0]
+
+
+@pytest.mark.slow
+def test_fit(run, tmp_path):
+    pytest.importorskip("torch", reason="torch is an extra")
+    example = Path(ip.__file__).parent / "fitting/examples/basketball.json"
+    shorter = {"python/ipman_rs/fitting/examples/basketball.json": str(example), '="fast"': '="fast", iterations=2'}
+    assert run("fit", shorter).strip().endswith("[]")
+    record = json.loads((tmp_path / "out/fits/report.json").read_text())
+    assert len(record["bodies"]) == 1

@@ -12,7 +12,7 @@ import ipman_rs as ip
 from ipman_rs.body import poses
 from ipman_rs.cli import evaluate as command
 from ipman_rs.evaluation.tables import TABLES, job
-from ipman_rs.evaluation.tables.metrics import FIGURES
+from ipman_rs.evaluation.tables.metrics import METRICS
 
 FRAMES = 30
 
@@ -88,12 +88,12 @@ def test_every_table_is_printed(table, run, folder, own, tmp_path):
     assert done.code == 0, done.err
     page = (tmp_path / "out" / "evaluation.md").read_text()
     assert page.startswith(f"# {TABLES[table].title}\n")
-    for name in TABLES[table].figures:
-        assert FIGURES[name].title in page
+    for name in TABLES[table].metrics:
+        assert METRICS[name].title in page
     for method, printed in TABLES[table].published.items():
         assert f"{method} (printed)" in page
         for name, value in printed.items():
-            assert f" {value:.{FIGURES[name].digits}f} |" in page
+            assert f" {value:.{METRICS[name].digits}f} |" in page
 
 
 @pytest.mark.slow
@@ -177,6 +177,6 @@ def test_files_that_are_wrong(run, folder, own, tmp_path):
 
 def test_the_names_of_tables_are_one(run):
     assert tuple(TABLES) == command.TABLES
-    assert all(name in FIGURES for table in TABLES.values() for name in table.figures)
-    assert all(name in table.figures for table in TABLES.values() for row in table.published.values() for name in row)
+    assert all(name in METRICS for table in TABLES.values() for name in table.metrics)
+    assert all(name in table.metrics for table in TABLES.values() for row in table.published.values() for name in row)
     assert "ipman evaluate hmr.npz --table rich" in run("evaluate", "--help").out

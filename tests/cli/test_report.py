@@ -12,11 +12,11 @@ import pytest
 import ipman_rs as ip
 from ipman_rs import view
 from ipman_rs.cli.options import PRESETS
+from ipman_rs.files import safe_names
 from ipman_rs.study.camera import look_at
 from ipman_rs.view import colors
 from ipman_rs.view.geometry import pressure_at
 from ipman_rs.view.raster import rasterize
-from ipman_rs.view.report import safe_names
 from tests.helpers.cli_files import report, strict, walk_parameters
 
 

@@ -152,9 +152,9 @@ def test_a_recording_that_fails_for_no_known_reason_takes_no_other_with_it(folde
             raise AssertionError
         return {"name": one.trial.name}
 
-    monkeypatch.setattr(validation_run, "_fitted", lambda *_: {"notes": []})
-    monkeypatch.setattr(validation_run, "_compared", compared)
-    monkeypatch.setattr(validation_run, "_weighs", lambda _: False)
+    monkeypatch.setattr(validation_run, "_fit", lambda *_: {"notes": []})
+    monkeypatch.setattr(validation_run, "_compare", compared)
+    monkeypatch.setattr(validation_run, "_gives_weight", lambda _: False)
     found, _, failures = validation_run.run(plan)
     assert [one["name"] for one in found] == ["lift"]
     assert [str(each) for each in failures] == [
@@ -213,7 +213,7 @@ def test_forces_in_other_axes_than_the_markers(person, tmp_path):
     mot(lab / "walk_grf.mot", np.array([x, -z, y]), lambda _t: MASS * G, up="z")
     for up in (None, (0.0, 0.0, 1.0)):
         plan = validation_run.plan(lab, tmp_path / "out", "anny-lite", "none", 10.0, True, force_up=up)
-        told = validation_run.Told()
+        told = validation_run.RunLog()
         found = validation_run._read(plan, plan.trials[0], told)
         if up is None:
             assert "walk_grf.mot: looks like z up" in str(told.failures[0])

@@ -31,7 +31,7 @@ def levels(found):
 @pytest.mark.parametrize("up", [(0, 0, 1), (0, 1, 0), (0, -1, 0), (0.6, 0, 0.8)])
 def test_people_who_stand_are_right(up):
     up = tuple(map(float, up))
-    assert levels(check.of_frames(people(up=up))) == {"ok"}
+    assert levels(check.check_frames(people(up=up))) == {"ok"}
 
 
 @pytest.mark.parametrize("true", range(3))
@@ -54,9 +54,9 @@ def test_axes_from_the_root_of_a_body_model():
         pose = np.zeros((20, 24, 3))
         pose[:, 0] = [stick.root(up, heading) for heading in np.linspace(0, 6, 20)]
         frames = people(joints=None, joint_names=None, pose=pose, body="smpl", ground=ip.Ground(up))
-        assert levels(check.of_frames(frames)) == {"ok"}
+        assert levels(check.check_frames(frames)) == {"ok"}
         wrong = people(joints=None, joint_names=None, pose=pose, body="smpl", ground=ip.Ground((0, 1, 0)))
-        assert any(f"pose: looks like {name} up" in each.what for each in check.of_frames(wrong))
+        assert any(f"pose: looks like {name} up" in each.what for each in check.check_frames(wrong))
 
 
 def test_people_who_lie_give_no_verdict():
@@ -73,7 +73,7 @@ def test_people_who_lie_give_no_verdict():
     ("factor", "unit"), [(1000, "millimetres"), (100, "centimetres"), (0.01, "no unit"), (1e5, "no unit")]
 )
 def test_unit_is_named(factor, unit):
-    found = check.of_frames(people(joints=people().joints * factor))
+    found = check.check_frames(people(joints=people().joints * factor))
     assert any(each.level == "wrong" and unit in each.what for each in found)
 
 
@@ -84,7 +84,7 @@ def test_children_and_giants_are_metres(size):
 
 def test_floor_of_another_height():
     for height in (-1.0, 1.0):
-        found = check.of_frames(people(ground=ip.Ground.z_up(height)))
+        found = check.check_frames(people(ground=ip.Ground.z_up(height)))
         side = "above" if height < 0 else "below"
         assert any(each.level == "wrong" and f"m {side} the ground" in each.what for each in found)
 
@@ -93,8 +93,8 @@ def test_a_floor_for_each_frame():
     heights = np.linspace(-3, 3, 20)
     frames = people()
     joints = frames.joints + heights[:, None, None] * (0, 0, 1)
-    assert levels(check.of_frames(people(joints=joints, ground=ip.Ground.z_up(heights)))) == {"ok"}
-    assert levels(check.of_frames(people(joints=joints, ground=ip.Ground.z_up(heights + 1)))) == {"ok", "wrong"}
+    assert levels(check.check_frames(people(joints=joints, ground=ip.Ground.z_up(heights)))) == {"ok"}
+    assert levels(check.check_frames(people(joints=joints, ground=ip.Ground.z_up(heights + 1)))) == {"ok", "wrong"}
 
 
 def view(up=(0.0, 0.0, 1.0), eye=(4.0, 1.0, 1.5)):
@@ -109,7 +109,7 @@ def view(up=(0.0, 0.0, 1.0), eye=(4.0, 1.0, 1.5)):
 def test_cameras_against_keypoints():
     cameras, keypoints = view()
     labelled = {"keypoints": keypoints, "keypoint_names": NAMES}
-    right = check.of_frames(people(cameras=cameras, **labelled))
+    right = check.check_frames(people(cameras=cameras, **labelled))
     assert levels(right) == {"ok"}
     assert any("lie 0.0 pixels from the keypoints" in each.what for each in right)
     inverse = Cameras(
@@ -124,7 +124,7 @@ def test_cameras_against_keypoints():
         Cameras(cameras.rotation * (1, -1, 1), cameras.translation, cameras.intrinsics),
         Cameras(cameras.rotation, cameras.translation + (1, 0, 0), cameras.intrinsics),
     ):
-        assert "wrong" in levels(check.of_frames(people(cameras=wrong, **labelled)))
+        assert "wrong" in levels(check.check_frames(people(cameras=wrong, **labelled)))
 
 
 def test_nan_is_told_and_passed_over():
@@ -137,13 +137,13 @@ def test_nan_is_told_and_passed_over():
         ("ok", "joints: 1 of 20 frames have none"),
         ("missing", "joints: NaN or infinity among the numbers of 1 of 20 frames"),
     ]
-    assert "wrong" not in levels(check.of_frames(people(joints=joints)))
+    assert "wrong" not in levels(check.check_frames(people(joints=joints)))
     every = np.full_like(joints, np.nan)
-    assert "wrong" not in levels(check.of_frames(people(joints=every)))
+    assert "wrong" not in levels(check.check_frames(people(joints=every)))
 
 
 def test_no_frames():
-    found = check.of_frames(people()[:0])
+    found = check.check_frames(people()[:0])
     assert [each.level for each in found] == ["wrong"]
 
 
@@ -154,16 +154,18 @@ def test_real_bodies_are_right():
     frames = Frames(
         np.array(ip.body.poses.NAMES), np.array(ip.body.poses.NAMES), ground=ip.Ground.y_up(), vertices=vertices
     )
-    assert levels(check.of_frames(frames)) == {"ok"}
-    found = check.of_frames(Frames(frames.names, frames.sequences, ground=ip.Ground.z_up(), vertices=1000 * vertices))
+    assert levels(check.check_frames(frames)) == {"ok"}
+    found = check.check_frames(
+        Frames(frames.names, frames.sequences, ground=ip.Ground.z_up(), vertices=1000 * vertices)
+    )
     assert any("looks like millimetres" in each.what for each in found)
 
 
 def test_demand_tells_all_that_is_wrong():
     found = [check.Finding("missing", "a"), check.Finding("wrong", "b", "do c"), check.Finding("wrong", "d")]
     with pytest.raises(ValueError, match=r"^some/file: b; do c\. d$"):
-        check.demand(Path("some/file"), found)
-    check.demand("some/file", found[:1])
+        check.raise_if_wrong(Path("some/file"), found)
+    check.raise_if_wrong("some/file", found[:1])
 
 
 def test_names_of_data_sets():

@@ -9,7 +9,7 @@ import pytest
 
 import ipman_rs as ip
 from ipman_rs.data import judge
-from ipman_rs.data.check import Finding, place
+from ipman_rs.data.check import Finding, near_origin
 
 UPRIGHT = tuple(name for name in ip.body.poses.NAMES if name != "lying")
 ON_FEET = ("standing", "t_pose", "a_pose", "walking", "one_leg", "warrior", "lunge", "chair", "squat", "kneeling")
@@ -206,7 +206,7 @@ def test_one_body_of_another_size_among_many_is_odd():
 def test_places_of_people_about_the_origin(unit, option):
     draw = np.random.default_rng(0)
     places = unit * np.column_stack([draw.normal(0, 1, 200), np.full(200, 0.9), 2 + draw.normal(0, 1, 200)])
-    assert [each.option for each in place("trans", places)] == ([] if option is None else [option])
+    assert [each.option for each in near_origin("trans", places)] == ([] if option is None else [option])
 
 
 @pytest.mark.parametrize(("metres", "levels"), [(0.02, []), (2.0, ["odd"])])

@@ -426,14 +426,14 @@ def test_names_in_a_tolerant_pickle(tmp_path, name, refusal):
         with pytest.raises(ValueError, match=name.replace(".", r"\.")):
             safe_pickle.read(path, tolerant=True)
     else:
-        assert isinstance(safe_pickle.read(path, tolerant=True)["a"], safe_pickle.Stranger)
+        assert isinstance(safe_pickle.read(path, tolerant=True)["a"], safe_pickle.ForeignObject)
 
 
 def test_strangers_swallow_what_is_put_into_them(tmp_path):
     module = "(dS'a'\ncpandas\nDataFrame\n(tR(S'x'\nI1\nu(I1\nI2\neI3\nas."
     (tmp_path / "a.pkl").write_bytes(module.encode())
     found = safe_pickle.read(tmp_path / "a.pkl", tolerant=True)
-    assert isinstance(found["a"], safe_pickle.Stranger)
+    assert isinstance(found["a"], safe_pickle.ForeignObject)
 
 
 @pytest.mark.parametrize(

@@ -202,7 +202,7 @@ def test_her_template_is_posed_without_betas(sessions, bodies, her, tmp_path, en
     body = ip.load_body(bodies / "SMPLX_FEMALE.npz", flat_hand_mean=True, v_template=her)
     expected = body(frames.pose, None, frames.transl)
     np.testing.assert_allclose(posed.vertices, expected.vertices, atol=1e-6)  # float32 in the .ply
-    np.testing.assert_allclose(posed.own, expected.joints, atol=1e-6)
+    np.testing.assert_allclose(posed.model_joints, expected.joints, atol=1e-6)
     assert (
         np.abs(posed.vertices - Models(bodies).posed(data.open("moyo", sessions, frames="selected")[:]).vertices).max()
         > 0.05

@@ -29,11 +29,11 @@ def test_same_as_numpy(tmp_path, packed, order):
     file = tmp_path / "a.npz"
     (np.savez_compressed if packed else np.savez)(file, **arrays)
     for name, array in arrays.items():
-        for read in (safe_npz.mapped, safe_npz.read):
+        for read in (safe_npz.memory_map, safe_npz.read):
             found = read(file, name)
             np.testing.assert_array_equal(found, array)
             assert found.dtype == array.dtype
-    assert isinstance(safe_npz.mapped(file, "a"), np.memmap) != packed
+    assert isinstance(safe_npz.memory_map(file, "a"), np.memmap) != packed
 
 
 def test_rows_cost_what_is_looked_at(tmp_path):
@@ -77,16 +77,16 @@ def test_archives_that_lie(tmp_path, what):
         content[at : at + 8] = struct.pack("<II", 1 << 30, 1 << 30)
     file.write_bytes(content)
     with pytest.raises(ValueError, match=r"a\.npz: array 'a' cannot be read"):
-        safe_npz.mapped(file, "a")
+        safe_npz.memory_map(file, "a")
 
 
 def test_objects_are_refused(tmp_path):
     file = tmp_path / "a.npz"
     np.savez(file, a=np.array([{"a": 1}], object))
     with pytest.raises(ValueError, match="array 'a' cannot be read: holds Python objects"):
-        safe_npz.mapped(file, "a")
+        safe_npz.memory_map(file, "a")
     with pytest.raises(ValueError, match="array 'b' cannot be read"):
-        safe_npz.mapped(file, "b")
+        safe_npz.memory_map(file, "b")
 
 
 @settings(max_examples=200, deadline=None)
@@ -100,7 +100,7 @@ def test_damaged_bytes_never_do_anything_but_raise(tmp_path_factory, position, v
     content[position % len(content)] = value
     file.write_bytes(content)
     with contextlib.suppress(ValueError):
-        assert safe_npz.mapped(file, "a").nbytes <= len(content)
+        assert safe_npz.memory_map(file, "a").nbytes <= len(content)
 
 
 @settings(max_examples=100, deadline=None)

@@ -106,7 +106,7 @@ def test_people_are_kept_apart():
     assert there == {files[0]: files[2], files[1]: files[3]}
     assert paired(*files[:2], files[3])[0] == {files[1]: files[3]}
     assert pairing.names([ROOT / name for name in files[:2]], ROOT) == ["S1_walk", "S2_walk"]
-    assert [pairing.Place.of(ROOT / name, ROOT).owner for name in files[:2]] == [("S1",), ("S2",)]
+    assert [pairing.ParsedPath.of(ROOT / name, ROOT).owner for name in files[:2]] == [("S1",), ("S2",)]
 
 
 def test_names_of_recordings():
@@ -120,8 +120,13 @@ def test_names_of_recordings():
 
 
 def test_words_that_say_whose_a_file_is():
-    assert pairing.words("grf_Walk-2") == ("walk", "2")
-    assert pairing.words("MarkerData") == pairing.words("ground reaction forces") == pairing.words("OpenSimData") == ()
+    assert pairing.distinctive_words("grf_Walk-2") == ("walk", "2")
+    assert (
+        pairing.distinctive_words("MarkerData")
+        == pairing.distinctive_words("ground reaction forces")
+        == pairing.distinctive_words("OpenSimData")
+        == ()
+    )
 
 
 LOADS = """<?xml version="1.0"?><OpenSimDocument Version="40000"><ExternalLoads name="x"><objects>
@@ -138,7 +143,7 @@ def test_external_loads(tmp_path):
     (tmp_path / "gone.xml").write_text(LOADS.format("ground", "gone.mot"))
     (tmp_path / "foot.xml").write_text(LOADS.format("calcn_r", "kistler.mot"))
     (tmp_path / "broken.xml").write_text("<a>")
-    said, sources, wrong = external_loads.beside(sorted(tmp_path.iterdir()))
+    said, sources, wrong = external_loads.find(sorted(tmp_path.iterdir()))
     assert [*said] == [tmp_path / "kistler.mot"]
     assert said[tmp_path / "kistler.mot"].loads == (external_loads.Load("FP1_F", "FP1_P", ""),)
     assert sources == {tmp_path / "kistler.mot": tmp_path / "walk.xml"}

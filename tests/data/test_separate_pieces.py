@@ -27,7 +27,7 @@ def beside(mesh, other, place):
 
 
 def judged(mesh):
-    return [each.what for each in separate_pieces.judged(mesh.vertices, mesh.faces, np.array([0.0, 1.0, 0.0]))]
+    return [each.what for each in separate_pieces.check_pieces(mesh.vertices, mesh.faces, np.array([0.0, 1.0, 0.0]))]
 
 
 def write(path, mesh, frames):

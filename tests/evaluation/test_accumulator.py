@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ipman_rs.evaluation import Accumulator, reasons
-from ipman_rs.evaluation.statistics.clusters import CLUSTERS, pooled
+from ipman_rs.evaluation.statistics.clusters import CLUSTERS, pooled_clusters
 from ipman_rs.evaluation.statistics.exact_sum import LARGEST, exact, limbs
 
 METRICS = ("mpjpe", "bose")
@@ -113,7 +113,7 @@ def test_pooled_clusters_are_those_of_the_hash():
     values, names, _ = data(count, 1)
     values["bose"] = np.arange(count) / 8  # exact
     found = of(values, names, names, np.arange(count)).clusters("bose")
-    which = pooled(names.tolist())
+    which = pooled_clusters(names.tolist())
     assert found.names == [str(cluster) for cluster in np.unique(which)]
     expected = np.bincount(which, values["bose"], CLUSTERS)
     np.testing.assert_array_equal(found.sums, expected[np.unique(which)])
@@ -275,11 +275,11 @@ def test_other_files(tmp_path):
 def test_bad_input_adds_nothing(tmp_path):
     found = of(*data(50, 5), np.arange(50))
     before = file_of(found, tmp_path)
-    with pytest.raises(ValueError, match="sequences: expected a name a frame, 2, got 3"):
+    with pytest.raises(ValueError, match="sequences: expected a name per frame, 2, got 3"):
         found.add({"a": [1.0, 2.0]}, ["f", "g"], ["s"] * 3)
-    with pytest.raises(ValueError, match=r"b: expected a number a frame, \(2,\), got \(3,\)"):
+    with pytest.raises(ValueError, match=r"b: expected a number per frame, \(2,\), got \(3,\)"):
         found.add({"a": [1.0, 2.0], "b": [1.0, 2.0, 3.0]}, ["f", "g"], ["new", "new"])
-    with pytest.raises(ValueError, match=r"why: expected a word or a word a frame, \(2,\), got \(3,\)"):
+    with pytest.raises(ValueError, match=r"why: expected a word or a word per frame, \(2,\), got \(3,\)"):
         found.add({"a": [1.0, np.nan]}, ["f", "g"], ["new", "new"], ["x"] * 3)
     with pytest.raises(ValueError, match="metric: expected one of bose, mpjpe, got 'pve'"):
         found.clusters("pve")

@@ -11,7 +11,7 @@ import pytest
 
 import ipman_rs as ip
 from ipman_rs.evaluation.tables import read
-from ipman_rs.evaluation.tables.metrics import FIGURES
+from ipman_rs.evaluation.tables.metrics import METRICS
 from tests.helpers import evaluate_files as files
 
 
@@ -131,7 +131,7 @@ def test_other_units_and_degrees_are_mended_or_forced(tmp_path, true, guessed):
     np.testing.assert_allclose(mended.estimates[:5].transl, moved["transl"][:5], atol=1e-3)  # float32, 900 m away
     mended.begin()
     assert mended.flags[0].startswith("transl: looks like millimetres: 9")
-    assert mended.made_of["unit"] == 0.001
+    assert mended.manifest["unit"] == 0.001
     assert plain.flags == ()
     with pytest.raises(ValueError, match="another evaluation"):
         job_of(tmp_path / "mended", true, other, unit=0.001, degrees=False, force=True).begin()
@@ -181,7 +181,7 @@ def test_a_frame_of_nan_touches_no_other(evaluated, tmp_path, true, guessed):
     assert found["bose"]["frames"] == 297
     bad = [5, 123, 200]
     good = np.setdiff1d(np.arange(300), bad)
-    for name in FIGURES:
+    for name in METRICS:
         pieces = [
             np.concatenate([p[name] for p in each.results()]) for each in (evaluated[1], job) if name in each.result(0)
         ]

@@ -126,7 +126,7 @@ def test_bad_input(block, bodies):
         bose(bodies, block, FLOOR, "lenient")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match='labels: expected with bose_mode="released" only'):
         bose(bodies, block, FLOOR, labels=np.ones(len(bodies)))
-    with pytest.raises(ValueError, match=r"labels: expected one a body, \(60,\), got \(3,\)"):
+    with pytest.raises(ValueError, match=r"labels: expected one per body, \(60,\), got \(3,\)"):
         bose(bodies, block, FLOOR, "released", labels=np.ones(3))
     with pytest.raises(ValueError, match="threshold: expected positive metres"):
         bose(bodies, block, FLOOR, threshold=0.0)

@@ -198,7 +198,7 @@ def test_bad_input():
         paired([], [])
     with pytest.raises(ValueError, match="expected a body where both are finite, got none"):
         paired_test([np.nan, 1.0], [1.0, np.nan])
-    with pytest.raises(ValueError, match=r"sequences: expected a name a value, \(2,\), got \(3,\)"):
+    with pytest.raises(ValueError, match=r"sequences: expected a name per value, \(2,\), got \(3,\)"):
         paired([1.0, 2.0], [1.0, 2.0], sequences=["a"] * 3)
     with pytest.raises(ValueError, match="level: expected a share between 0 and 1, got 95"):
         paired([1.0, 2.0], [1.0, 2.0], level=95)

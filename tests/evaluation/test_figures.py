@@ -13,7 +13,7 @@ import ipman_rs as ip
 from ipman_rs.body.soles import sole_vertices
 from ipman_rs.evaluation import paired, paired_test
 from ipman_rs.evaluation.tables import Job, Source, frame_metrics, read
-from ipman_rs.evaluation.tables.metrics import FIGURES
+from ipman_rs.evaluation.tables.metrics import METRICS
 from tests.helpers import evaluate_files as files
 
 
@@ -160,7 +160,7 @@ def test_a_pressure_mat_is_compared(evaluated):
     _, job = evaluated
     model, floor = ip.load_body("anny-lite"), ip.Ground.y_up()
     guess = job.estimates[slice(0, 6)]
-    vertices = job.bodies.posed(guess).vertices
+    vertices = job.body_models.posed(guess).vertices
     samples = ip.sample_surface(vertices, model.template)
     mat = PressureMaps(
         np.zeros((6, 90, 90)), np.array([-1.0, 0, -1.0]), np.array([1.0, 0, 0]), np.array([0, 0, 1.0]), 0.025
@@ -169,7 +169,7 @@ def test_a_pressure_mat_is_compared(evaluated):
     centers = ip.center_of_pressure(vertices, model.template, floor, alpha=100, gamma=10)
     true = replace(job.data[slice(0, 6)], pressure=replace(mat, values=pressed), center_of_pressure=centers)
     assert isinstance(true, Frames)
-    found = frame_metrics.figures(true, guess, job)
+    found = frame_metrics.pair_metrics(true, guess, job.setup)
     assert found["cop_error"] == pytest.approx(np.zeros(6), abs=1e-5)
     assert (found["pressure_iou"] > 0.9).all()
     assert (found["pressure_iou_chosen"] >= found["pressure_iou"] - 0.2).all()
@@ -230,7 +230,7 @@ def test_other_forms_of_the_same_predictions(form, tmp_path, evaluated, guessed,
     other = files.job(tmp_path / "out", path, folder / "truth.npz")
     files.finish([other])
     for first, second in zip(job.results(), other.results(), strict=True):
-        for name in second.keys() & FIGURES.keys():
+        for name in second.keys() & METRICS.keys():
             if form == "double":  # posed and measured in float64
                 near = np.isclose(first[name], second[name], atol=2e-6, equal_nan=True)
                 assert near.mean() > 0.97, name

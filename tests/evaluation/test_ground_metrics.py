@@ -178,7 +178,7 @@ def test_bad_input():
         tilt(np.zeros((24, 3)), np.zeros((24, 3)), floor, pelvis=(0, 1))
     with pytest.raises(ValueError, match=r"rotations: expected two arrays \(\.\.\., 3, 3\)"):
         root_tilt(np.zeros((4, 3)), np.zeros((4, 3)), floor)
-    with pytest.raises(ValueError, match=r"sequences: expected a name a frame, \(5,\), got \(4,\)"):
+    with pytest.raises(ValueError, match=r"sequences: expected a name per frame, \(5,\), got \(4,\)"):
         foot_skating(np.zeros((5, 2, 3)), floor, ["a"] * 4)
     with pytest.raises(ValueError, match=r"feet: expected \(F, N, 3\), got \(2, 3\)"):
         foot_skating(np.zeros((2, 3)), floor, ["a"] * 2)

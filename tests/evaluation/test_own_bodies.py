@@ -229,8 +229,8 @@ def test_measured_joints_of_spin_s_definition_take_its_extra_regressor(bodies, r
     for place, joint in enumerate(spin.J24):
         if joint in EXTRA:
             joints[:, place, :3] = extra[:, EXTRA.index(joint)]
-        elif joint in posed.own_names:
-            joints[:, place, :3] = posed.own[:, posed.own_names.index(joint)]
+        elif joint in posed.model_joint_names:
+            joints[:, place, :3] = posed.model_joints[:, posed.model_joint_names.index(joint)]
     rich_ipman.write(tmp_path, S_world=joints, pose_world=None, part=None)
     asked = own, "--data", "rich-ipman", "--path", file, "--models", bodies
     code, said = evaluated(*asked, "--regressor", regressors[0], "-o", tmp_path / "refused")
@@ -290,8 +290,8 @@ def test_the_gender_of_a_missing_model_is_the_one_that_is_needed(tmp_path):
     assert "smplx (female) needs its model file, SMPLX_FEMALE.npz or .pkl: no folder is named by --models" in said
     frames = data.open("moyo", tmp_path)[:2]
     beside = replace(frames, joints=np.zeros((2, 1, 3)), joint_names=("pelvis",))
-    assert Models().posed(beside).without_model == "SMPLX_FEMALE"
-    assert Models().posed(replace(beside, genders=None)).without_model == "SMPLX_NEUTRAL"
+    assert Models().posed(beside).missing_model == "SMPLX_FEMALE"
+    assert Models().posed(replace(beside, genders=None)).missing_model == "SMPLX_NEUTRAL"
 
 
 def test_what_is_asked_of_a_data_set_must_be_there(regressors, tmp_path):

@@ -66,7 +66,7 @@ def test_shards_of_other_machines_are_copied_together(evaluated, again):
         other.begin()
         other.run(Shard(index, 3))
         assert len(other.missing()) in (5, 6)
-        shutil.copytree(other.place, job.place, dirs_exist_ok=True)
+        shutil.copytree(other.pieces_folder, job.pieces_folder, dirs_exist_ok=True)
     files.finish([job])
     the_same(evaluated, job)
 
@@ -77,7 +77,7 @@ def test_killed_twice_it_goes_on_and_ends_the_same(evaluated, again):
     for pieces in (2, 5):
         process = files.process(RUN, str(folder), "0.2")
         begun = time.monotonic()
-        while len(list(job.place.glob("*.npz"))) < pieces:
+        while len(list(job.pieces_folder.glob("*.npz"))) < pieces:
             assert process.poll() is None, process.communicate()
             assert time.monotonic() - begun < 120
             time.sleep(0.01)
@@ -99,7 +99,7 @@ def test_a_half_written_piece_is_done_again(evaluated, again):
     whole = job.file(3).read_bytes()
     job.file(3).write_bytes(whole[: len(whole) // 2])
     job.file(5).write_bytes(b"")
-    (job.place / ".000006.npz.999.part").write_bytes(whole[:100])  # what a killed process leaves
+    (job.pieces_folder / ".000006.npz.999.part").write_bytes(whole[:100])  # what a killed process leaves
     assert job.damaged() == [3, 5]
     assert job.missing() == [3, 5]
     files.finish([job])
@@ -123,7 +123,7 @@ def test_a_full_disk_loses_nothing(again, monkeypatch):
     _, job = again
     job.begin()
     job.run(Shard(1, 2))
-    there = sorted(job.place.iterdir())
+    there = sorted(job.pieces_folder.iterdir())
 
     def full(*_):
         raise OSError(28, "No space left on device")
@@ -132,7 +132,7 @@ def test_a_full_disk_loses_nothing(again, monkeypatch):
         patch.setattr("os.fsync", full)
         with pytest.raises(OSError, match="No space left"):
             job.run(Shard(2, 2))
-    assert sorted(job.place.iterdir()) == there
+    assert sorted(job.pieces_folder.iterdir()) == there
 
 
 def test_other_predictions_under_the_same_name_are_refused(evaluated, again):

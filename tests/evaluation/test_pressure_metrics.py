@@ -187,7 +187,7 @@ def test_moyo_where_nothing_is():
 
 def test_bad_input():
     samples, there = over(2, 10), mat(np.ones((2, HEIGHT, WIDTH)))
-    with pytest.raises(ValueError, match=r"pressure: expected one a sample, \(2, 10\), got \(2, 9\)"):
+    with pytest.raises(ValueError, match=r"pressure: expected one per sample, \(2, 10\), got \(2, 9\)"):
         pressure_map(samples, np.ones((2, 9)), there)
     with pytest.raises(ValueError, match=r"maps: expected two arrays of one shape \(\.\.\., H, W\)"):
         pressure_iou(np.ones((2, 3)), np.ones((3, 2)))

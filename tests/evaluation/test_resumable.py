@@ -12,15 +12,15 @@ from ipman_rs.evaluation.tables.resumable import Resumable
 
 
 class Squares(Resumable):
-    def __init__(self, folder, **made_of):
-        self.folder, self.options = folder, made_of
+    def __init__(self, folder, **manifest):
+        self.folder, self.options = folder, manifest
 
     @property
     def pieces_folder(self):
         return self.folder
 
     @property
-    def made_of(self):
+    def manifest(self):
         return self.options
 
 

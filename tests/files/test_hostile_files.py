@@ -12,8 +12,8 @@ from click.testing import CliRunner
 from ipman_rs.body import joint_regressors
 from ipman_rs.cli import main
 from ipman_rs.data import moyo
-from ipman_rs.evaluation.tables.rows import of_npz
-from ipman_rs.files import parse_json, parse_yaml, read_json, read_yaml, regular, safe_npz, safe_pickle, safe_xml
+from ipman_rs.evaluation.tables.rows import open_npz
+from ipman_rs.files import parse_json, parse_yaml, read_json, read_yaml, regular_file, safe_npz, safe_pickle, safe_xml
 from ipman_rs.files.errors import FileError
 from ipman_rs.fitting import camera_file, config, presented_files
 from ipman_rs.io.parts import read_parts
@@ -175,7 +175,7 @@ def test_text_of_characters_that_are_none(tmp_path):
         content[place : place + 4] = code
         path.write_bytes(content)
         with pytest.raises(ValueError, match=r"predictions\.npz: "):
-            of_npz(path, "names", tmp_path)[:]
+            open_npz(path, "names", tmp_path)[:]
         content = content.replace(code, "s".encode("utf-32-le"), 1)
 
 
@@ -186,7 +186,7 @@ def test_member_at_a_place_that_cannot_be(tmp_path):
     directory = content.index(b"PK\x01\x02")
     content[directory + 42 : directory + 46] = b"\xff\xff\xff\x7f"
     path.write_bytes(content)
-    for read in (safe_npz.read, safe_npz.mapped, lambda path, name: of_npz(path, name, tmp_path)):
+    for read in (safe_npz.read, safe_npz.memory_map, lambda path, name: open_npz(path, name, tmp_path)):
         with pytest.raises(ValueError, match=r"a\.npz: "):
             read(path, "x")
 
@@ -207,8 +207,8 @@ READERS = {
     "parts": lambda path: read_parts(path.with_suffix(".json"), FACES, None),
     "npz": lambda path: safe_npz.read(path, "x"),
     "npz names": safe_npz.names,
-    "npz mapped": lambda path: safe_npz.mapped(path, "x"),
-    "npz rows": lambda path: of_npz(path, "x", path.parent),
+    "npz mapped": lambda path: safe_npz.memory_map(path, "x"),
+    "npz rows": lambda path: open_npz(path, "x", path.parent),
     "npy": safe_npz.read_npy,
     "pickle": safe_pickle.read,
     "XML": safe_xml.read,
@@ -241,11 +241,11 @@ def test_special_files_are_refused_at_once(tmp_path, read):
 def test_names_that_no_file_can_have(tmp_path):
     for name in ("x" * 300, "a\0b"):
         with pytest.raises(ValueError, match="cannot be opened"):
-            regular(tmp_path / name)
+            regular_file(tmp_path / name)
     loop = tmp_path / "loop"
     loop.symlink_to(loop)
     with pytest.raises(ValueError, match="cannot be opened"):
-        regular(loop)
+        regular_file(loop)
 
 
 def test_xml_of_too_many_attributes_is_refused(tmp_path):

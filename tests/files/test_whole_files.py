@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from ipman_rs.files import being_written, cell, write_whole
+from ipman_rs.files import atomic_write, cell, write_whole
 
 
 def names(folder):
@@ -21,7 +21,7 @@ def names(folder):
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
     path = tmp_path / "report.json"
     write_whole(path, "old")
-    with contextlib.suppress(KeyboardInterrupt), being_written(path) as file:
+    with contextlib.suppress(KeyboardInterrupt), atomic_write(path) as file:
         file.write(b"half of the new")
         raise KeyboardInterrupt
     assert path.read_text() == "old"
@@ -50,8 +50,8 @@ def test_a_full_disk_leaves_whole_files(tmp_path):
 WRITER = textwrap.dedent("""
     import sys, time
     from pathlib import Path
-    from ipman_rs.files import being_written
-    with being_written(Path(sys.argv[1]) / "frames.parquet") as file:
+    from ipman_rs.files import atomic_write
+    with atomic_write(Path(sys.argv[1]) / "frames.parquet") as file:
         file.write(b"half")
         file.flush()
         print("begun", flush=True)

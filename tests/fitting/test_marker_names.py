@@ -12,9 +12,9 @@ pytest.importorskip("torch", reason="torch is an extra")
 import ipman_rs as ip
 from ipman_rs.data.markers import judged, meanings, own
 from ipman_rs.data.markers.anatomy import Anatomy, harrington
-from ipman_rs.data.markers.names import plain, unmatched
+from ipman_rs.data.markers.names import comparable, unmatched
 from ipman_rs.data.markers.skin_distance import mean_distances, signed_distance
-from ipman_rs.data.tracks import TO_Y_UP, Tracks, turned
+from ipman_rs.data.tracks import TO_Y_UP, Tracks, turn_up
 
 
 @pytest.mark.parametrize(
@@ -228,7 +228,7 @@ def tracks(points=STANDING, names=NAMES, up="y", unit=1.0):
 
 
 def wrong(one, up_is_said=False):
-    found = judged.of_points(one, meanings(one.names), up_is_said)
+    found = judged.check_points(one, meanings(one.names), up_is_said)
     return [finding for finding in found if finding.level == "wrong"]
 
 
@@ -242,7 +242,7 @@ def test_another_axis_up_is_refused_and_mended(axis):
     (finding,) = wrong(other)
     assert finding.option == f"--up {axis}"
     assert wrong(other, up_is_said=True) == []
-    np.testing.assert_allclose(turned(other, np.eye(3)["xyz".index(axis)]).points[0], STANDING, atol=1e-15)
+    np.testing.assert_allclose(turn_up(other, np.eye(3)["xyz".index(axis)]).points[0], STANDING, atol=1e-15)
 
 
 def test_the_axis_is_named_as_the_file_has_it():
@@ -250,7 +250,7 @@ def test_the_axis_is_named_as_the_file_has_it():
     raw = STANDING * [1, -1, -1]
     (finding,) = wrong(tracks(raw @ TO_Y_UP["z"].T, up="z"))
     assert finding.option == "--up -y"
-    np.testing.assert_allclose(turned(tracks(raw), (0, -1, 0)).points[0], STANDING, atol=1e-15)
+    np.testing.assert_allclose(turn_up(tracks(raw), (0, -1, 0)).points[0], STANDING, atol=1e-15)
 
 
 def test_units_are_refused_and_mended():
@@ -263,11 +263,11 @@ def test_units_are_refused_and_mended():
 
 
 def test_markers_below_the_floor():
-    (finding,) = judged.of_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES))
+    (finding,) = judged.check_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES))
     assert finding.what == "the lowest markers are 0.95 m below the floor in the median"
     assert finding.option == "--ground HEIGHT"
-    assert judged.of_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES), ground=-1.0) == []
-    assert judged.of_floor(tracks(), meanings(NAMES)) == []
+    assert judged.check_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES), ground=-1.0) == []
+    assert judged.check_floor(tracks(), meanings(NAMES)) == []
 
 
 SWAP = {"L": "R", "R": "L"}
@@ -291,23 +291,23 @@ def test_left_and_right_exchanged_in_a_part():
     """Of the feet alone: names, or crossed legs."""
     swapped = [SWAP[name[0]] + name[1:] if name[1:] in ("HEE", "TOE") else name for name in WITH_FEET]
     one = tracks(STANDING_FEET, swapped)
-    (finding,) = (each for each in judged.of_points(one, meanings(one.names)) if each.level != "ok")
+    (finding,) = (each for each in judged.check_points(one, meanings(one.names)) if each.level != "ok")
     assert (finding.level, finding.what) == ("odd", "left and right look swapped of feet")
 
 
 def test_what_the_markers_do_not_say():
     legs = [name for name in NAMES if name not in ("C7", "CLAV")]
-    (finding,) = judged.coverage(legs, meanings(legs))
+    (finding,) = judged.check_coverage(legs, meanings(legs))
     assert finding.what.startswith("no marker above the pelvis was ever seen: trunk, arms, mass and centre of mass")
-    (finding,) = judged.coverage(NAMES, meanings(NAMES))
+    (finding,) = judged.check_coverage(NAMES, meanings(NAMES))
     assert finding.what == "no marker on head and arms was ever seen: there the body's mean is shown"
     whole = [*NAMES, "LFHD", "LELB"]
-    assert judged.coverage(whole, meanings(whole)) == []
+    assert judged.check_coverage(whole, meanings(whole)) == []
 
 
 def test_markers_off_the_skin_are_flagged():
-    assert judged.of_skin({"C7": 0.01, "LASI": 0.03}) == []
-    (finding,) = judged.of_skin({"C7": 0.01, "LKNE": -0.038, "RKNE": 0.06})
+    assert judged.check_skin({"C7": 0.01, "LASI": 0.03}) == []
+    (finding,) = judged.check_skin({"C7": 0.01, "LKNE": -0.038, "RKNE": 0.06})
     assert finding.level == "odd"
     assert "2 of 3 markers are not on the skin of the fitted body (RKNE +60 mm, LKNE -38 mm;" in finding.what
 
@@ -328,6 +328,6 @@ def test_wands_are_no_markers_on_the_skin():
 
 
 def test_names_compared():
-    assert plain("Left_Knee-Med.") == plain("L.KneeMed") == "lkneemed"
-    assert plain("RIGHT") == "right"
-    assert plain("l") == "l"
+    assert comparable("Left_Knee-Med.") == comparable("L.KneeMed") == "lkneemed"
+    assert comparable("RIGHT") == "right"
+    assert comparable("l") == "l"

@@ -15,7 +15,7 @@ import ipman_rs as ip
 from ipman_rs.body import poses
 from ipman_rs.evaluation.tables import Job, Shard, Source
 from ipman_rs.evaluation.tables import report as reports
-from ipman_rs.evaluation.tables.summary import difference, measured
+from ipman_rs.evaluation.tables.summary import difference, summarise
 
 FRAMES, PIECE = 300, 40  # eight pieces, the last of 20
 
@@ -66,7 +66,7 @@ def finish(jobs: list[Job], shard: Shard | None = None) -> dict[str, Any]:
 
 def write(jobs: list[Job]) -> dict[str, Any]:
     """The files of the report but the pictures, which take a second."""
-    found = [measured(each) for each in jobs]
+    found = [summarise(each) for each in jobs]
     differences = [difference(each, jobs[0]) for each in jobs[1:]]
     folder = Path(jobs[0].folder)
     report = reports.Report("test", "made", found, differences)

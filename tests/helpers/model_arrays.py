@@ -60,7 +60,7 @@ def lifelike_arrays(num_joints: int) -> dict[str, np.ndarray]:
     """The light embedded body in its zero pose, written as a model with 24, 52 or 55 joints: small, and a real body."""
     body = ip.load_body("anny-lite")
     rng = np.random.default_rng(num_joints)
-    names = joints.BY_COUNT[num_joints]
+    names = {24: joints.SMPL, 52: joints.SMPLH, 55: joints.SMPLX}[num_joints]
     weights = np.zeros((body.num_vertices, num_joints))
     for j, name in enumerate(body.joint_names):
         weights[:, names.index(name if name in names else name.replace("hand", "index1"))] += body.weights[:, j]

@@ -146,7 +146,7 @@ def test_loose_vertices_are_left_out_wherever_they_stand(read, body):
 def test_flat_and_repeated_faces_are_left_out():
     box = trimesh.creation.box((1, 1, 1))
     faces = np.concatenate([box.faces[:3], [[0, 0, 1]], box.faces[:1, [1, 2, 0]], box.faces[3:], box.faces[5:7]])
-    mesh = repair.repaired(repair.Mesh(box.vertices, faces))
+    mesh = repair.repair_mesh(repair.Mesh(box.vertices, faces))
     np.testing.assert_array_equal(mesh.faces, box.faces)
     np.testing.assert_array_equal(mesh.face_map, [0, 1, 2, *range(5, 14)])
     assert mesh.notes == ("1 face without area (a vertex twice) left out", "3 repeated faces left out")

@@ -12,7 +12,7 @@ from ipman_rs import Ground
 from ipman_rs.body.soles import sole_vertices
 from ipman_rs.data.force_plates import ForcePlates
 from ipman_rs.gravity import GRAVITY
-from ipman_rs.validation import Comparison, computed, figures
+from ipman_rs.validation import MeasuredComparison, computed, figures
 from ipman_rs.validation.comparison import beside_plates
 from ipman_rs.validation.computed import SOLE, first_shares
 
@@ -49,7 +49,7 @@ def plates_of(cop, upward, along=None):
 
 
 def compared(lite, bodies, plates=None, reference=None, **options):
-    return Comparison("made up", TIMES, computed(bodies, lite.template, plates), plates, reference, **options)
+    return MeasuredComparison("made up", TIMES, computed(bodies, lite.template, plates), plates, reference, **options)
 
 
 def test_standing_still(lite, standing):
@@ -160,7 +160,7 @@ def test_forces_that_are_no_numbers_are_no_foot_beside_the_plates(lite, standing
 )
 def test_why_there_is_no_weight_and_no_acceleration(lite, standing, load, rate, told):
     plates = plates_of(np.tile([0.0, 0, 0.02], (FRAMES, 1)), np.full(FRAMES, load))
-    one = Comparison("slow", TIMES * RATE / rate, computed(swaying(standing), lite.template, plates), plates)
+    one = MeasuredComparison("slow", TIMES * RATE / rate, computed(swaying(standing), lite.template, plates), plates)
     said = figures(one)["flags"]
     assert len(said) >= len(told)
     assert all(any(each.startswith(start) for each in said) for start in told)

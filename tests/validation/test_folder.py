@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ipman_rs.validation.folder import Kinds, find
+from ipman_rs.validation.folder import Kinds, find_trials
 
 
 def kind_of(path):
@@ -23,7 +23,7 @@ def found(tmp_path):
             stem, _, ending = name.rpartition("__")
             (tmp_path / f"{stem}.{ending}").write_text(content)
         kinds = Kinds(kind_of, lambda path: path.name in plates, lambda path: path.name in com)
-        trials, notes, unreadable = find(tmp_path, kinds)
+        trials, notes, unreadable = find_trials(tmp_path, kinds)
         told = [(t.name, t.forces and t.forces.name, t.com and t.com.name) for t in trials]
         assert not unreadable
         return told, notes
@@ -74,14 +74,14 @@ def test_bad_folders(tmp_path, found):
 
     kinds = Kinds(never, never, never)
     with pytest.raises(ValueError, match="nowhere: expected a folder of recordings, not there"):
-        find(tmp_path / "nowhere", kinds)
+        find_trials(tmp_path / "nowhere", kinds)
     with pytest.raises(ValueError, match=r"expected files of markers \(.trc, .c3d\), got an empty folder"):
-        find(tmp_path, kinds)
+        find_trials(tmp_path, kinds)
     (tmp_path / "notes.txt").write_text("")
     with pytest.raises(ValueError, match="expected a folder of recordings, got a file"):
-        find(tmp_path / "notes.txt", kinds)
+        find_trials(tmp_path / "notes.txt", kinds)
     with pytest.raises(ValueError, match=r"got notes.txt"):
-        find(tmp_path, kinds)
+        find_trials(tmp_path, kinds)
     with pytest.raises(ValueError, match=r"markers of hop, but nothing to compare with; .*such as hop_grf.mot"):
         found(hop__trc="")
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ipman_rs.gravity import GRAVITY
-from ipman_rs.validation.movement import Movement, longest, smoothed
+from ipman_rs.validation.movement import Movement, longest_run, smooth
 
 RATE = 100.0
 TIMES = np.arange(300) / RATE
@@ -85,14 +85,14 @@ def test_on_a_box_is_no_flight():
 
 
 def test_the_longest_run():
-    assert longest(np.array([0, 1, 1, 0, 1, 1, 1], bool)) == 3
-    assert longest(np.zeros(4, bool)) == 0
+    assert longest_run(np.array([0, 1, 1, 0, 1, 1, 1], bool)) == 3
+    assert longest_run(np.zeros(4, bool)) == 0
 
 
 def test_headings_on_average():
     turns = np.pi / 2 * np.arange(100) / 100
     ways = np.stack([np.sin(turns), 0 * turns, np.cos(turns)], axis=1)
-    found = smoothed(ways, 20)
+    found = smooth(ways, 20)
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, atol=1e-12)
     np.testing.assert_allclose(found[20:80], ways[20:80], atol=1e-12)  # of an even turn the mean is the middle
-    np.testing.assert_array_equal(smoothed(ways[:1], 20), ways[:1])
+    np.testing.assert_array_equal(smooth(ways[:1], 20), ways[:1])

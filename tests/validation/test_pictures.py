@@ -9,7 +9,7 @@ pytest.importorskip("matplotlib", reason="matplotlib is an extra")
 
 import ipman_rs as ip
 from ipman_rs.data.force_plates import ForcePlates
-from ipman_rs.validation import Comparison, computed, pictures
+from ipman_rs.validation import MeasuredComparison, computed, pictures
 from ipman_rs.validation.pictures import Floor
 
 FRAMES = 40
@@ -33,7 +33,7 @@ def test_whatever_was_measured(lite, bodies, measured):
     of = {"all": plates(600.0), "no load": plates(0.0), "unseen": plates(600.0)}.get(measured)
     reference = np.full((FRAMES, 3), np.nan) if measured.startswith("a reference") else None
     seen = np.zeros(FRAMES, bool) if measured == "unseen" else None
-    one = Comparison("made up", TIMES, computed(bodies, lite.template, of), of, reference, seen)
+    one = MeasuredComparison("made up", TIMES, computed(bodies, lite.template, of), of, reference, seen)
     markers = np.full((FRAMES, 3, 3), np.nan)
     for drawn in (
         pictures.pressure_map(one, bodies, lite.template),
@@ -64,7 +64,7 @@ def legends(draw, monkeypatch):
 )
 def test_legends_name_what_is_drawn(lite, bodies, monkeypatch, load, rate, lacking, panels):
     of = plates(load)
-    one = Comparison("made up", np.arange(FRAMES) / rate, computed(bodies, lite.template, of), of)
+    one = MeasuredComparison("made up", np.arange(FRAMES) / rate, computed(bodies, lite.template, of), of)
     everything = {"measured CoP", "ZMP of the parts", "m (g + acceleration of the fitted CoM)", "all plates"}
     named, count = legends(lambda: pictures.over_time(one), monkeypatch)
     assert everything - named == lacking
@@ -75,7 +75,7 @@ def test_legends_name_what_is_drawn(lite, bodies, monkeypatch, load, rate, lacki
 
 def test_somebody_who_walks_without_plates(lite, bodies):
     """A centre of mass was measured, no force: there are no phases, and the middle frame is drawn."""
-    one = Comparison("made up", TIMES, computed(bodies, lite.template), reference=np.full((FRAMES, 3), np.nan))
+    one = MeasuredComparison("made up", TIMES, computed(bodies, lite.template), reference=np.full((FRAMES, 3), np.nan))
     vars(one)["kind"] = "walking"
     assert one.phases == {}
     assert pictures.moments(one) == {"all": FRAMES // 2}
@@ -93,6 +93,6 @@ def test_pictures_turn_with_the_person(lite, bodies):
     turn = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     drawn = []
     for turned in (bodies, bodies @ turn.T + [3.0, 0.0, -1.0]):
-        one = Comparison("made up", TIMES, computed(turned, lite.template))
+        one = MeasuredComparison("made up", TIMES, computed(turned, lite.template))
         drawn.append(Floor.under(one, turned[5], lite.template, 5)(one.com[5]))
     np.testing.assert_allclose(drawn[0], drawn[1], atol=1e-6)

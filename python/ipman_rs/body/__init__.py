@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import embedded, poses, smpl_files
+from . import embedded, formats, poses
 from .model import BodyModel, BodyOutput
 from .parts import PART_NAMES
 from .poses import posed
@@ -29,7 +29,8 @@ def load_body(
     flat_hand_mean: bool = False,
     v_template: ArrayLike | None = None,
 ) -> BodyModel:
-    """The embedded body "anny" or "anny-lite", or a model file in the SMPL, SMPL+H or SMPL-X format (`.npz`, `.pkl`).
+    """The embedded body "anny" or "anny-lite", or a model file (`.npz`, `.pkl`) of a kind in
+    `body.formats`: SMPL, SMPL+H or SMPL-X.
 
     `num_betas` (shape components to keep), `flat_hand_mean` (zero hand pose is the flat hand instead of the mean
     hand; AMASS poses want True) and `v_template` (V, 3) m (a person's own body in the zero pose, instead of the mean
@@ -45,4 +46,4 @@ def load_body(
     if not path.is_file():
         raise ValueError(f"no body {str(name_or_path)!r}: it is neither one of {', '.join(embedded.NAMES)} nor a file")
     template = None if v_template is None else np.asarray(v_template, np.float64)
-    return smpl_files.load(path, num_betas=num_betas, flat_hand_mean=flat_hand_mean, v_template=template)
+    return formats.load(path, num_betas=num_betas, flat_hand_mean=flat_hand_mean, v_template=template)

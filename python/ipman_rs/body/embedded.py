@@ -10,7 +10,6 @@ import numpy as np
 from .model import BodyModel
 
 NAMES = ("anny", "anny-lite")
-_KINDS = {24: "smpl", 52: "smplh", 55: "smplx"}  # of a model file, by its joints
 
 
 @cache
@@ -36,9 +35,5 @@ def load(name: str) -> BodyModel:
         faces=stored["faces"].astype(np.int64),
         parents=stored["parents"].astype(np.int64),
         joint_names=tuple(stored["joint_names"].tolist()),
+        kind=name,
     )
-
-
-def kind_of(body: BodyModel) -> str:
-    """What files call the parameters of a body: "smpl", "smplh", "smplx", or the name of an embedded one."""
-    return body.name if body.name in NAMES else _KINDS.get(body.num_joints, body.name)

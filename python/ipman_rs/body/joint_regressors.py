@@ -1,4 +1,4 @@
-"""Joints made of vertices by a linear regressor, as the literature compares them: J (K, 3) = R (K, V) · V (V, 3).
+"""Joints from vertices by a linear regressor, as the literature reports them: J (K, 3) = R (K, V) · V (V, 3).
 
 The files are SPIN's, told apart by their number of rows: `J_regressor_h36m.npy` (17, V), Human3.6M's joints, and
 `J_regressor_extra.npy` (9, V), the joints that other data sets label and SMPL does not have.
@@ -25,7 +25,7 @@ _NAMES = {len(names): names for names in (HUMAN36M, EXTRA)}
 
 @dataclass(frozen=True, eq=False)
 class JointRegressor:
-    """`weights` (K, V) and the names (K,) of the joints that they make."""
+    """`weights` (K, V) and the names (K,) of their joints."""
 
     weights: NDArray[np.float64]
     names: tuple[str, ...]
@@ -41,12 +41,17 @@ class JointRegressor:
 def read(path: str | os.PathLike[str]) -> JointRegressor:
     """A regressor from an .npy file. ValueError, naming the file, for one that is damaged or not of 17 or 9 rows."""
     try:
-        found = safe_npz.read_npy(path)
+        weights = safe_npz.read_npy(path)
     except ValueError as error:
         raise ValueError(
             f"{path}: the regressor cannot be read ({error}); expected J_regressor_h36m.npy or J_regressor_extra.npy"
         ) from error
-    if not isinstance(found, np.ndarray) or found.ndim != 2 or len(found) not in _NAMES or found.dtype.kind != "f":
-        what = f"{found.dtype} {found.shape}" if isinstance(found, np.ndarray) else type(found).__name__
+    if (
+        not isinstance(weights, np.ndarray)
+        or weights.ndim != 2
+        or len(weights) not in _NAMES
+        or weights.dtype.kind != "f"
+    ):
+        what = f"{weights.dtype} {weights.shape}" if isinstance(weights, np.ndarray) else type(weights).__name__
         raise ValueError(f"{path}: expected a regressor of 17 (Human3.6M) or 9 rows (SPIN's extra joints), got {what}")
-    return JointRegressor(found.astype(np.float64), _NAMES[len(found)])
+    return JointRegressor(weights.astype(np.float64), _NAMES[len(weights)])

@@ -18,5 +18,4 @@ SMPLX = (*BODY, "jaw", "left_eye_smplhf", "right_eye_smplhf", *_fingers("left"),
 
 LEFT_HAND, RIGHT_HAND = tuple(_fingers("left")), tuple(_fingers("right"))
 
-BY_COUNT = {len(names): names for names in (SMPL, SMPLH, SMPLX)}
 SMPL_PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21)

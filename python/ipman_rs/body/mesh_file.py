@@ -1,4 +1,4 @@
-"""The vertices of a person's own mesh in a file, in the order of its body model."""
+"""Reads the vertices of a person's own mesh, which are in the order of the body model."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def vertices(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     if place.suffix.lower() not in ENDINGS or not place.is_file():
         what = "no such file" if not place.is_file() else f"a file {place.suffix or 'without ending'}"
         raise ValueError(f"{path}: expected a mesh in a .ply or .obj file, got {what}")
-    found = read_points(place)
-    span = float(np.ptp(found, axis=0).max())
+    points = read_points(place)
+    span = float(np.ptp(points, axis=0).max())
     if not SPAN[0] <= span <= SPAN[1]:
         hint = "; looks like millimetres" if span > 100 else ""
         raise ValueError(f"{path}: expected a body in metres, got one that spans {span:.4g}{hint}")
-    return found
+    return points

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import weakref
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -58,12 +59,15 @@ class BodyModel:
     joint_names: tuple[str, ...]
     hands: Hands | None = None
     up: str = "y"
+    kind: str = ""  # what files call the parameters of such bodies: "smplx", or the name of an embedded one
+    joint_parts: Mapping[str, str] = field(default_factory=dict)  # the body parts of joints whose names tell none
     _key: int = field(init=False, repr=False)
 
     part_names = PART_NAMES
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_key", next(_KEYS))
+        object.__setattr__(self, "kind", self.kind or self.name)
         _BY_KEY[self._key] = self
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -93,7 +97,7 @@ class BodyModel:
     @cached_property
     def face_parts(self) -> NDArray[np.int64]:
         """Part index (F,) of every face in `part_names`."""
-        return face_parts(self.faces, self.weights, self.joint_names)
+        return face_parts(self.faces, self.weights, self.joint_names, self.joint_parts)
 
     @cached_property
     def pose_mean(self) -> NDArray[np.float64]:

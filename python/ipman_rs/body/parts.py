@@ -7,7 +7,7 @@ the shoulder joint: the collar bone is torso, otherwise the boundaries at neck a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,16 @@ def part_of_joint(joint: str) -> str:
     return f"{side}_{limb}" if limb else "torso"
 
 
-def face_parts(faces: NDArray[np.int64], weights: NDArray[np.float64], joint_names: Sequence[str]) -> NDArray[np.int64]:
-    """Part index (F,) in `PART_NAMES` of every face, from `faces` (F, 3) and the skinning `weights` (V, J)."""
-    belongs = np.array([[part_of_joint(joint) == part for part in PART_NAMES] for joint in joint_names], float)
+def face_parts(
+    faces: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    joint_names: Sequence[str],
+    joint_parts: Mapping[str, str] | None = None,
+) -> NDArray[np.int64]:
+    """Part index (F,) in `PART_NAMES` of every face, from `faces` (F, 3) and the skinning `weights` (V, J).
+
+    joint_parts: the parts of joints whose names tell none.
+    """
+    parts = [(joint_parts or {}).get(joint) or part_of_joint(joint) for joint in joint_names]
+    belongs = np.array([[own == part for part in PART_NAMES] for own in parts], float)
     return (weights @ belongs)[faces].sum(1).argmax(1)

@@ -17,41 +17,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import rotations
-from .joints import BODY, LEFT_HAND, RIGHT_HAND, SMPL, SMPLH, SMPLX
+from .body_format import BodyFormat, Joints
+from .formats import FORMATS, of_kind
+from .joints import BODY
 from .model import BodyModel
+from .smpl_files import SMPL, SMPLX
 
 WHOLE_POSES = ("poses", "fullpose", "pose", "full_pose", "smpl_thetas", "smpl_poses")
-# Arrays that hold a piece of the pose, and the joints of that piece by its number of columns / 3.
-PIECES: dict[str, tuple[tuple[str, ...], ...]] = {
-    "global_orient": (BODY[:1],),
-    "root_orient": (BODY[:1],),
-    "Rh": (BODY[:1],),
-    "body_pose": (BODY[1:], SMPL[1:]),
-    "pose_body": (BODY[1:], SMPL[1:]),
-    "left_hand_pose": (LEFT_HAND,),
-    "right_hand_pose": (RIGHT_HAND,),
-    "pose_hand": ((*LEFT_HAND, *RIGHT_HAND),),
-    "jaw_pose": (("jaw",),),
-    "pose_jaw": (("jaw",),),
-    "leye_pose": (SMPLX[23:24],),
-    "reye_pose": (SMPLX[24:25],),
-    "pose_eye": (SMPLX[23:25],),
-}
-# Those of the smplx package, under whose names poses are written.
-_SMPLX_PIECES = (
-    "global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose", "left_hand_pose", "right_hand_pose",
-)  # fmt: skip
-_WHOLE = (SMPL, BODY, SMPLH, SMPLX)
 _VECTORS, _MATRICES, COLUMNS, _QUATERNIONS = "rotation vectors", "rotation matrices", "6D rotations", "quaternions"
 _WIDTHS = {_VECTORS: 3, _MATRICES: 9, COLUMNS: 6, _QUATERNIONS: 4}
 _ORDERS = {"_wxyz": (1, 2, 3, 0), "_xyzw": (0, 1, 2, 3)}  # where x, y, z and w of a quaternion are
 _ORTHONORMAL = 1e-3  # how far rounded rotation matrices are off
 _NEARLY = 0.2  # so near to orthonormal are three frames of rotation vectors by no chance
-NAMES = tuple(
-    f"{name}{more}" for name in (*WHOLE_POSES, *PIECES) for more in ("", *_ORDERS, *(f"_quat{end}" for end in _ORDERS))
-)
 
 Array = NDArray[Any]
+
+
+def pieces_of() -> dict[str, list[Joints]]:
+    """The arrays that hold a piece of the pose, in files of all kinds of models, and the joints that each may have."""
+    found: dict[str, list[Joints]] = {}
+    for format in FORMATS.values():
+        for name, sets in format.pieces.items():
+            found[name] = list(dict.fromkeys((*found.get(name, ()), *sets)))
+    return found
+
+
+def names() -> set[str]:
+    """Of all arrays that hold a pose or a piece of it."""
+    endings = ("", *_ORDERS, *(f"_quat{end}" for end in _ORDERS))
+    return {f"{name}{more}" for name in (*WHOLE_POSES, *pieces_of()) for more in endings}
+
+
+def _whole() -> list[Joints]:
+    return list(dict.fromkeys(joints for format in FORMATS.values() for joints in format.poses))
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,16 +70,17 @@ class Piece:
         return self.form != _VECTORS
 
 
-def read(first: Callable[..., Array | None], degrees: bool = False) -> list[Piece]:
+def read(first: Callable[..., Array | None], degrees: bool = False, kind: str | None = None) -> list[Piece]:
     """The pieces of a stored pose; `first(*names)` gives the first of these arrays that there is, or None.
 
-    degrees: of rotation vectors; in the pieces they are radians.
+    degrees: of rotation vectors; in the pieces they are radians. kind: of the model that the pose is of, one of
+    `formats.FORMATS`; None: not known, and then the joints are those of the only kind that has so many.
 
     Raises:
-        ValueError: an array has another shape than its joints need, does not tell what it holds, or pieces have unequal
-            numbers of frames.
+        ValueError: an array has another shape than its joints need, does not tell what it holds, may be the joints of
+            several kinds of models, or pieces have unequal numbers of frames.
     """
-    pieces = _pieces(first)
+    pieces = _pieces(first, FORMATS.get(kind or ""))
     if degrees:
         pieces = [each if each.is_absolute else replace(each, rotations=np.radians(each.rotations)) for each in pieces]
     counts = {len(piece.rotations) for piece in pieces}
@@ -91,16 +90,21 @@ def read(first: Callable[..., Array | None], degrees: bool = False) -> list[Piec
     return pieces if turn is None else _turned(turn, [piece for piece in pieces if piece is not turn])
 
 
-def _pieces(first: Callable[..., Array | None]) -> list[Piece]:
+def _pieces(first: Callable[..., Array | None], kind: BodyFormat | None) -> list[Piece]:
     """As they are in the file."""
     for name in WHOLE_POSES:
         whole = _stored(first, name)
         if whole is not None:
             turn = first("Rh")
+            choices = _whole() if kind is None else of_kind(_whole(), kind.poses)
             if turn is None:
-                return [_piece(*whole, _WHOLE)]
-            return [_piece("Rh", turn, PIECES["Rh"]), _piece(*whole, (*_WHOLE, SMPL[1:], BODY[1:]))]
-    stored = [(name, array, PIECES[base]) for base in PIECES for name, array in _listed(_stored(first, base))]
+                return [_piece(*whole, choices)]
+            rest = [joints[1:] for joints in SMPL.poses]
+            return [_piece("Rh", turn, pieces_of()["Rh"]), _piece(*whole, (*choices, *rest))]
+    stored: list[tuple[str, Array, list[Joints]]] = []
+    for base, sets in pieces_of().items():
+        choices = sets if kind is None else of_kind(sets, kind.pieces.get(base, ()))
+        stored += [(name, array, choices) for name, array in _listed(_stored(first, base))]
     # One matrix has the shape of three rotation vectors: how many frames the others have tells which it is.
     others = [_piece(*one) for one in stored if one[1].shape != (3, 3)]
     frames = {len(piece.rotations) for piece in others} - {1}
@@ -142,14 +146,17 @@ def place(
 
 
 def joints_of(body: BodyModel) -> dict[str, list[int]]:
-    """The joints of each piece that a body has, under the names that the smplx package gives the pieces."""
+    """The joints of each piece that a body has, under the names by which its kind writes the pieces; for bodies of no
+    kind in `formats.FORMATS` those of the smplx package."""
     column = {name: index for index, name in enumerate(body.joint_names)}
-    pieces = {name: [piece for piece in PIECES[name] if set(piece) <= set(column)] for name in _SMPLX_PIECES}
+    own = FORMATS.get(body.kind)
+    listed = pieces_of() if own is None else {"pose": own.poses, **own.pieces}
+    pieces = {name: [p for p in listed.get(name, ()) if set(p) <= set(column)] for name in (own or SMPLX).written}
     return {name: [column[joint] for joint in max(each, key=len)] for name, each in pieces.items() if each}
 
 
 def split(pose: Array, body: BodyModel) -> dict[str, Array]:
-    """Poses (T, J, 3) of a body as the arrays of its pieces (T, 3 n), under smplx's names; `joined` reads them."""
+    """Poses (T, J, 3) of a body as the arrays of its pieces (T, 3 n), named by `joints_of`; `joined` reads them."""
     return {name: pose[:, joints].reshape(len(pose), -1) for name, joints in joints_of(body).items()}
 
 
@@ -180,7 +187,7 @@ def _listed(found: tuple[str, Array] | None) -> list[tuple[str, Array]]:
     return [] if found is None else [found]
 
 
-def _piece(name: str, array: Array, choices: Sequence[tuple[str, ...]]) -> Piece:
+def _piece(name: str, array: Array, choices: Sequence[Joints]) -> Piece:
     """The rotations of an array by its shape; those of the first of the `choices` of joints that it fits."""
     order = next((order for ending, order in _ORDERS.items() if name.endswith(ending)), None)
     for joints in choices:
@@ -188,6 +195,7 @@ def _piece(name: str, array: Array, choices: Sequence[tuple[str, ...]]) -> Piece
             rows = _rows(array, len(joints), width)
             if rows is None or (form == _QUATERNIONS) != (order is not None):
                 continue
+            _check_only(name, array, joints, choices)
             return Piece(_vectors(name, form, rows, order), joints, name, form)
     for joints in choices:
         if order is None and _rows(array, len(joints), 4) is not None:
@@ -202,7 +210,20 @@ def _piece(name: str, array: Array, choices: Sequence[tuple[str, ...]]) -> Piece
     )
 
 
-def _square(name: str, array: Array, choices: Sequence[tuple[str, ...]], frames: set[int]) -> Piece:
+def _check_only(name: str, array: Array, joints: Joints, choices: Sequence[Joints]) -> None:
+    """ValueError if other joints are as many."""
+    equal = [other for other in choices if len(other) == len(joints)]
+    if len(equal) == 1:
+        return
+    sets = {format.title: {*format.poses, *sum(format.pieces.values(), ())} for format in FORMATS.values()}
+    titles = [next(title for title, own in sets.items() if other in own) for other in equal]
+    raise ValueError(
+        f"{name} has shape {array.shape}, as poses of {' and '.join(titles)} have, and nothing tells of which model it "
+        f"is: name it in an array model, as one of {', '.join(FORMATS)}"
+    )
+
+
+def _square(name: str, array: Array, choices: Sequence[Joints], frames: set[int]) -> Piece:
     """An array (3, 3): one matrix, if it is a rotation and the other pieces have not three `frames`, else vectors."""
     single = [joints for joints in choices if len(joints) == 1]
     if not single or not _are_rotations(array[None]):

@@ -1,4 +1,4 @@
-"""Many posed bodies without their vertices: these are made when they are asked for, a piece at a time."""
+"""A sequence of posed bodies whose vertices are computed on demand, a piece at a time."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class PosedSequence:
         return self.body(*self.parameters(index)).vertices
 
     def pieces(self, size: int) -> Iterator[NDArray[np.floating]]:
-        """The vertices of `size` bodies after the other; a piece is overwritten by the next."""
+        """The vertices in pieces of `size` bodies; each piece overwrites the one before."""
         buffer = None
         for start in range(0, self.length, size):
             buffer = self.body.vertices_into(buffer, *self.parameters(slice(start, min(start + size, self.length))))
@@ -72,7 +72,7 @@ class PosedSequence:
 
 
 def pieces(bodies: PosedSequence | NDArray[Any], size: int) -> Iterator[NDArray[Any]]:
-    """Vertices of up to `size` bodies after the other; at least one piece. Raises ValueError if size is under 1."""
+    """The vertices in pieces of up to `size` bodies; at least one piece. ValueError if size is under 1."""
     if size < 1:
         raise ValueError(f"piece: expected 1 body or more, got {size}")
     if isinstance(bodies, PosedSequence) and len(bodies):
@@ -83,5 +83,5 @@ def pieces(bodies: PosedSequence | NDArray[Any], size: int) -> Iterator[NDArray[
 
 
 def rows_of(array: NDArray[Any], index: Index) -> NDArray[Any]:
-    """Those rows; a single row is that of every body."""
+    """Rows of an array; a single row is shared by all bodies."""
     return array if len(array) == 1 else array[index]

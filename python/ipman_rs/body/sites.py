@@ -1,4 +1,4 @@
-"""Points that the caller brings to a body: on its skin, inside, or by the name of a joint."""
+"""Points of a body that a caller defines: on its skin, inside it, or by the name of a joint."""
 
 from __future__ import annotations
 

@@ -1,58 +1,59 @@
-"""Model files in the formats of SMPL (24 joints), SMPL+H (52) and SMPL-X (55), as `.npz` or `.pkl`."""
+"""Model files of SMPL (24 joints), SMPL+H (52) and SMPL-X (55), as `.npz` or `.pkl`.
+
+They have the same arrays and do not name their joints: which of the three a file is, the number of its joints says.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import safe_npz, safe_pickle
+from ..files import safe_npz
 from . import joints
+from .body_format import BodyFormat
 from .hands import JOINTS_PER_HAND, Hands
+from .joints import BODY, LEFT_HAND, RIGHT_HAND
 from .model import BodyModel
+from .model_file import ModelFile
 
 EXPRESSIONS = 10
 FULL_SHAPE_SPACE = 300  # SMPL-X files with all components: 300 of shape, then 100 of expression
 FULL_EXPRESSION_SPACE = 100
 HAND_KEYS = ("hands_meanl", "hands_meanr", "hands_componentsl", "hands_componentsr")
 
-Read = Callable[[str, tuple[int, ...]], NDArray[Any]]
 
-
-def load(
-    path: Path,
-    num_betas: int = 10,
-    flat_hand_mean: bool = False,
-    v_template: NDArray[np.float64] | None = None,
+def _load(
+    file: ModelFile,
+    name: str,
+    names: tuple[str, ...],
+    num_betas: int,
+    flat_hand_mean: bool,
+    v_template: NDArray[np.float64] | None,
 ) -> BodyModel:
-    """The body model in `path`; see `ipman_rs.load_body`. Raises ValueError naming the file and what was expected."""
-    read, keys = _open(path)
+    read = file.read
     mean = read("v_template", (-1, 3))
     num_vertices = len(mean)
     if v_template is None:
         v_template = mean
     elif v_template.shape != mean.shape:
-        raise ValueError(f"v_template: expected {mean.shape}, as {path} has, got {v_template.shape}")
-    parents = _parents(path, read("kintree_table", (2, -1)))
-    names = joints.BY_COUNT.get(len(parents))
-    if names is None:
-        raise ValueError(f"{path}: expected 24 (SMPL), 52 (SMPL+H) or 55 (SMPL-X) joints, found {len(parents)}")
-    faces = _faces(path, read("f", (-1, 3)), num_vertices)
+        raise ValueError(f"v_template: expected {mean.shape}, as {file.path} has, got {v_template.shape}")
+    parents = _parents(file)
+    faces = file.faces("f", num_vertices)
     # One layout for all files, and einsum for products: BLAS sums in an order of the layout's.
     regressor = np.array(read("J_regressor", (len(parents), num_vertices)), order="C")
     shapedirs, expressiondirs = _split_shapes(
-        read("shapedirs", (num_vertices, 3, -1)), num_betas, has_face=len(names) == len(joints.SMPLX)
+        read("shapedirs", (num_vertices, 3, -1)), num_betas, has_face="jaw" in names
     )
     return BodyModel(
-        name=path.stem,
+        name=file.path.stem,
         v_template=v_template,
         shapedirs=shapedirs,
         expressiondirs=expressiondirs,
-        posedirs=read("posedirs", (num_vertices, 3, 9 * (len(parents) - 1))) if "posedirs" in keys else None,
+        posedirs=read("posedirs", (num_vertices, 3, 9 * (len(parents) - 1))) if "posedirs" in file.keys else None,
         J_template=np.einsum("jv,vc->jc", regressor, v_template),
         J_shapedirs=np.einsum("jv,vck->jck", regressor, shapedirs),
         J_expressiondirs=np.einsum("jv,vck->jck", regressor, expressiondirs),
@@ -61,8 +62,17 @@ def load(
         faces=faces,
         parents=parents,
         joint_names=names,
-        hands=_hands(read, flat_hand_mean) if keys.issuperset(HAND_KEYS) else None,
+        hands=_hands(file, flat_hand_mean) if file.keys.issuperset(HAND_KEYS) else None,
+        kind=name,
     )
+
+
+def refuse(file: ModelFile) -> NoReturn:
+    """Raise the ValueError of a file that is none of the three."""
+    file.read("v_template", (-1, 3))
+    parents = _parents(file)
+    said = [f"{len(each.joints)} ({each.title})" for each in (SMPL, SMPLH, SMPLX)]
+    raise ValueError(f"{file.path}: expected {', '.join(said[:-1])} or {said[-1]} joints, found {len(parents)}")
 
 
 _GENDERS = {"female": "female", "f": "female", "male": "male", "m": "male", "neutral": "neutral", "n": "neutral"}
@@ -85,63 +95,15 @@ def gender_of(path: Path) -> str:
     return next((_GENDERS[word] for word in (*words, *re.split(r"[^a-z]+", stem)) if word in _GENDERS), "")
 
 
-def _open(path: Path) -> tuple[Read, set[str]]:
-    """The names of the file's arrays and a reader that checks them: finite float64 of a shape (-1 fits any size)."""
-    if path.suffix == ".npz":
-        keys = safe_npz.names(path)
-
-        def raw(key: str, shape: tuple[int, ...]) -> NDArray[Any]:
-            return safe_npz.read(path, key)
-
-    elif path.suffix == ".pkl":
-        content = safe_pickle.read(path)
-        keys = {key for key in content if isinstance(key, str)}
-
-        def raw(key: str, shape: tuple[int, ...]) -> NDArray[Any]:
-            return safe_pickle.as_array(content[key], shape)
-
-    else:
-        raise ValueError(
-            f"{path}: a body model is a .npz or a .pkl file, not {path.suffix or 'a file without suffix'!r}"
-        )
-
-    def read(key: str, shape: tuple[int, ...]) -> NDArray[Any]:
-        if key not in keys:
-            raise ValueError(
-                f"{path}: no array {key!r} in it (it has {', '.join(sorted(keys)) or 'none'}); expected a model "
-                "file of SMPL, SMPL+H or SMPL-X, not a motion or a mesh"
-            )
-        try:
-            array = raw(key, shape)
-        except Exception as error:
-            raise ValueError(f"{path}: {key}: {error}") from error
-        if array.dtype.kind not in "fiu":
-            raise ValueError(f"{path}: {key}: expected numbers, found type {array.dtype}")
-        fits = array.ndim == len(shape) and all(want in (-1, got) for want, got in zip(shape, array.shape, strict=True))
-        if not fits or array.size == 0:
-            wanted = ", ".join("any" if size == -1 else str(size) for size in shape)
-            raise ValueError(f"{path}: {key}: expected shape ({wanted}), got {array.shape}")
-        if not np.isfinite(array).all():
-            raise ValueError(f"{path}: {key}: has NaN or infinite numbers in it")
-        return array.astype(float)
-
-    return read, keys
-
-
-def _parents(path: Path, kintree: NDArray[np.float64]) -> NDArray[np.int64]:
+def _parents(file: ModelFile) -> NDArray[np.int64]:
     """Parent of each joint; upstream marks the root with 2**32 - 1 or with -1."""
+    kintree = file.read("kintree_table", (2, -1))
     parents = np.concatenate([[-1], kintree[0, 1:]])
     if not ((parents[1:] >= 0) & (parents[1:] < np.arange(1, len(parents)))).all():
-        raise ValueError(f"{path}: kintree_table: each joint after the root must name an earlier joint as its parent")
-    return parents.astype(np.int64)
-
-
-def _faces(path: Path, faces: NDArray[np.float64], num_vertices: int) -> NDArray[np.int64]:
-    if faces.min() < 0 or faces.max() >= num_vertices:
         raise ValueError(
-            f"{path}: f: face indices must lie in 0 to {num_vertices - 1}, found {faces.min():.0f} to {faces.max():.0f}"
+            f"{file.path}: kintree_table: each joint after the root must name an earlier joint as its parent"
         )
-    return faces.astype(np.int64)
+    return parents.astype(np.int64)
 
 
 def _split_shapes(
@@ -155,7 +117,8 @@ def _split_shapes(
     return directions[..., : min(num_betas, start)], directions[..., start : start + EXPRESSIONS]
 
 
-def _hands(read: Read, flat: bool) -> Hands:
+def _hands(file: ModelFile, flat: bool) -> Hands:
+    read = file.read
     size = 3 * JOINTS_PER_HAND
     mean = np.concatenate([read("hands_meanl", (size,)), read("hands_meanr", (size,))]).reshape(-1, 3)
     return Hands(
@@ -163,3 +126,62 @@ def _hands(read: Read, flat: bool) -> Hands:
         left_components=read("hands_componentsl", (-1, size)),
         right_components=read("hands_componentsr", (-1, size)),
     )
+
+
+def _format(name: str, title: str, names: tuple[str, ...], **more: Any) -> BodyFormat:
+    def matches(file: ModelFile) -> bool:
+        try:
+            return "v_template" in file.keys and len(_parents(file)) == len(names)
+        except ValueError:
+            return False
+
+    def load(
+        file: ModelFile, *, num_betas: int, flat_hand_mean: bool, v_template: NDArray[np.float64] | None
+    ) -> BodyModel:
+        return _load(file, name, names, num_betas, flat_hand_mean, v_template)
+
+    written = (
+        "global_orient", "body_pose", "jaw_pose", "leye_pose", "reye_pose", "left_hand_pose", "right_hand_pose",
+    )  # fmt: skip
+    return BodyFormat(name, title, names, matches, load, written=written, **more)
+
+
+# Arrays that hold a piece of the pose, in files of AMASS, of the smplx package, and of EasyMocap.
+_BODY_PIECES = {
+    "global_orient": (BODY[:1],),
+    "root_orient": (BODY[:1],),
+    "Rh": (BODY[:1],),
+    "body_pose": (BODY[1:],),
+    "pose_body": (BODY[1:],),
+}
+_HAND_PIECES = {
+    "left_hand_pose": (LEFT_HAND,),
+    "right_hand_pose": (RIGHT_HAND,),
+    "pose_hand": ((*LEFT_HAND, *RIGHT_HAND),),
+}
+_FACE_PIECES = {
+    "jaw_pose": (("jaw",),),
+    "pose_jaw": (("jaw",),),
+    "leye_pose": (joints.SMPLX[23:24],),
+    "reye_pose": (joints.SMPLX[24:25],),
+    "pose_eye": (joints.SMPLX[23:25],),
+}
+_BODY_OR_ALL = (BODY[1:], joints.SMPL[1:])
+
+SMPL = _format(
+    "smpl",
+    "SMPL",
+    joints.SMPL,
+    poses=(joints.SMPL, BODY),
+    pieces={**_BODY_PIECES, "body_pose": _BODY_OR_ALL, "pose_body": _BODY_OR_ALL},
+    # SMPL itself is downloaded under these names; all else is called SMPLX_NEUTRAL.npz and so on.
+    downloaded={"neutral": "basicmodel_neutral_lbs", "male": "basicmodel_m_lbs", "female": "basicmodel_f_lbs"},
+)
+SMPLH = _format("smplh", "SMPL+H", joints.SMPLH, poses=(joints.SMPLH, BODY), pieces={**_BODY_PIECES, **_HAND_PIECES})
+SMPLX = _format(
+    "smplx",
+    "SMPL-X",
+    joints.SMPLX,
+    poses=(joints.SMPLX, BODY),
+    pieces={**_BODY_PIECES, **_HAND_PIECES, **_FACE_PIECES},
+)

@@ -1,4 +1,4 @@
-"""Which vertices of a body are the soles of its feet."""
+"""The vertices of the soles of a body's feet."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _LOWER_LEGS = ("left_lower_leg", "right_lower_leg")
 def sole_vertices(template: BodyTemplate, within: float) -> NDArray[np.int64]:
     """The vertices (n,) of both lower legs that lie less than `within` m above the lowest of them in the resting pose.
 
-    The template stands y up and has the ten parts of `PART_NAMES`. How thick a sole is depends on what is asked: 2 cm
-    are skin that touches the floor wherever the foot is flat, 3 cm the whole foot under a shoe.
+    The template stands y up and has the ten parts of `PART_NAMES`. The thickness depends on the use: 2 cm
+    is the skin that touches the floor under a flat foot, 3 cm the whole foot in a shoe.
 
     Raises:
         ValueError: the template has no part of such a name.

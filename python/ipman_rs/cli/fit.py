@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..files.errors import FileError
 from .options import FLOOR, METRES, SIZE, UNIT, UP, Setting, force, needs, of_unknown_camera, rate, subject
 
 if TYPE_CHECKING:
-    from ..fitting.jobs.items import Item
-    from ..fitting.jobs.run import Settings
-    from ..view import Study
+    from ..fitting.jobs.run import Fits
 
 
 @click.command()
@@ -168,7 +165,6 @@ def fit(
         raise click.UsageError("expected INPUT..., or --data with --path")
     needs("torch", "roma", "yaml")
     warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
-    from ..fitting.jobs.items import Reading
     from . import console
 
     if data is not None:
@@ -176,36 +172,53 @@ def fit(
 
         where = {"name": data, "path": str(path), "split": split, "options": settings}
         sys.exit(fit_data(where, output, models, keypoints, image_folder, every, options))
-    options["preset"], options["model"] = options["preset"] or "fast", options["model"] or "anny-lite"
-    reading = Reading(options.pop("person"), options.pop("image_size"), image, sequence, options["force"])
-    items, tracks, failures = _items(inputs, reading)
-    said = next((name for name in ("up", "units", "rate", "markers") if options[name] is not None), None)
-    if said and not tracks and not failures:
-        raise click.UsageError(f"--{said} belongs to marker files (.trc, .c3d), of which there are none")
-    chosen = _settings(options)
-    if fps <= 0:
-        raise click.UsageError(f"--fps: expected more than 0, got {fps}")
-    studies, failed = _recordings(tracks, items if sequence else [], chosen, (every, fps), output, resume)
-    failures += failed
-    items = [] if sequence else items
-    records: dict[str, dict[str, Any]] = {}
-    if items:
-        records = _run(items, chosen, output, resume)
-        failures += [(item.source, item.failure) for item in items if item.failure is not None]
-        studies += _studies(items, records, chosen, output, pictures)
-    for source, what in failures:
+    fits = _fit(inputs, output, image, sequence, (every, fps), resume, pictures, options)
+    for source, flags in fits.flags:
+        console.warn_of(source, flags)
+    for source, what in fits.failures:
         console.error(f"{source}: {what}")
-    if studies:
+    if fits.studies:
         from .report import write
 
-        page = write(studies, output, failures, own_folders=True)
-        fits, recorded = [s for s in studies if s.fitted is not None], [s for s in studies if s.fitted is None]
-        if fits:
-            console.print_fits(fits)
+        page = write(fits.studies, output, fits.failures, own_folders=True)
+        people, recorded = (
+            [study for study in fits.studies if (study.fitted is not None) == single] for single in (True, False)
+        )
+        if people:
+            console.print_fits(people)
         if recorded:
             console.print_table(recorded)
         console.say(f"report: {page}")
-    sys.exit(1 if failures else 0)
+    sys.exit(1 if fits.failures else 0)
+
+
+def _fit(
+    inputs: tuple[Path, ...],
+    output: Path,
+    image: Path | None,
+    sequence: bool,
+    pace: tuple[int, float],
+    resume: bool,
+    pictures: int,
+    options: dict[str, Any],
+) -> Fits:
+    """The fits. Ends the command for options that fit no input, and where nothing can be written."""
+    from ..fitting.jobs.items import InputOptions
+    from ..fitting.jobs.options import fit_options
+    from ..fitting.jobs.recordings import Pace
+    from ..fitting.jobs.run import fit_files
+    from . import console
+
+    options["preset"], options["model"] = options["preset"] or "fast", options["model"] or "anny-lite"
+    reading = InputOptions(options.pop("person"), options.pop("image_size"), image, sequence, options["force"])
+    try:
+        chosen = fit_options(**options)
+        return fit_files(inputs, output, chosen, reading, Pace(*pace), resume, pictures, console.progress)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+    except OSError as error:
+        what = f"{output}: outputs cannot be written ({error.strerror or error}); choose another folder"
+        raise click.ClickException(what) from error
 
 
 def _list_places(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -218,105 +231,3 @@ def _list_places(context: click.Context, _: click.Parameter, wanted: bool) -> No
 
     click.echo("\n".join(places(ip.load_body("anny-lite"))))
     context.exit()
-
-
-def _items(inputs: tuple[Path, ...], reading: Any) -> tuple[list[Item], list[Path], list[tuple[str, str]]]:
-    """The people in the inputs, under names of their own, the marker files, and the files that have nobody."""
-    from ..fitting.jobs import items
-    from ..view.report import safe_names
-
-    found: list[Item] = []
-    failures: list[tuple[str, str]] = []
-    paths: list[Path] = []
-    for path in inputs:
-        try:
-            paths += items.expand([path])
-        except FileError as error:
-            failures.append((str(path), error.what))
-    if reading.photo is not None and len(paths) > 1:
-        raise click.UsageError(f"--image belongs to one keypoint file, got {len(paths)} inputs")
-    tracks = [path for path in paths if path.suffix.lower() in items.MARKERS]
-    for path in paths:
-        if path in tracks:
-            continue
-        try:
-            found += items.items(path, reading)
-        except FileError as error:
-            failures.append((str(path), error.what))
-        except (OSError, ValueError) as error:
-            failures.append((str(path), str(error)))
-    for item, name in zip(found, safe_names([item.name for item in found]), strict=True):
-        item.name = name
-    return found, tracks, failures
-
-
-def _recordings(
-    tracks: list[Path], frames: list[Item], settings: Settings, pace: tuple[int, float], output: Path, resume: bool
-) -> tuple[list[Study], list[tuple[str, str]]]:
-    """The fitted recordings, measured, and those that failed."""
-    from ..fitting.jobs import recordings
-    from . import console
-
-    studies: list[Study] = []
-    failures: list[tuple[str, str]] = []
-    for recording in recordings.recordings(tracks, frames):
-        try:
-            found = recordings.fitted(recording, settings, recordings.Pace(*pace), output, resume, console.progress)
-            console.warn_of(recording.source, found.flags)
-            studies.append(found)
-        except FileError as error:
-            failures.append((recording.source, error.what))
-        except OSError as error:
-            failures.append((recording.source, str(error)))
-    return studies, failures
-
-
-def _settings(options: dict[str, Any]) -> Settings:
-    import ipman_rs as ip
-
-    from ..data.markers import own
-    from ..fitting import camera_file, config
-    from ..fitting.jobs.run import Settings
-
-    try:
-        options["camera"] = None if options["camera"] is None else camera_file.read(options["camera"])
-        chosen, most = config.load(options.pop("preset")), options.pop("iterations")
-        if options["markers"] is not None:
-            own.read(options["markers"], ip.load_body(options["model"]))  # before anything is fitted
-        return Settings(config=chosen if most is None else config.capped(chosen, most), **options)
-    except ValueError as error:
-        raise click.UsageError(str(error)) from error
-
-
-def _run(items: list[Item], settings: Settings, output: Path, resume: bool) -> dict[str, dict[str, Any]]:
-    from ..fitting.jobs.run import run
-    from . import console
-
-    try:
-        return run(items, settings, output, resume, console.progress)
-    except ValueError as error:
-        raise click.UsageError(str(error)) from error
-    except OSError as error:
-        what = f"{output}: outputs cannot be written ({error.strerror or error}); choose another folder"
-        raise click.ClickException(what) from error
-
-
-def _studies(
-    items: list[Item], records: dict[str, dict[str, Any]], settings: Settings, output: Path, pictures: int
-) -> list[Study]:
-    """The fitted bodies, measured."""
-    import ipman_rs as ip
-
-    from ..fitting import photo
-    from ..fitting.jobs.outputs import study_of
-    from . import console
-
-    body = ip.load_body(settings.model)
-    fitted = [item for item in items if item.name in records]
-    studies = []
-    with console.progress("measuring", len(fitted)) as step:
-        for number, item in enumerate(fitted):
-            record = records[item.name]
-            studies.append(study_of(item, body, output / item.name, record, number < pictures, photo.read))
-            step.one()
-    return studies

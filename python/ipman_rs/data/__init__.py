@@ -1,6 +1,6 @@
-"""Data sets of people with ground, cameras, forces or pressure, each read into one common form.
+"""Data sets of people with ground, cameras, forces or pressure, all read into one common form.
 
-data = ipman_rs.data.open("human36m", "h36m_valid_protocol2.npz")    # nothing read yet but what the file says of itself
+data = ipman_rs.data.open("human36m", "h36m_valid_protocol2.npz")    # only headers are read
 frames = data[1000:1064]                                             # Frames: pose, betas, transl, joints, cameras ...
 for frames in ipman_rs.data.pieces(data, 64): ...
 """

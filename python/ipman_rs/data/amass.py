@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.body.formats import FORMATS
 from ipman_rs.files import safe_npz
 from ipman_rs.ground import Ground
 
@@ -41,7 +42,7 @@ SPLITS = {
         "BMLrub", "BioMotionLab_NTroje", "EKUT", "TCD_handMocap", "TCDHands", "ACCAD",
     ),
 }  # fmt: skip
-BODIES = {72: "smpl", 156: "smplh", 165: "smplx"}  # by the columns of poses
+BODIES = {3 * len(FORMATS[name].joints): name for name in ("smpl", "smplh", "smplx")}  # by the columns of poses
 RATES = ("mocap_framerate", "mocap_frame_rate")
 REQUIRED = ("poses", "betas", "trans")
 
@@ -63,12 +64,12 @@ def open(path: str | os.PathLike[str], split: str | None = None, *, frame_rate: 
             f"{files[other]}: poses: expected {motions[0][0]} columns as in {files[0].name}, got {motions[other][0]}; "
             "open the bodies of SMPL+H and of SMPL-X apart"
         )
-    taken = [_taken(count, rate, frame_rate) for _, count, rate in motions]
+    taken = [_select_rows(count, rate, frame_rate) for _, count, rate in motions]
 
     def sequence(index: int) -> Frames:
         return _frames(files[index], _name(files[index], root), taken[index], frame_rate or motions[index][2])
 
-    return sequences.demanded(path, sequences.sequences([len(rows) for rows in taken], sequence, path))
+    return sequences.require_plausible(path, sequences.sequences([len(rows) for rows in taken], sequence, path))
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
@@ -78,23 +79,25 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         files = _motions(root, None)
     except ValueError as error:
         return [Finding("missing", str(error), "expected a folder such as AMASS, with CMU/01/01_01_poses.npz in it")]
-    found = [Finding("ok", f"{len(files)} motions")]
+    findings = [Finding("ok", f"{len(files)} motions")]
     there = {part for file in files for part in file.relative_to(root).parts[:-1]} if root.is_dir() else set()
     for split, names in SPLITS.items():
         has = [name for name in names if name in there]
         if has:
-            found.append(Finding("ok", f"{split}: {', '.join(has)}"))
+            findings.append(Finding("ok", f"{split}: {', '.join(has)}"))
         elif root.is_dir():
-            found.append(Finding("missing", f"{split}: none of {', '.join(names)}"))
+            findings.append(Finding("missing", f"{split}: none of {', '.join(names)}"))
     whole = []
     for file in files:
         try:
             _header(file)
             whole.append(file)
         except ValueError as error:
-            found.append(Finding("wrong", str(error), "download it again"))
+            findings.append(Finding("wrong", str(error), "download it again"))
     named = {file: _name(file, root) for file in whole}
-    return found + sequences.judged([(name, partial(_whole, file, name)) for file, name in named.items()])
+    return findings + sequences.check_sequences(
+        [(name, partial(_all_frames, file, name)) for file, name in named.items()]
+    )
 
 
 def _motions(root: Path, split: str | None) -> list[Path]:
@@ -136,7 +139,7 @@ def _header(file: Path) -> tuple[int, int, float]:
     return poses[1], poses[0], float(rate.reshape(()))
 
 
-def _taken(count: int, rate: float, wanted: float | None) -> NDArray[np.int64]:
+def _select_rows(count: int, rate: float, wanted: float | None) -> NDArray[np.int64]:
     """The numbers of the frames that are taken of a motion."""
     if wanted is None or wanted >= rate:
         return np.arange(count)
@@ -150,7 +153,7 @@ def _name(file: Path, root: Path) -> str:
     return file.relative_to(root if root.is_dir() else root.parent).with_suffix("").as_posix()
 
 
-def _whole(file: Path, name: str) -> Frames:
+def _all_frames(file: Path, name: str) -> Frames:
     _, count, rate = _header(file)
     return _frames(file, name, np.arange(count), rate)
 
@@ -171,7 +174,7 @@ def _frames(file: Path, name: str, rows: NDArray[np.int64], rate: float) -> Fram
         betas=betas[rows] if len(betas) > 1 else np.broadcast_to(betas, (count, betas.shape[1])),
         transl=trans[rows],
     )
-    return sequences.plausible(file, frames)
+    return sequences.require_plausible_units(file, frames)
 
 
 def _numbers(file: Path, name: str) -> Array:
@@ -188,7 +191,7 @@ def _gender(file: Path) -> str:
     value = safe_npz.read(file, "gender").reshape(-1)
     if value.dtype.kind not in "US" or len(value) != 1:
         raise ValueError(f"{file}: gender: expected a word, got {value!r:.60}")
-    said = value[0].decode("latin1") if value.dtype.kind == "S" else str(value[0])
-    if said not in ("neutral", "female", "male"):
-        raise ValueError(f"{file}: gender: expected neutral, female or male, got {said!r}")
-    return said
+    gender = value[0].decode("latin1") if value.dtype.kind == "S" else str(value[0])
+    if gender not in ("neutral", "female", "male"):
+        raise ValueError(f"{file}: gender: expected neutral, female or male, got {gender!r}")
+    return gender

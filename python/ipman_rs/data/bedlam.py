@@ -1,8 +1,8 @@
-"""BEDLAM: rendered people in motion, one `.npz` a scene, as the project's own preprocessing writes it.
+"""BEDLAM: rendered people in motion, one `.npz` per scene, as the project's own preprocessing writes it.
 
     20221010_3-10_500_batch01hand_zoom_suburb_d_6fps.npz …    in the folder, or in its processed_labels
 
-A row a person in an image: imgname `seq_000000/seq_000000_0125.png`, center (2,) px, scale = side of the box / 200,
+One row per person and image: imgname `seq_000000/seq_000000_0125.png`, center (2,) px, scale = side of the box / 200,
 gender, pose_world and pose_cam (165,) SMPL-X or (72,) SMPL, hands relative to the flat hand (load the body with
 flat_hand_mean=True), shape (10,), (11,) or (16,), trans_world and trans_cam (3,) m, cam_int (3, 3) px, cam_ext (4, 4),
 gtkps (K, 2 or 3) px. Arrays are mapped into memory (see `rows`); motion_info, Python objects, is not read.
@@ -27,11 +27,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import joints
+from ipman_rs.body.formats import FORMATS
 from ipman_rs.ground import Ground
 
 from . import naming
-from .check import Finding, demand, of_frames, sample, stance
+from .check import Finding, check_frames, raise_if_wrong, sample, stance
 from .frames import Cameras, Frames, Rows
 from .joined import Joined
 from .rows import TEXT, RowFile
@@ -45,10 +45,10 @@ SHAPES: dict[str, tuple[int, ...] | str] = {
     "cam_int": (3, 3), "cam_ext": (4, 4), "gender": TEXT, "gtkps": (-1, -1), "hand_det_conf": (-1,),
 }  # fmt: skip
 REQUIRED = ("imgname", "center", "scale", "pose_world", "trans_world", "shape", "cam_int", "cam_ext")
-BODIES = {72: "smpl", 165: "smplx"}
+BODIES = {3 * len(FORMATS[name].joints): name for name in ("smpl", "smplx")}  # by the columns of pose_world
 
 
-class Scene:
+class BedlamScene:
     """The rows of one file, as Frames."""
 
     def __init__(self, path: Path, height: float | None = None) -> None:
@@ -99,12 +99,12 @@ class Scene:
         """The first of gtkps: the joints of the body model, in BEDLAM2's files OpenPose's."""
         if "gtkps" not in self.file:
             return {}
-        names = OPENPOSE if "hand_det_conf" in self.file else joints.BY_COUNT[self.num_joints]
+        names = OPENPOSE if "hand_det_conf" in self.file else FORMATS[self.body].joints
         points = self.file.numbers("gtkps", rows)[:, : len(names), :2]
         return {"keypoints": np.dstack([points, np.ones(points.shape[:2])]), "keypoint_names": names[: points.shape[1]]}
 
 
-def open(path: str | os.PathLike[str], split: None = None, height: float | None = None) -> Joined | Scene:
+def open(path: str | os.PathLike[str], split: None = None, height: float | None = None) -> Joined | BedlamScene:
     """Frames of a file, or of all `.npz` files of a folder one after the other; there are no splits.
 
     Raises ValueError naming the file for what is missing, damaged, of a wrong shape, or not metres, radians and y down.
@@ -115,9 +115,9 @@ def open(path: str | os.PathLike[str], split: None = None, height: float | None 
     files = _files(place)
     if not files:
         raise ValueError(f"{place}: {'no .npz file in it' if place.is_dir() else 'no such file or folder'}")
-    scenes = [Scene(file, height) for file in files]
+    scenes = [BedlamScene(file, height) for file in files]
     for scene in scenes:
-        demand(scene.file.path, _plausible(scene))
+        raise_if_wrong(scene.file.path, _check_scene(scene))
     return scenes[0] if len(scenes) == 1 else Joined(scenes)
 
 
@@ -131,20 +131,20 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
 
 def _check_file(file: Path) -> list[Finding]:
     try:
-        scene = Scene(file)
-        found = [Finding("ok", f"{len(scene)} rows with {', '.join(scene.file)}")]
-        found += _plausible(scene)
-        found += scene.file.scan()
+        scene = BedlamScene(file)
+        findings = [Finding("ok", f"{len(scene)} rows with {', '.join(scene.file)}")]
+        findings += _check_scene(scene)
+        findings += scene.file.scan()
     except ValueError as error:
         return [Finding("wrong", str(error))]
-    return [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in found]
+    return [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in findings]
 
 
 def _files(place: Path) -> list[Path]:
     return [place] if place.is_file() else sorted(place.glob("*.npz")) or sorted(place.glob("processed_labels/*.npz"))
 
 
-def _plausible(scene: Scene) -> list[Finding]:
+def _check_scene(scene: BedlamScene) -> list[Finding]:
     """The axes are judged without a floor, too."""
     frames = sample(scene)
-    return of_frames(frames) + (stance(frames, Ground(UP)) if frames.ground is None else [])
+    return check_frames(frames) + (stance(frames, Ground(UP)) if frames.ground is None else [])

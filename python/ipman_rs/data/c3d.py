@@ -14,8 +14,20 @@ from numpy.typing import NDArray
 from ipman_rs.files import read_bytes
 
 from . import c3d_format
-from .c3d_format import Parameters, several
-from .tracks import METRES, TO_Y_UP, Named, Tracks, and_more, letters, likely_unit, named, not_given, seen_of, tracks
+from .c3d_format import Parameters, parameter_values
+from .tracks import (
+    METRES,
+    TO_Y_UP,
+    MarkerColumns,
+    Tracks,
+    alphanumeric,
+    likely_unit,
+    list_names,
+    select_markers,
+    tracks,
+    unit_note,
+    visibility,
+)
 from .units import metres
 
 Array = NDArray[np.float64]
@@ -28,10 +40,10 @@ CENTER_OF_MASS = ("centreofmass", "centerofmass", "com", "wholebodycom")  # free
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
-    """What a file holds: P points in T samples, in the file's own unit and axes, and A analogue channels beside them.
+class C3DFile:
+    """The content of a C3D file: P points in T samples, in the file's unit and axes, and A analogue channels.
 
-    A point that was not seen is NaN. `outputs` and `markers` part the points into what a model computed and the rest.
+    A point that was not seen is NaN. `outputs` are the points that a model computed, `markers` the others.
     """
 
     names: tuple[str, ...]  # P, as the file has them, such as "SensorMat:M_1"
@@ -67,17 +79,17 @@ class Recording:
 
     @cached_property
     def _computed(self) -> list[int]:
-        said = {name for group in GROUPS for name in several(self.parameters.get("POINT", {}), group)}
+        listed = {name for group in GROUPS for name in parameter_values(self.parameters.get("POINT", {}), group)}
         bare = [name.rpartition(":")[2] for name in self.names]
         axes = {name[:3] for name in bare if all(name[:3] + end in bare for end in "OALP")}  # LFEO, LFEA, LFEL, LFEP
         return [
             column
             for column, (name, own) in enumerate(zip(self.names, bare, strict=True))
-            if name in said
-            or own in said
+            if name in listed
+            or own in listed
             or OUTPUTS.fullmatch(own)
             or (len(own) == 4 and own[:3] in axes and own[3] in "OALP")
-            or letters(own) in CENTER_OF_MASS
+            or alphanumeric(own) in CENTER_OF_MASS
         ]
 
     @cached_property
@@ -86,15 +98,15 @@ class Recording:
         computed = set(self._computed)
         return [column for column in range(len(self.names)) if column not in computed]
 
-    def markers(self, subject: str | None = None) -> Named:
-        """The points that are markers of the person, without the subject before a colon; see `tracks.named`.
+    def markers(self, subject: str | None = None) -> MarkerColumns:
+        """The points that are markers of the person, without the subject before a colon; see `tracks.select_markers`.
 
         ValueError for two people of whom none is chosen.
         """
         rest = self._measured
-        seen, _ = seen_of(self.points[:, rest], [self.names[column] for column in rest])
-        chosen = named([self.names[column] for column in rest], seen, self.source, subject)
-        return Named(chosen.names, [rest[column] for column in chosen.columns], chosen.notes)
+        visible, _ = visibility(self.points[:, rest], [self.names[column] for column in rest])
+        chosen = select_markers([self.names[column] for column in rest], visible, self.source, subject)
+        return MarkerColumns(chosen.names, [rest[column] for column in chosen.columns], chosen.notes)
 
     def center_of_mass(self, subject: str | None = None) -> Array | None:
         """The whole body's centre of mass (T, 3) m in the file's axes, as a model such as Plug-in Gait computed it.
@@ -103,7 +115,7 @@ class Recording:
         """
         for column in self._computed:
             person, _, name = self.names[column].rpartition(":")
-            if letters(name) in CENTER_OF_MASS and subject in (None, person):
+            if alphanumeric(name) in CENTER_OF_MASS and subject in (None, person):
                 points = self.points[:, column] * self.metres
                 return np.where((points == 0).all(axis=-1, keepdims=True), np.nan, points)
         return None
@@ -129,21 +141,21 @@ class Recording:
         return scale
 
 
-def read(path: str | os.PathLike[str]) -> Recording:
+def read(path: str | os.PathLike[str]) -> C3DFile:
     """The content of a C3D file. ValueError, naming the file, if it is missing, damaged or shorter than it says."""
     data = read_bytes(path, MAX_BYTES)
     try:
         content = c3d_format.content(data)
     except ValueError as error:
-        said = str(error)
-        raise ValueError(f"{path}: {said}" if said.endswith("?") else f"{path}: {said}; {AGAIN}") from None
+        message = str(error)
+        raise ValueError(f"{path}: {message}" if message.endswith("?") else f"{path}: {message}; {AGAIN}") from None
     about, count = content.parameters["POINT"], content.points.shape[1]
-    names = [str(name) for name in several(about, "LABELS")][:count]
+    names = [str(name) for name in parameter_values(about, "LABELS")][:count]
     names += [""] * (count - len(names))
     rate = _number(about, "RATE")
     screen = "".join(str(value) for value in about.get("Y_SCREEN", []))
     axis = screen.strip()[-1:].lower()
-    found = Recording(
+    file = C3DFile(
         names=tuple(names),
         points=content.points,
         times=(content.first + np.arange(len(content.points))) / (rate if rate > 0 else 1.0),
@@ -156,20 +168,22 @@ def read(path: str | os.PathLike[str]) -> Recording:
         notes=content.notes,
     )
     if screen.strip() and axis not in TO_Y_UP:
-        note = f"its Y_SCREEN is {screen!r}, which is no axis: taken as {found.up} up (--up)"
-        found = replace(found, notes=(*found.notes, note))
-    if str(found.unit).strip():
-        return found
-    unit = _likely_unit(found)
-    return replace(found, unit=unit, notes=(*found.notes, not_given(unit)))
+        note = f"its Y_SCREEN is {screen!r}, which is no axis: taken as {file.up} up (--up)"
+        file = replace(file, notes=(*file.notes, note))
+    if str(file.unit).strip():
+        return file
+    unit = _likely_unit(file)
+    return replace(file, unit=unit, notes=(*file.notes, unit_note(unit)))
 
 
-def _likely_unit(found: Recording) -> str:
+def _likely_unit(file: C3DFile) -> str:
     """The unit of a file that does not say it: the one in which its markers, or else its plates, are not too large."""
-    rest = found._measured
-    seen, _ = seen_of(found.points[:, rest], [found.names[column] for column in rest])
-    corners = [each for each in found.values("FORCE_PLATFORM", "CORNERS") if isinstance(each, (int, float))]
-    places = found.points[:, rest][seen] if seen.any() else np.array(corners[: len(corners) // 3 * 3]).reshape(-1, 3)
+    rest = file._measured
+    visible, _ = visibility(file.points[:, rest], [file.names[column] for column in rest])
+    corners = [each for each in file.values("FORCE_PLATFORM", "CORNERS") if isinstance(each, (int, float))]
+    places = (
+        file.points[:, rest][visible] if visible.any() else np.array(corners[: len(corners) // 3 * 3]).reshape(-1, 3)
+    )
     return likely_unit(places) if len(places) else "mm"
 
 
@@ -185,17 +199,17 @@ def markers(
     `subject`: of whom, where the file has several people. ValueError, naming the file, if it is missing, damaged, has
     no markers, or has those of several people of whom none is chosen.
     """
-    found = read(path)
-    if not found.names and "ROTATION" in found.parameters:
+    file = read(path)
+    if not file.names and "ROTATION" in file.parameters:
         raise ValueError(f"{path}: expected markers, it has rotations of segments only, as Theia writes them")
-    rest = found._measured
-    notes = [note for note in found.notes if unit is None or note != not_given(found.unit)]
-    if found._computed:
-        notes.append(f"{len(found._computed)} outputs of a model are no markers: {and_more(list(found.outputs), 4)}")
-    names = [found.names[column] for column in rest]
-    said, up = found.unit if unit is None else unit, up or found.up
-    times = found.times if rate is None else np.arange(len(found.points)) / rate
-    return tracks(names, found.points[:, rest], times, said, up, found.source, subject=subject, notes=notes)
+    rest = file._measured
+    notes = [note for note in file.notes if unit is None or note != unit_note(file.unit)]
+    if file._computed:
+        notes.append(f"{len(file._computed)} outputs of a model are no markers: {list_names(list(file.outputs), 4)}")
+    names = [file.names[column] for column in rest]
+    file_unit, up = file.unit if unit is None else unit, up or file.up
+    times = file.times if rate is None else np.arange(len(file.points)) / rate
+    return tracks(names, file.points[:, rest], times, file_unit, up, file.source, subject=subject, notes=notes)
 
 
 def _faced(parameters: Parameters) -> str:

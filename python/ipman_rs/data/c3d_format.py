@@ -1,7 +1,7 @@
 """The bytes of a C3D file: its header, its parameters and its frames, as the format's manual (c3d.org) has them.
 
-Nothing is believed that the file says of itself: every length, count and place is compared with the file's size before
-it is used, so that a damaged file ends in an error, never in a crash, in made-up frames or in a loop without end.
+The file's own statements are not trusted: every length, count and offset is compared with the file's size before it is
+used, so that a damaged file gives an error and never a crash, invented frames or an endless loop.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class _Layout:
 
 
 def content(data: bytes) -> Content:
-    """What a file of these bytes holds. ValueError, saying what is wrong, if it is no C3D file, cut or damaged."""
+    """The content of a file of these bytes. ValueError, saying what is wrong, if it is no C3D file, cut or damaged."""
     if len(data) < BLOCK or data[1] != KEY:
         raise ValueError("expected a C3D file, got something else")
     begin = (data[0] - 1) * BLOCK
@@ -107,14 +107,14 @@ def _parameters(numbers: _Numbers, begin: int, data_block: int, notes: list[str]
     blocks = max(numbers.data[begin + 2], data_block - 1 - begin // BLOCK)  # one byte counts no more than 255 of them
     end = min(begin + blocks * BLOCK, len(numbers.data))
     groups: dict[int, str] = {}
-    found: list[tuple[int, str, list[Any]]] = []
+    records: list[tuple[int, str, list[Any]]] = []
     for number, name, value in _records(numbers, begin + 4, end, notes):
         if value is None:
             groups[-number] = name
         else:
-            found.append((number, name, value))
+            records.append((number, name, value))
     parameters: Parameters = {name: {} for name in groups.values()}
-    for number, name, value in found:
+    for number, name, value in records:
         if number in groups:
             parameters[groups[number]][name] = value
     if "POINT" not in parameters:
@@ -195,17 +195,17 @@ def _layout(numbers: _Numbers, header: list[int], parameters: Parameters, notes:
     scale, real = _first(parameters, "POINT", "SCALE"), bool(np.signbit(numbers.reals(12, 1)[0]))
     used = _count(parameters, "POINT", "USED")
     points, counts = header[1] if used is None else used, _analog_counts(header, parameters)
-    said = [_Layout(points, count, real if scale is None else scale < 0) for count in counts]
-    of_header = [_Layout(header[1], count, real) for count in counts]
-    possible = [(start, each) for each in dict.fromkeys(said + of_header) for start in starts]
+    by_parameters = [_Layout(points, count, real if scale is None else scale < 0) for count in counts]
+    by_header = [_Layout(header[1], count, real) for count in counts]
+    possible = [(start, each) for each in dict.fromkeys(by_parameters + by_header) for start in starts]
     if len(possible) == 1:
         return possible[0]
     frames = max(_said_frames(header, parameters), default=0)
     filled = [  # the last block is filled up
         (start, each) for start, each in possible if 0 <= len(numbers.data) - start - frames * each.size < BLOCK
     ]
-    if len(filled) != 1 and len(starts) == 1 and said[0] == of_header[0] and _of_used(header, parameters):
-        filled = [(starts[0], said[0])]  # the rates alone say otherwise, and the size does not tell
+    if len(filled) != 1 and len(starts) == 1 and by_parameters[0] == by_header[0] and _of_used(header, parameters):
+        filled = [(starts[0], by_parameters[0])]  # the rates alone say otherwise, and the size does not tell
     if len(filled) != 1:
         raise ValueError(
             f"expected a C3D file: its header has {header[1]} points and {header[2]} analogue samples a frame from "
@@ -261,12 +261,12 @@ def _compare_rates(of_header: float, header: list[int], parameters: Parameters, 
 def _said_frames(header: list[int], parameters: Parameters) -> list[int]:
     """The numbers of frames that header and parameters say."""
     first, last = header[3], header[4]
-    said = [last - first + 1] if last >= first and last > 0 else []
+    counts = [last - first + 1] if last >= first and last > 0 else []
     count = _count(parameters, "POINT", "FRAMES")
     more = _more_frames(parameters)
     if more and LARGEST_COUNT in (last, count):  # two bytes are not enough for it
         return [more]
-    return said + ([count] if count else [])
+    return counts + ([count] if count else [])
 
 
 def _more_frames(parameters: Parameters) -> int | None:
@@ -283,20 +283,22 @@ def _frames(available: int, layout: _Layout, header: list[int], parameters: Para
     """How many frames there are. ValueError for frames that the file says it has and that are not there."""
     if layout.size == 0:
         raise ValueError("expected points or analogue samples, it has none")
-    said, held = _said_frames(header, parameters), available // layout.size
-    if max(said, default=0) > held:
-        raise ValueError(f"expected {max(said)} frames as it says, {held} at most fit in: is the download complete?")
-    if not said:
-        raise ValueError("expected a C3D file: it does not say how many frames it has")
-    if LARGEST_COUNT - header[3] < max(said) <= LARGEST_COUNT == header[4] and not _more_frames(parameters):
-        notes.append(f"the first {max(said)} frames are read: it does not say how many more there are")
-    elif min(said) < max(said):
-        notes.append(f"it says {min(said)} and {max(said)} frames; {max(said)} are read")
-    elif available - max(said) * layout.size >= BLOCK:  # the last block is filled up
-        notes.append(
-            f"the last {available - max(said) * layout.size} bytes, behind its {max(said)} frames, are not read"
+    counts, capacity = _said_frames(header, parameters), available // layout.size
+    if max(counts, default=0) > capacity:
+        raise ValueError(
+            f"expected {max(counts)} frames as it says, {capacity} at most fit in: is the download complete?"
         )
-    return max(said)
+    if not counts:
+        raise ValueError("expected a C3D file: it does not say how many frames it has")
+    if LARGEST_COUNT - header[3] < max(counts) <= LARGEST_COUNT == header[4] and not _more_frames(parameters):
+        notes.append(f"the first {max(counts)} frames are read: it does not say how many more there are")
+    elif min(counts) < max(counts):
+        notes.append(f"it says {min(counts)} and {max(counts)} frames; {max(counts)} are read")
+    elif available - max(counts) * layout.size >= BLOCK:  # the last block is filled up
+        notes.append(
+            f"the last {available - max(counts) * layout.size} bytes, behind its {max(counts)} frames, are not read"
+        )
+    return max(counts)
 
 
 def _scale(numbers: _Numbers, parameters: Parameters) -> float:
@@ -355,13 +357,13 @@ def _analogs(
 
 def _each(about: dict[str, list[Any]], name: str, channels: int, lacking: float) -> Array:
     """A number of each channel; a parameter holds up to 255 of them, the next has a 2 behind its name."""
-    values = several(about, name)
+    values = parameter_values(about, name)
     numbers = [float(value) for value in values[:channels] if isinstance(value, (int, float))]
     return np.array(numbers + [lacking] * (channels - len(numbers)))
 
 
-def several(about: dict[str, list[Any]], name: str) -> list[Any]:
-    """The values of a parameter and of those that go on with it: LABELS, LABELS2, LABELS3, …"""
+def parameter_values(about: dict[str, list[Any]], name: str) -> list[Any]:
+    """The values of a parameter and its continuations: LABELS, LABELS2, LABELS3, …"""
     values, more = list(about.get(name, [])), 2
     while f"{name}{more}" in about:
         values += about[f"{name}{more}"]

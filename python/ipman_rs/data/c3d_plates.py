@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import c3d
-from .c3d_format import several
+from .c3d_format import parameter_values
 from .check import size_of_body
-from .tracks import not_given, seen_of
+from .tracks import unit_note, visibility
 from .units import metres, newton_metres, newtons
 
 Array = NDArray[np.float64]
@@ -32,14 +32,14 @@ OTHER_TYPES = {  # what they are, for whoever has one
 }
 
 
-def usable(found: c3d.Recording, used: int) -> tuple[list[Plate], tuple[str, ...]]:
+def usable_plates(file: c3d.C3DFile, used: int) -> tuple[list[Plate], tuple[str, ...]]:
     """The plates that can be computed, and what is wrong with the others. ValueError if it is something with each."""
     plates, wrong = [], []
-    scale, notes = _plates_unit(found)
-    notes = (*(note for note in found.notes if note == not_given(found.unit)), *notes)
+    scale, notes = _plates_unit(file)
+    notes = (*(note for note in file.notes if note == unit_note(file.unit)), *notes)
     for index in range(min(used, MOST)):
         try:
-            plate = Plate.of(found, index, scale)
+            plate = Plate.of(file, index, scale)
             _ = plate.axes  # of corners that make a plate
             notes = (*notes, *plate.astray())
             plates.append(plate)
@@ -47,24 +47,24 @@ def usable(found: c3d.Recording, used: int) -> tuple[list[Plate], tuple[str, ...
             wrong.append(str(error))
     if not plates:
         raise ValueError(wrong[0])
-    return plates, (*notes, *(f"{what.removeprefix(f'{found.source}: ')}; left out" for what in wrong))
+    return plates, (*notes, *(f"{what.removeprefix(f'{file.source}: ')}; left out" for what in wrong))
 
 
-def _plates_unit(found: c3d.Recording) -> tuple[float, tuple[str, ...]]:
+def _plates_unit(file: c3d.C3DFile) -> tuple[float, tuple[str, ...]]:
     """Metres in the unit of corners and origins: the points', unless only the points, a person's, can be in it."""
-    scale = found.metres
-    values = [value for value in found.values("FORCE_PLATFORM", "CORNERS") if isinstance(value, (int, float))]
+    scale = file.metres
+    values = [value for value in file.values("FORCE_PLATFORM", "CORNERS") if isinstance(value, (int, float))]
     corners = np.array(values[: len(values) // 12 * 12], float).reshape(-1, 4, 3)
     sides = np.linalg.norm(corners[:, 0] - corners[:, 1], axis=-1)
     sides = sides[np.isfinite(sides) & (sides > 0)]
     if not len(sides) or np.median(sides) * scale <= LONGEST or not SHORTEST < np.median(sides) * 1e-3 <= LONGEST:
         return scale, ()
-    own = found.markers(next(iter(found.subjects), None))
-    seen, _ = seen_of(found.points[:, own.columns], own.names)
-    points = np.where(seen[..., None], found.places(own.columns), np.nan)
-    if not seen.any() or size_of_body("points", points)[0].level != "ok":
+    own = file.markers(next(iter(file.subjects), None))
+    visible, _ = visibility(file.points[:, own.columns], own.names)
+    points = np.where(visible[..., None], file.places(own.columns), np.nan)
+    if not visible.any() or size_of_body("points", points)[0].level != "ok":
         return scale, ()  # all are in another unit than the file says
-    return 1e-3, (f"the corners of the force plates are in millimetres, its points in {found.unit}",)
+    return 1e-3, (f"the corners of the force plates are in millimetres, its points in {file.unit}",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,15 +79,15 @@ class Plate:
     unit: str  # of its moments, of type 1 of its centres of pressure, as the file says; "" if it does not
 
     @classmethod
-    def of(cls, found: c3d.Recording, index: int, scale: float) -> Plate:
+    def of(cls, file: c3d.C3DFile, index: int, scale: float) -> Plate:
         """`scale`: metres in the unit of its corners and origin."""
-        place = f"{found.source}: force plate {index + 1}"
-        kind = _type(found, index, place)
-        corners = _numbers_of_plate(found, "CORNERS", index, 12, place).reshape(4, 3) * scale
-        origin = _numbers_of_plate(found, "ORIGIN", index, 3, place) * scale
-        channels = _channels(found, index, kind, place)
-        units = _units(found, channels)
-        signals = _signals(found, index, kind, channels, scale, place)
+        place = f"{file.source}: force plate {index + 1}"
+        kind = _type(file, index, place)
+        corners = _numbers_of_plate(file, "CORNERS", index, 12, place).reshape(4, 3) * scale
+        origin = _numbers_of_plate(file, "ORIGIN", index, 3, place) * scale
+        channels = _channels(file, index, kind, place)
+        units = _units(file, channels)
+        signals = _signals(file, index, kind, channels, scale, place)
         if kind == 1:
             return cls(place, corners, signals[:, :3], signals[:, 3:5], signals[:, 5], units[3])
         forces, moments = _kistler(signals, origin) if kind == 3 else (signals[:, :3], signals[:, 3:])
@@ -114,10 +114,10 @@ class Plate:
         if middle == 0:
             return []
         unit = f", by the file in {self.unit!r}," if self.unit.strip() else ""
-        said = f"{self.place}: its centre of pressure is {middle:.3g} m outside its corners"
+        message = f"{self.place}: its centre of pressure is {middle:.3g} m outside its corners"
         if middle > 2 * np.linalg.norm(half):
-            raise ValueError(f"{said}: are its moments{unit} in another unit?")
-        name = said.removeprefix(self.place.rpartition(": ")[0]).removeprefix(": ")
+            raise ValueError(f"{message}: are its moments{unit} in another unit?")
+        name = message.removeprefix(self.place.rpartition(": ")[0]).removeprefix(": ")
         return [f"{name} in the median: are its corners and its origin right?"]
 
     def wrench(self, up: Array) -> tuple[Array, Array, Array]:
@@ -148,9 +148,9 @@ class Plate:
         return np.stack([x, np.cross(z, x), z], axis=1).astype(np.float64)
 
 
-def _type(found: c3d.Recording, index: int, place: str) -> int:
+def _type(file: c3d.C3DFile, index: int, place: str) -> int:
     """Which of the types that can be computed."""
-    kind = next(iter(whole_numbers(found, "TYPE")[index : index + 1]), None)
+    kind = next(iter(whole_numbers(file, "TYPE")[index : index + 1]), None)
     if kind in CHANNELS:
         return kind
     expected = f"TYPE: expected one of {', '.join(map(str, CHANNELS))}"
@@ -162,47 +162,47 @@ def _type(found: c3d.Recording, index: int, place: str) -> int:
     )
 
 
-def whole_numbers(found: c3d.Recording, name: str) -> list[int]:
+def whole_numbers(file: c3d.C3DFile, name: str) -> list[int]:
     """The numbers of a parameter of counts; 0 for what is none."""
-    values = found.values("FORCE_PLATFORM", name)
+    values = file.values("FORCE_PLATFORM", name)
     return [int(value) if isinstance(value, (int, float)) and np.isfinite(value) else 0 for value in values]
 
 
-def _numbers_of_plate(found: c3d.Recording, name: str, index: int, size: int, place: str) -> Array:
+def _numbers_of_plate(file: c3d.C3DFile, name: str, index: int, size: int, place: str) -> Array:
     """The numbers of one plate of a parameter whose last dimension is the plates. ValueError if some are missing."""
-    values = found.values("FORCE_PLATFORM", name)[index * size : (index + 1) * size]
-    got = np.array([value for value in values if isinstance(value, (int, float))], float)
-    if got.size != size or not np.isfinite(got).all():
-        raise ValueError(f"{place}: {name}: expected {size} numbers, got {int(np.isfinite(got).sum())}")
-    return got
+    values = file.values("FORCE_PLATFORM", name)[index * size : (index + 1) * size]
+    numbers = np.array([value for value in values if isinstance(value, (int, float))], float)
+    if numbers.size != size or not np.isfinite(numbers).all():
+        raise ValueError(f"{place}: {name}: expected {size} numbers, got {int(np.isfinite(numbers).sum())}")
+    return numbers
 
 
-def _channels(found: c3d.Recording, index: int, kind: int, place: str) -> list[int]:
+def _channels(file: c3d.C3DFile, index: int, kind: int, place: str) -> list[int]:
     """The columns of its signals. ValueError if they are too few, or not there."""
     count = CHANNELS[kind]
-    stored = whole_numbers(found, "CHANNEL")
-    each = len(stored) // max(len(whole_numbers(found, "TYPE")), 1)
-    channels = [number - 1 for number in stored[index * each : (index + 1) * each][:count]]
-    if len(channels) < count or min(channels) < 0 or max(channels) >= found.analogs.shape[1]:
+    stored = whole_numbers(file, "CHANNEL")
+    per_plate = len(stored) // max(len(whole_numbers(file, "TYPE")), 1)
+    channels = [number - 1 for number in stored[index * per_plate : (index + 1) * per_plate][:count]]
+    if len(channels) < count or min(channels) < 0 or max(channels) >= file.analogs.shape[1]:
         raise ValueError(
-            f"{place}: CHANNEL: expected {count} of the {found.analogs.shape[1]} channels, got "
+            f"{place}: CHANNEL: expected {count} of the {file.analogs.shape[1]} channels, got "
             f"{', '.join(str(channel + 1) for channel in channels) or 'none'}"
         )
     return channels
 
 
-def _units(found: c3d.Recording, channels: Sequence[int]) -> list[str]:
+def _units(file: c3d.C3DFile, channels: Sequence[int]) -> list[str]:
     """As the file says; "" where it does not."""
-    units = [str(unit) for unit in several(found.parameters.get("ANALOG", {}), "UNITS")]
+    units = [str(unit) for unit in parameter_values(file.parameters.get("ANALOG", {}), "UNITS")]
     return ["" if channel >= len(units) else units[channel] for channel in channels]
 
 
-def _signals(found: c3d.Recording, index: int, kind: int, channels: Sequence[int], length: float, place: str) -> Array:
+def _signals(file: c3d.C3DFile, index: int, kind: int, channels: Sequence[int], length: float, place: str) -> Array:
     """(T, 6 or 8) forces in N and moments in N m, or forces alone, in the plate's axes."""
-    signals, units = found.analogs[:, channels], _units(found, channels)
-    matrix = found.values("FORCE_PLATFORM", "CAL_MATRIX")
+    signals, units = file.analogs[:, channels], _units(file, channels)
+    matrix = file.values("FORCE_PLATFORM", "CAL_MATRIX")
     if kind == 4 and matrix:  # raw channels, turned into forces and moments by a matrix; Cortex leaves it empty
-        matrix = _numbers_of_plate(found, "CAL_MATRIX", index, 36, place)
+        matrix = _numbers_of_plate(file, "CAL_MATRIX", index, 36, place)
         with np.errstate(invalid="ignore", over="ignore"):
             signals, units = signals @ matrix.reshape(6, 6), [""] * 6
     return signals * [_scale(unit, kind, column, length, place) for column, unit in enumerate(units)]

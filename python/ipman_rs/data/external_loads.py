@@ -33,14 +33,14 @@ def read(path: str | os.PathLike[str]) -> ExternalLoads | None:
     """The ExternalLoads of an XML file; None if it has none. ValueError, naming the file, if it is damaged, names no
     file of forces, or has forces in the axes of a part of the body."""
     root = safe_xml.read(path)
-    found = next(root.iter("ExternalLoads"), None)
-    if found is None:
+    element = next(root.iter("ExternalLoads"), None)
+    if element is None:
         return None
-    datafile = _text(found, ".//datafile") or _text(found, ".//data_source_name")
+    datafile = _text(element, ".//datafile") or _text(element, ".//data_source_name")
     if not datafile:
         raise ValueError(f"{path}: expected a <datafile> with the forces, got none")
     loads = []
-    for force in found.iter("ExternalForce"):
+    for force in element.iter("ExternalForce"):
         for what in ("force_expressed_in_body", "point_expressed_in_body"):
             axes = _text(force, what)
             if axes.rpartition("/")[2] not in ("", "ground", "Unassigned"):
@@ -53,34 +53,34 @@ def read(path: str | os.PathLike[str]) -> ExternalLoads | None:
     return ExternalLoads(PureWindowsPath(datafile).name, tuple(loads), str(Path(path)))
 
 
-def beside(files: Iterable[Path]) -> tuple[dict[Path, ExternalLoads], dict[Path, Path], list[str]]:
+def find(files: Iterable[Path]) -> tuple[dict[Path, ExternalLoads], dict[Path, Path], list[str]]:
     """By files of forces: what the ExternalLoads among `files` say of them, and the XML files that do.
 
     And what is wrong with those XML files that cannot be read, or whose forces are not there."""
     files = list(files)
-    said: dict[Path, ExternalLoads] = {}
+    loads: dict[Path, ExternalLoads] = {}
     sources: dict[Path, Path] = {}
     wrong: list[str] = []
     for path in files:
         if path.suffix.lower() != ".xml":
             continue
         try:
-            found = read(path)
+            content = read(path)
         except ValueError as error:
             wrong.append(str(error))
             continue
-        if found is None:
+        if content is None:
             continue
-        named = [file for file in files if file.name.lower() == found.datafile.lower()]
+        named = [file for file in files if file.name.lower() == content.datafile.lower()]
         near = [file for file in named if file.parent == path.parent] or named
         if len(near) != 1:
             what = "is not there" if not near else f"is there {len(near)} times"
-            wrong.append(f"{path}: not used, for its file of forces, {found.datafile}, {what}")
-        elif near[0] not in said:
-            said[near[0]], sources[near[0]] = found, path
-    return said, sources, wrong
+            wrong.append(f"{path}: not used, for its file of forces, {content.datafile}, {what}")
+        elif near[0] not in loads:
+            loads[near[0]], sources[near[0]] = content, path
+    return loads, sources, wrong
 
 
 def _text(element: Element, path: str) -> str:
-    found = element.find(path)
-    return "" if found is None else (found.text or "").strip()
+    child = element.find(path)
+    return "" if child is None else (child.text or "").strip()

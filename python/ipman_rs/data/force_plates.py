@@ -27,11 +27,11 @@ from numpy.typing import ArrayLike, NDArray
 from ipman_rs.ground import Ground
 
 from . import c3d, sequences
-from .c3d_plates import LOADED, usable, whole_numbers
-from .check import Finding, demanded
+from .c3d_plates import LOADED, usable_plates, whole_numbers
+from .check import Finding, require_plausible
 from .frames import DataSet, Frames
 from .joined import Joined
-from .tracks import TO_Y_UP, seen_of
+from .tracks import TO_Y_UP, visibility
 
 NAME = "force-plates"
 
@@ -85,12 +85,12 @@ class ForcePlates:
         """
         wanted = np.asarray(times, float)
         loads = np.where((self.loads > least) & np.isfinite(self.points).all(axis=-1), self.loads, 0.0)
-        carried = between(self.times, loads[..., None], wanted)
+        carried = interpolate(self.times, loads[..., None], wanted)
         pressed = np.where(loads[..., None] > 0, loads[..., None] * self.points, 0.0)
-        weighted = between(self.times, pressed, wanted)
+        weighted = interpolate(self.times, pressed, wanted)
         with np.errstate(invalid="ignore"):
             points = np.where(carried > 0, weighted / carried, np.nan)
-        forces, moments = (between(self.times, values, wanted) for values in (self.forces, self.moments))
+        forces, moments = (interpolate(self.times, values, wanted) for values in (self.forces, self.moments))
         return replace(self, times=wanted, forces=forces, points=points, moments=moments)
 
     def turned(self, rotation: ArrayLike) -> ForcePlates:
@@ -102,27 +102,26 @@ class ForcePlates:
         )  # fmt: skip
 
 
-def recorded(found: ForcePlates) -> ForcePlates:
-    """Without the plates of which no force is a number; notes name them, those that lack some samples, and a load that
-    is nobody's."""
-    known = np.asarray(np.isfinite(found.forces).all(axis=-1))  # (T, P)
-    kept = np.asarray(known.any(axis=0))
-    if not kept.any():
-        return found
-    notes = [f"the forces of plate {plate + 1} are no numbers: it is left out" for plate in np.flatnonzero(~kept)]
+def drop_unreadable_plates(plates: ForcePlates) -> ForcePlates:
+    """Without plates whose forces are all NaN. Notes name these, plates with missing samples, and implausible loads."""
+    known = np.asarray(np.isfinite(plates.forces).all(axis=-1))  # (T, P)
+    readable = np.asarray(known.any(axis=0))
+    if not readable.any():
+        return plates
+    notes = [f"the forces of plate {plate + 1} are no numbers: it is left out" for plate in np.flatnonzero(~readable)]
     notes += [
-        f"the forces of plate {plate + 1} are no numbers in {(~known[:, plate]).sum()} of {len(found)} samples"
-        for plate in np.flatnonzero(kept & ~known.all(axis=0))
+        f"the forces of plate {plate + 1} are no numbers in {(~known[:, plate]).sum()} of {len(plates)} samples"
+        for plate in np.flatnonzero(readable & ~known.all(axis=0))
     ]
-    most = float(np.abs(np.nansum(found.loads, axis=1)).max())
+    most = float(np.abs(np.nansum(plates.loads, axis=1)).max())
     if most > HEAVIEST:
         notes.append(f"loads of up to {most:.0f} N, of a person expected up to {HEAVIEST:.0f} N: are they in newtons?")
-    parts = {name: getattr(found, name)[:, kept] for name in ("forces", "points", "moments")}
-    corners = None if found.corners is None else found.corners[kept]
-    return replace(found, **parts, corners=corners, notes=(*found.notes, *notes))
+    parts = {name: getattr(plates, name)[:, readable] for name in ("forces", "points", "moments")}
+    corners = None if plates.corners is None else plates.corners[readable]
+    return replace(plates, **parts, corners=corners, notes=(*plates.notes, *notes))
 
 
-def between(times: Array, values: Array, wanted: ArrayLike) -> Array:
+def interpolate(times: Array, values: Array, wanted: ArrayLike) -> Array:
     """Values (T, ...) at other times (n,), on straight lines between the samples: (n, ...).
 
     NaN more than half a sample outside the recording: files round their times.
@@ -130,9 +129,9 @@ def between(times: Array, values: Array, wanted: ArrayLike) -> Array:
     wanted, rows = np.asarray(wanted, float), values.reshape(len(values), -1)
     slack = 0.5 * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     outside = (wanted < times[0] - slack) | (wanted > times[-1] + slack)
-    found = np.stack([np.interp(wanted, times, column) for column in rows.T], axis=-1)
-    found[outside] = np.nan
-    return found.astype(np.float64).reshape(len(wanted), *values.shape[1:])
+    result = np.stack([np.interp(wanted, times, column) for column in rows.T], axis=-1)
+    result[outside] = np.nan
+    return result.astype(np.float64).reshape(len(wanted), *values.shape[1:])
 
 
 def read(path: str | os.PathLike[str], up: str | None = None) -> ForcePlates:
@@ -142,34 +141,34 @@ def read(path: str | os.PathLike[str], up: str | None = None) -> ForcePlates:
     surface, the plane of its corners. A baseline (FORCE_PLATFORM:ZERO) is not subtracted. A plate that cannot be
     computed is left out, `notes` say why. ValueError, naming the file, if it is damaged or no plate can be computed.
     """
-    return of_recording(c3d.read(Path(path)), up)
+    return from_c3d(c3d.read(Path(path)), up)
 
 
-def of_recording(found: c3d.Recording, up: str | None = None) -> ForcePlates:
-    """As `read`."""
-    used = (whole_numbers(found, "USED") or [0])[0]
+def from_c3d(file: c3d.C3DFile, up: str | None = None) -> ForcePlates:
+    """The force plates of a C3D file that has been read; see `read`."""
+    used = (whole_numbers(file, "USED") or [0])[0]
     if used < 1:
-        raise ValueError(f"{found.source}: expected force plates (FORCE_PLATFORM), it has none")
-    if (up or found.up) not in UP:
-        raise ValueError(f"{found.source}: up: expected x, y or z, got {up or found.up!r}")
-    vertical = UP[up or found.up]
-    count = len(found.analogs) // max(len(found.times), 1)
+        raise ValueError(f"{file.source}: expected force plates (FORCE_PLATFORM), it has none")
+    if (up or file.up) not in UP:
+        raise ValueError(f"{file.source}: up: expected x, y or z, got {up or file.up!r}")
+    vertical = UP[up or file.up]
+    count = len(file.analogs) // max(len(file.times), 1)
     if count == 0:
-        raise ValueError(f"{found.source}: expected samples of the force plates, it has none")
-    plates, notes = usable(found, used)
+        raise ValueError(f"{file.source}: expected samples of the force plates, it has none")
+    plates, notes = usable_plates(file, used)
     normals = np.abs([plate.axes[:, 2] for plate in plates])
     if (normals @ np.abs(vertical)).max() < LEVEL:
         axis = "xyz"[int(normals[0].argmax())]
         raise ValueError(
-            f"{found.source}: looks like {axis} up: that is where its force plates face, up is said to be "
-            f"{up or found.up}; say up={axis!r} if so"
+            f"{file.source}: looks like {axis} up: that is where its force plates face, up is said to be "
+            f"{up or file.up}; say up={axis!r} if so"
         )
     wrenches = [plate.wrench(vertical) for plate in plates]
     forces, points, moments = (np.stack(part, axis=1) for part in zip(*wrenches, strict=True))
-    rate = found.rate * count if found.rate > 0 else float(count)
-    times = found.times[0] + np.arange(len(found.analogs)) / rate
+    rate = file.rate * count if file.rate > 0 else float(count)
+    times = file.times[0] + np.arange(len(file.analogs)) / rate
     corners = np.stack([plate.corners for plate in plates])
-    return recorded(ForcePlates(times, forces, points, moments, vertical, found.source, corners, notes))
+    return drop_unreadable_plates(ForcePlates(times, forces, points, moments, vertical, file.source, corners, notes))
 
 
 def open(
@@ -184,39 +183,42 @@ def open(
         raise ValueError(f"split: recordings have none, got {split!r}")
     files = sequences.recordings(path, ".c3d")
     recordings = [c3d.read(file) for file in files]
-    names = list(dict.fromkeys(name for found in recordings for name in found.markers(subject).names))
-    parts = [of_file(found, file.stem, names, up, subject) for file, found in zip(files, recordings, strict=True)]
-    return demanded(Path(path), Joined(sequences.measured_alike(parts)))
+    names = list(dict.fromkeys(name for file_content in recordings for name in file_content.markers(subject).names))
+    parts = [
+        frames_from_c3d(file_content, file.stem, names, up, subject)
+        for file, file_content in zip(files, recordings, strict=True)
+    ]
+    return require_plausible(Path(path), Joined(sequences.fill_missing(parts)))
 
 
-def of_file(
-    found: c3d.Recording, name: str, markers: Sequence[str], up: str | None = None, subject: str | None = None
+def frames_from_c3d(
+    file: c3d.C3DFile, name: str, markers: Sequence[str], up: str | None = None, subject: str | None = None
 ) -> Frames:
     """The frames of a recording, with these markers (NaN where it has none of the name)."""
-    axis = up or found.up
+    axis = up or file.up
     if axis not in UP:
-        raise ValueError(f"{found.source}: up: expected x, y or z, got {axis!r}")
-    joints = np.full((len(found.times), len(markers), 3), np.nan)
-    own = found.markers(subject)
+        raise ValueError(f"{file.source}: up: expected x, y or z, got {axis!r}")
+    joints = np.full((len(file.times), len(markers), 3), np.nan)
+    own = file.markers(subject)
     if own.names:
         column = {marker: index for index, marker in enumerate(markers)}
-        seen, _ = seen_of(found.points[:, own.columns], own.names)
-        places = np.where(seen[..., None], found.places(own.columns), np.nan)
+        visible, _ = visibility(file.points[:, own.columns], own.names)
+        places = np.where(visible[..., None], file.places(own.columns), np.nan)
         joints[:, [column[marker] for marker in own.names]] = places
-    plates = of_recording(found, up) if found.has_plates else None
-    return _frames(name, found, joints, list(markers), plates, UP[axis])
+    plates = from_c3d(file, up) if file.has_plates else None
+    return _frames(name, file, joints, list(markers), plates, UP[axis])
 
 
 def _frames(
-    name: str, found: c3d.Recording, joints: Array, markers: list[str], plates: ForcePlates | None, up: Array
+    name: str, file: c3d.C3DFile, joints: Array, markers: list[str], plates: ForcePlates | None, up: Array
 ) -> Frames:
-    at = None if plates is None else plates.at(found.times)
+    at = None if plates is None else plates.at(file.times)
     height = 0.0 if plates is None or plates.corners is None else float((plates.corners @ up).mean())
     return Frames(
-        names=sequences.numbered(name, len(found.times)),
-        sequences=np.full(len(found.times), name),
+        names=sequences.frame_names(name, len(file.times)),
+        sequences=np.full(len(file.times), name),
         ground=Ground(up, height),
-        frame_rate=found.rate or None,
+        frame_rate=file.rate or None,
         joints=joints if markers else None,
         joint_names=tuple(markers) if markers else None,
         center_of_pressure=None if at is None else at.center(),
@@ -230,23 +232,23 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         files = sequences.recordings(path, ".c3d")
     except ValueError as error:
         return [Finding("missing", str(error), "expected a .c3d file or a folder of them")]
-    found = [Finding("ok", f"{len(files)} .c3d {'file' if len(files) == 1 else 'files'}")]
+    findings = [Finding("ok", f"{len(files)} .c3d {'file' if len(files) == 1 else 'files'}")]
     for file in files:
         try:
             content = c3d.read(file)
             own = content.markers()
-            seen, said = seen_of(content.points[:, own.columns], own.names)
-            found += standing(file.name, content.places(own.columns), seen, content.up)
-            found += [Finding("odd", f"{file.name}: {note}") for note in (*content.notes, *own.notes, *said)]
-            found += _outputs(file, content)
-            found += sequences.told(file.name, open(file)[:])
-            found += _loads(file, content.notes)
+            visible, notes = visibility(content.points[:, own.columns], own.names)
+            findings += check_longest_axis(file.name, content.places(own.columns), visible, content.up)
+            findings += [Finding("odd", f"{file.name}: {note}") for note in (*content.notes, *own.notes, *notes)]
+            findings += _outputs(file, content)
+            findings += sequences.check_recording(file.name, open(file)[:])
+            findings += _loads(file, content.notes)
         except ValueError as error:
-            found.append(Finding("wrong", str(error)))
-    return found
+            findings.append(Finding("wrong", str(error)))
+    return findings
 
 
-def _outputs(file: Path, content: c3d.Recording) -> list[Finding]:
+def _outputs(file: Path, content: c3d.C3DFile) -> list[Finding]:
     """What a model has computed, which is not taken as markers."""
     count = len(content.outputs)
     if not count:
@@ -255,12 +257,12 @@ def _outputs(file: Path, content: c3d.Recording) -> list[Finding]:
     return [Finding("ok", f"{file.name}: {count} outputs of a model are no markers{com}")]
 
 
-def standing(what: str, markers: Array, seen: NDArray[np.bool_], up: str) -> list[Finding]:
+def check_longest_axis(what: str, markers: Array, visible: NDArray[np.bool_], up: str) -> list[Finding]:
     """Whether the way in which markers (T, M, 3) m of a person are longest, and begin at a floor, is `up`.
 
     Nothing is wrong in somebody who lies; so this is told, and is no error.
     """
-    points = np.where(seen[..., None], markers, np.nan)[seen.sum(axis=1) > 2]
+    points = np.where(visible[..., None], markers, np.nan)[visible.sum(axis=1) > 2]
     if not len(points):
         return []
     low, high = np.nanmin(points, axis=1), np.nanmax(points, axis=1)
@@ -270,8 +272,8 @@ def standing(what: str, markers: Array, seen: NDArray[np.bool_], up: str) -> lis
     if axis == up or extent["xyz".index(up)] > 0.8 or extent[longest] < 1.2 or not -0.3 < lowest[longest] < 0.5:
         return []
     reach = f"from {lowest[longest]:.2f} m along {axis} over {extent[longest]:.2f} m"
-    said = f"{what}: looks like {axis} up: markers reach {reach}, but up is said to be {up}"
-    return [Finding("wrong", said, "or does this person lie?", f"--up {axis}")]
+    message = f"{what}: looks like {axis} up: markers reach {reach}, but up is said to be {up}"
+    return [Finding("wrong", message, "or does this person lie?", f"--up {axis}")]
 
 
 def _loads(file: Path, said: Sequence[str]) -> list[Finding]:
@@ -280,7 +282,7 @@ def _loads(file: Path, said: Sequence[str]) -> list[Finding]:
         plates = read(file)
     except ValueError as error:
         return [Finding("missing", str(error))]
-    found = [Finding("odd", f"{file.name}: {note}") for note in plates.notes if note not in said]
+    findings = [Finding("odd", f"{file.name}: {note}") for note in plates.notes if note not in said]
     heaviest = float(np.nan_to_num(plates.loads).sum(axis=1).max())
     said = f"{file.name}: {plates.forces.shape[1]} force plates, together up to {heaviest:.0f} N"
-    return [*found, Finding("ok", said) if heaviest > 200 else Finding("missing", said, "nobody stands on them")]
+    return [*findings, Finding("ok", said) if heaviest > 200 else Finding("missing", said, "nobody stands on them")]

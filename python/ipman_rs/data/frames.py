@@ -1,4 +1,4 @@
-"""The common form of all data sets: frames of people, as arrays with a row a frame."""
+"""The common form of all data sets: frames of people, as arrays with one row per frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Rows = slice | NDArray[np.integer]
 
 @dataclass(frozen=True, eq=False)
 class Cameras:
-    """A camera a frame: X_c = R X + t (m, x right, y down, z forward), then x = K X_c / z (pixels)."""
+    """One camera per frame: X_c = R X + t (m, x right, y down, z forward), then x = K X_c / z (pixels)."""
 
     rotation: Array  # (F, 3, 3)
     translation: Array  # (F, 3) m
@@ -29,10 +29,10 @@ class Cameras:
 
 @dataclass(frozen=True, eq=False)
 class PressureMaps:
-    """What a mat measured under the body: a map a frame, on a grid of square cells on the ground.
+    """Pressure that a mat measured under the body: one map per frame, on a grid of square cells on the ground.
 
     The point of cell (i, j) is origin + (i + ½) cell e1 + (j + ½) cell e2. Where the mat lay elsewhere in some of the
-    frames, origin, e1 and e2 have a row a frame; the maps of one frame, or of one place, never have.
+    frames, origin, e1 and e2 have one row per frame; the maps of one frame, or of one place, never have.
     """
 
     values: Array  # (F, H, W), in the mat's own unit
@@ -61,7 +61,7 @@ class Frames:
 
     names: NDArray[np.str_]  # (F,) of the frame, unique in the data set
     sequences: NDArray[np.str_]  # (F,) frames of one sequence follow each other; an image by itself is its own
-    ground: Ground | None = None  # one, or one a frame
+    ground: Ground | None = None  # one, or one per frame
     frame_rate: float | None = None  # Hz, of the sequences
 
     body: str | None = None  # "smpl", "smplh", "smplx", or a name of `ipman_rs.load_body`: what pose and betas are of
@@ -112,6 +112,6 @@ class DataSet(Protocol):
 
 
 def pieces(data: DataSet, size: int) -> Iterator[Frames]:
-    """`size` frames after the other."""
+    """The frames in pieces of `size`."""
     for start in range(0, len(data), size):
         yield data[slice(start, min(start + size, len(data)))]

@@ -28,11 +28,11 @@ IMAGE = re.compile(r"(S\d+)[/_]([^/]+\.\d{8})[/_](\d{6})\.\w+$")
 
 def label(image: str) -> tuple[str, str]:
     """`S9/Directions_1.60457274/000001` and `S9/Directions_1.60457274`."""
-    found = IMAGE.search(image)
-    if found is None:
+    match = IMAGE.search(image)
+    if match is None:
         return spin.image_by_itself(image)
-    sequence = f"{found[1]}/{found[2]}"
-    return f"{sequence}/{found[3]}", sequence
+    sequence = f"{match[1]}/{match[2]}"
+    return f"{sequence}/{match[3]}", sequence
 
 
 FORM = spin.Form(

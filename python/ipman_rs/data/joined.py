@@ -32,14 +32,14 @@ class Joined:
         part = np.searchsorted(self.ends, wanted, side="right")
         order = np.argsort(part, kind="stable")
         starts = np.append(0, self.ends)
-        found = concatenated(
+        frames = concatenate(
             [self.parts[each][wanted[order][part[order] == each] - starts[each]] for each in np.unique(part)]
             or [self.parts[0][:0]]
         )
-        return found if (order == np.arange(len(order))).all() else found[np.argsort(order, kind="stable")]
+        return frames if (order == np.arange(len(order))).all() else frames[np.argsort(order, kind="stable")]
 
 
-def concatenated(parts: Sequence[Frames]) -> Frames:
+def concatenate(parts: Sequence[Frames]) -> Frames:
     """One after the other. What differs in length (betas) is filled up with zeros; what a part lacks is an error.
 
     A frame rate that is not the same in all parts is None. Raises ValueError naming the field for parts that have

@@ -1,7 +1,7 @@
-"""The judge that every door asks: can what came in be a person, and which option mends it if not?
+"""Plausibility checks of all input: can it be a person, and if not, which option corrects it?
 
-Every function takes what it judges, a few hundred rows are enough, and gives findings. `admit` refuses what is wrong
-in one line that names the option that mends it, and hands back in words what is odd.
+Every function takes the rows that it judges (a few hundred are enough) and returns findings. `admit` refuses what is
+wrong, in one line that names the option to use, and returns in words what is unusual.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ipman_rs.ground import Ground
 from ipman_rs.template import BodyTemplate
 
-from .check import AXES, BODY, WORLD, Finding, size_of_body, some, upright
+from .check import AXES, BODY, WORLD, Finding, first_names, size_of_body, upright
 
 MASS = (1.0, 650.0)  # kg: the heaviest person known weighed 635
 USUAL_MASS = (1.8, 250.0)  # kg
@@ -44,16 +44,16 @@ Array = NDArray[np.floating[Any]]
 
 
 class NoPerson(ValueError):
-    """What came in cannot be a person; the message names the option that mends it."""
+    """The input cannot be a person; the message names the option that corrects it."""
 
 
 def admit(path: str | os.PathLike[str], findings: Iterable[Finding], force: bool = False) -> tuple[str, ...]:
-    """What is odd, in words. Raises NoPerson, naming the file, for what is wrong; with `force` that is odd, too."""
+    """What is unusual, in words. NoPerson, naming the file, for what is wrong; with `force` that counts as unusual."""
     findings = list(findings)
     wrong = [each for each in findings if each.level == "wrong"]
     if wrong and not force:
-        said = ". ".join(_advised(each) for each in wrong)
-        raise NoPerson(f"{path}: {said} (--force: it is right as it is)")
+        message = ". ".join(_advised(each) for each in wrong)
+        raise NoPerson(f"{path}: {message} (--force: it is right as it is)")
     return tuple(_advised(each) for each in findings if each.level in ("odd", "wrong"))
 
 
@@ -73,25 +73,27 @@ def bodies(vertices: Array, template: BodyTemplate, normal: Array, *, up_is_said
     vertices = vertices[np.isfinite(vertices).all(axis=(1, 2))]
     if not len(vertices):
         return []
-    found = size_of_body("vertices", vertices)
-    if found[0].level == "wrong":
-        return found
-    found += _sizes(vertices)
+    findings = size_of_body("vertices", vertices)
+    if findings[0].level == "wrong":
+        return findings
+    findings += _sizes(vertices)
     away = far("vertices", vertices.mean(axis=1)) or _height(vertices, normal)
     if up_is_said:
-        return found + away
-    return found + away + (_stance(vertices, template, normal) or _shape(vertices, template, normal))
+        return findings + away
+    return findings + away + (_stance(vertices, template, normal) or _shape(vertices, template, normal))
 
 
 def _sizes(vertices: Array) -> list[Finding]:
-    """Of bodies that span something else than the others."""
+    """Findings about single bodies of implausible size."""
     spans = np.linalg.norm(np.ptp(vertices, axis=1), axis=-1)
     odd = spans[(spans < BODY[0]) | (spans > BODY[1])]
     if not len(odd):
         return []
     verb = "spans" if len(odd) == 1 else "span up to"
-    said = f"vertices: {len(odd)} of {len(spans)} bodies {verb} {odd.max():.4g}, expected {BODY[0]} to {BODY[1]} metres"
-    return [Finding("odd", said)]
+    message = (
+        f"vertices: {len(odd)} of {len(spans)} bodies {verb} {odd.max():.4g}, expected {BODY[0]} to {BODY[1]} metres"
+    )
+    return [Finding("odd", message)]
 
 
 def far(what: str, places: Array) -> list[Finding]:
@@ -100,22 +102,24 @@ def far(what: str, places: Array) -> list[Finding]:
     away = float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 0.0
     if away <= WORLD:
         return []
-    said = f"{what}: bodies of a person's size, {away:.4g} m from the origin of their world, expected up to {WORLD:g}"
-    return [Finding("wrong", said, "are their places in another unit, or those of a map? Put the origin near them")]
+    message = (
+        f"{what}: bodies of a person's size, {away:.4g} m from the origin of their world, expected up to {WORLD:g}"
+    )
+    return [Finding("wrong", message, "are their places in another unit, or those of a map? Put the origin near them")]
 
 
 def _height(vertices: Array, normal: Array) -> list[Finding]:
-    """Of bodies in a world whose origin is far below or above them."""
+    """Findings about bodies far above or below the origin of their world."""
     height = float(np.median((vertices @ Ground(normal).normal).min(axis=-1)))
     if abs(height) <= USUAL_HEIGHT:
         return []
     side = "above" if height > 0 else "below"
-    said = f"vertices: {abs(height):.4g} m {side} the origin of their world"
-    return [Finding("odd", said, "is the unit of their places another (--units), or their origin?")]
+    message = f"vertices: {abs(height):.4g} m {side} the origin of their world"
+    return [Finding("odd", message, "is the unit of their places another (--units), or their origin?")]
 
 
 def _stance(vertices: Array, template: BodyTemplate, normal: Array) -> list[Finding]:
-    """Of bodies whose parts have names: where the head is from the lower legs and from the torso, together."""
+    """The stance of bodies with named parts, from the directions of legs and torso to the head."""
     limbs = ("left_forearm", "right_forearm", "left_lower_leg", "right_lower_leg")
     points = {word: _of_parts(template, word) for word in ("head", "torso", *limbs)}
     if not all(len(index) for index in points.values()):
@@ -132,8 +136,8 @@ def _stance(vertices: Array, template: BodyTemplate, normal: Array) -> list[Find
         return [Finding("ok", "bodies: on hands and feet")]
     axis = f"--up {_axis(_unit(ways.mean(axis=0)))}"
     if len(vertices) > 1:
-        said = f"bodies: heads are above feet in {(up > UPRIGHT).sum()} of {len(up)}"
-        return upright("bodies", ways, ground) or [Finding("ok" if up.mean() > 0.5 else "odd", said, option=axis)]
+        message = f"bodies: heads are above feet in {(up > UPRIGHT).sum()} of {len(up)}"
+        return upright("bodies", ways, ground) or [Finding("ok" if up.mean() > 0.5 else "odd", message, option=axis)]
     if up[0] < -0.5:
         if up[0] < -0.8 and low["head"][0] < 1e-3 and min(low[limb][0] for limb in limbs[:2]) > NEAR:
             return [Finding("wrong", "stands on its head, with its feet in the air", option=axis)]
@@ -149,14 +153,14 @@ def _unit(ways: Array) -> Array:
 
 
 def _shape(vertices: Array, template: BodyTemplate, normal: Array) -> list[Finding]:
-    """Of bodies whose parts nobody knows: how low they are, and whether they end below as a head does."""
+    """The stance of bodies without named parts: whether they lie, and whether their lower end looks like a head."""
     first, normal = vertices[0], Ground(normal).normal
     height = first @ normal
     extent = np.ptp(first, axis=0)
     axis = int(extent.argmax())
     if np.ptp(height) < LIES * extent[axis] and abs(normal[axis]) < 0.5:
-        said = f"lies: {np.ptp(height):.2f} m high and {extent[axis]:.2f} m long"
-        return [Finding("odd", said, option="--up AXIS")]
+        message = f"lies: {np.ptp(height):.2f} m high and {extent[axis]:.2f} m long"
+        return [Finding("odd", message, option="--up AXIS")]
     middle = float(np.median(height[np.unique(template.faces)]) - height.min()) / max(float(np.ptp(height)), 1e-9)
     below, above = (_ends(first, height, normal, end) for end in ("low", "high"))
     if below == 1 and above == 2 and middle < 0.5:
@@ -165,7 +169,7 @@ def _shape(vertices: Array, template: BodyTemplate, normal: Array) -> list[Findi
 
 
 def _ends(points: Array, height: Array, normal: Array, end: str) -> int:
-    """How many pieces are left of a body where all but its lowest or highest eighth is cut off: 1, or 2 for more."""
+    """The number of pieces of the lowest or highest eighth of a body: 1, or 2 for more."""
     span = float(np.ptp(height))
     there = height < height.min() + span / 8 if end == "low" else height > height.max() - span / 8
     flat = points[there] - np.outer(height[there], normal)
@@ -190,25 +194,27 @@ def mass(kilograms: float, span: float | None = None) -> list[Finding]:
     if not np.isfinite(kilograms):
         return []
     if kilograms <= 0:
-        said = f"a body of {kilograms:.4g} kg"
-        return [Finding("wrong", said, "is its surface closed, and do its faces point outwards?")]
-    said = f"a person of {kilograms:.4g} kg"
+        message = f"a body of {kilograms:.4g} kg"
+        return [Finding("wrong", message, "is its surface closed, and do its faces point outwards?")]
+    message = f"a person of {kilograms:.4g} kg"
     if not USUAL_MASS[0] <= kilograms <= USUAL_MASS[1]:
         level = "odd" if MASS[0] <= kilograms <= MASS[1] else "wrong"
-        return [Finding(level, said, option="--units UNIT")]
+        return [Finding(level, message, option="--units UNIT")]
     build = 10.0 if span is None else kilograms / span**3
     if USUAL_BUILD[0] <= build <= USUAL_BUILD[1]:
         return []
     level = "odd" if BUILD[0] <= build <= BUILD[1] else "wrong"
-    return [Finding(level, f"{said} who spans {span:.2f} m", "are shape and units right, left and right not swapped?")]
+    return [
+        Finding(level, f"{message} who spans {span:.2f} m", "are shape and units right, left and right not swapped?")
+    ]
 
 
 def masses(kilograms: Array, vertices: Array) -> list[Finding]:
     """`mass` of bodies (T,) kg with vertices (T, V, 3) m, in the median."""
-    known = kilograms[np.isfinite(kilograms)]
+    finite = kilograms[np.isfinite(kilograms)]
     spans = np.linalg.norm(np.ptp(np.asarray(vertices, np.float64), axis=1), axis=-1)
     spans = spans[np.isfinite(spans)]
-    return mass(float(np.median(known)), float(np.median(spans)) if len(spans) else None) if len(known) else []
+    return mass(float(np.median(finite)), float(np.median(spans)) if len(spans) else None) if len(finite) else []
 
 
 def rate(hertz: float) -> list[Finding]:
@@ -228,8 +234,8 @@ def speed(what: str, positions: Array, seconds: Array | None) -> list[Finding]:
     usual = float(np.median(moved[np.isfinite(moved)])) if np.isfinite(moved).any() else 0.0
     if usual <= USUAL_SPEED:
         return []
-    said = f"{what}: moves at {usual:.4g} m/s in the median, expected up to {USUAL_SPEED:g}"
-    return [Finding("odd", said, "is its unit (--units) or its rate (--rate) another?")]
+    message = f"{what}: moves at {usual:.4g} m/s in the median, expected up to {USUAL_SPEED:g}"
+    return [Finding("odd", message, "is its unit (--units) or its rate (--rate) another?")]
 
 
 def degrees(rotations: Sequence[Array]) -> list[Finding]:
@@ -238,8 +244,8 @@ def degrees(rotations: Sequence[Array]) -> list[Finding]:
     largest = max((float(np.median(each[np.isfinite(each)])) for each in largest if np.isfinite(each).any()), default=0)
     if not 0 < largest <= SMALLEST_TURN:
         return []
-    said = f"the pose: with --degrees no joint turns by more than {np.degrees(largest):.2g} degrees"
-    return [Finding("odd", said, "is it in radians?")]
+    message = f"the pose: with --degrees no joint turns by more than {np.degrees(largest):.2g} degrees"
+    return [Finding("odd", message, "is it in radians?")]
 
 
 def marker_error(metres: float) -> list[Finding]:
@@ -247,8 +253,8 @@ def marker_error(metres: float) -> list[Finding]:
     if metres <= USUAL_MARKER_ERROR:
         return []
     level = "odd" if metres <= MARKER_ERROR else "wrong"
-    said = f"markers lie {1e3 * metres:.0f} mm from the fitted body in the mean, expected under 30"
-    return [Finding(level, said, "are units, axes and names of the markers right? (--units, --up, --markers)")]
+    message = f"markers lie {1e3 * metres:.0f} mm from the fitted body in the mean, expected under 30"
+    return [Finding(level, message, "are units, axes and names of the markers right? (--units, --up, --markers)")]
 
 
 def known_markers(known: Sequence[str], unknown: Sequence[str], fewest: int = 6) -> list[Finding]:
@@ -256,9 +262,9 @@ def known_markers(known: Sequence[str], unknown: Sequence[str], fewest: int = 6)
     count = len(known) + len(unknown)
     if not unknown:
         return []
-    said = f"{len(unknown)} of {count} markers have names without a known place: {some(unknown)}"
+    message = f"{len(unknown)} of {count} markers have names without a known place: {first_names(unknown)}"
     wrong = len(known) < fewest or 3 * len(known) < count
-    return [Finding("wrong" if wrong else "odd", said, "--markers FILE says where they are")]
+    return [Finding("wrong" if wrong else "odd", message, "--markers FILE says where they are")]
 
 
 def keypoints(points: Array, size: Array) -> list[Finding]:
@@ -267,27 +273,27 @@ def keypoints(points: Array, size: Array) -> list[Finding]:
     Those that the detector is sure of are judged, all that were seen where it is sure of few.
     """
     sure = points[:, 2] > SURE
-    seen = np.asarray(points[sure if sure.sum() >= FEWEST_POINTS else points[:, 2] > 0, :2], np.float64)
-    if len(seen) < FEWEST_POINTS:
+    visible = np.asarray(points[sure if sure.sum() >= FEWEST_POINTS else points[:, 2] > 0, :2], np.float64)
+    if len(visible) < FEWEST_POINTS:
         return []
     image = f"{size[0]:g} × {size[1]:g} pixels"
-    extent = float(np.ptp(seen, axis=0).max())
+    extent = float(np.ptp(visible, axis=0).max())
     if extent == 0:
-        return [Finding("wrong", f"all {len(seen)} points lie at one place, ({seen[0, 0]:g}, {seen[0, 1]:g})")]
-    if abs(seen).max() <= RELATIVE and min(size) > SMALL_PERSON:
-        said = f"points of {seen.min():.3g} to {seen.max():.3g} look relative to the image"
-        return [Finding("wrong", said, "multiply them by its width and height")]
-    spread = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
+        return [Finding("wrong", f"all {len(visible)} points lie at one place, ({visible[0, 0]:g}, {visible[0, 1]:g})")]
+    if abs(visible).max() <= RELATIVE and min(size) > SMALL_PERSON:
+        message = f"points of {visible.min():.3g} to {visible.max():.3g} look relative to the image"
+        return [Finding("wrong", message, "multiply them by its width and height")]
+    spread = np.linalg.svd(visible - visible.mean(axis=0), compute_uv=False)
     if spread[1] < FLAT * spread[0]:
-        said = f"all {len(seen)} points lie on one line"
-        return [Finding("wrong", said, "are x and y columns of their own in the file?")]
-    outside = ((seen < -AROUND * size) | (seen > (1 + AROUND) * size)).any(axis=1)
-    if 2 * outside.sum() > len(seen):
-        x, y = seen[:, 0], seen[:, 1]
-        said = f"{outside.sum()} of {len(seen)} points lie outside the image of {image}"
-        said += f": x from {x.min():.0f} to {x.max():.0f}, y from {y.min():.0f} to {y.max():.0f}"
-        return [Finding("wrong", said, "is that its size? (--image-size WxH)")]
+        message = f"all {len(visible)} points lie on one line"
+        return [Finding("wrong", message, "are x and y columns of their own in the file?")]
+    outside = ((visible < -AROUND * size) | (visible > (1 + AROUND) * size)).any(axis=1)
+    if 2 * outside.sum() > len(visible):
+        x, y = visible[:, 0], visible[:, 1]
+        message = f"{outside.sum()} of {len(visible)} points lie outside the image of {image}"
+        message += f": x from {x.min():.0f} to {x.max():.0f}, y from {y.min():.0f} to {y.max():.0f}"
+        return [Finding("wrong", message, "is that its size? (--image-size WxH)")]
     if extent < SMALL_PERSON:
-        said = f"the person is {extent:.2g} pixels large in an image of {image}"
-        return [Finding("odd", said, "is that its size? (--image-size WxH)")]
+        message = f"the person is {extent:.2g} pixels large in an image of {image}"
+        return [Finding("odd", message, "is that its size? (--image-size WxH)")]
     return [Finding("ok", f"keypoints: a person of {extent:.0f} pixels in an image of {image}")]

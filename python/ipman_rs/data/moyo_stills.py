@@ -30,7 +30,7 @@ BODY = 22  # joints, without face and fingers
 MAX_BYTES = 1 << 20  # of a list
 
 
-def stillest(frames: Frames) -> int:
+def stillest_frame(frames: Frames) -> int:
     """The still frame of one sequence: of its middle half, the even frame about which the body turns least.
 
     The measure is the angle by which root and joints turn from frame to frame, mean over them and over half a second.
@@ -51,7 +51,7 @@ def stillest(frames: Frames) -> int:
     return int(middle[np.argmin(motion[middle].round(9))])
 
 
-class Chosen:
+class FrameList:
     """A list of the chosen images: of each pose, or of each pose in recordings with and without "nexus" in their names.
 
     ValueError, naming the file, for one that is missing, damaged, or no list of images. Nothing in it is executed.
@@ -61,12 +61,12 @@ class Chosen:
         self.path = Path(path)
         content = read_bytes(path, MAX_BYTES)
         try:
-            found = _python(content.decode()) if self.path.suffix == ".py" else {"": parse_json(content)}
+            lists = _python(content.decode()) if self.path.suffix == ".py" else {"": parse_json(content)}
         except (ValueError, SyntaxError, RecursionError, MemoryError) as error:
             raise ValueError(f"{path}: expected the chosen image of each pose: {error}") from None
-        for name, images in found.items():
+        for name, images in lists.items():
             _check(f"{path}: {name}".removesuffix(": "), images)
-        self.lists: Mapping[str, Mapping[str, int]] = found
+        self.lists: Mapping[str, Mapping[str, int]] = lists
 
     def frame(self, sequence: str, count: int) -> int | None:
         """The chosen frame of a sequence of `count` frames; None for a pose that is not in the list.
@@ -87,17 +87,17 @@ class Chosen:
 
 def _python(text: str) -> dict[str, Any]:
     """Both dictionaries of the authors' constants.py, read as literals."""
-    found = {
+    lists = {
         target.id: ast.literal_eval(line.value)
         for line in ast.parse(text).body
         if isinstance(line, ast.Assign)
         for target in line.targets
         if isinstance(target, ast.Name) and target.id in (COMBINED, NEXUS)
     }
-    lacking = [name for name in (COMBINED, NEXUS) if name not in found]
+    lacking = [name for name in (COMBINED, NEXUS) if name not in lists]
     if lacking:
         raise ValueError(f"no {lacking[0]} in it; it should be moyo/utils/constants.py of moyo_toolkit")
-    return found
+    return lists
 
 
 def _check(where: str, images: Any) -> None:
@@ -106,9 +106,9 @@ def _check(where: str, images: Any) -> None:
         raise ValueError(f'{where}: expected {{"pose": number of its image, …}}, whole numbers from 0')
 
 
-def selected(wanted: str, sequence: Frames, chosen: Chosen | None) -> NDArray[np.int64]:
+def select_frames(wanted: str, sequence: Frames, chosen: FrameList | None) -> NDArray[np.int64]:
     """The numbers of the frames of one sequence that are wanted: "all", "selected" by our rule, or of a list."""
     if wanted == "all":
         return np.arange(len(sequence))
-    frame = stillest(sequence) if chosen is None else chosen.frame(str(sequence.sequences[0]), len(sequence))
+    frame = stillest_frame(sequence) if chosen is None else chosen.frame(str(sequence.sequences[0]), len(sequence))
     return np.array([] if frame is None else [frame], np.int64)

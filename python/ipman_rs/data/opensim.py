@@ -26,9 +26,9 @@ from ipman_rs.ground import Ground
 
 from . import external_loads, pairing, sequences, trc
 from .c3d_plates import LOADED
-from .check import Finding, demand, demanded, size_of_body, some
+from .check import Finding, first_names, raise_if_wrong, require_plausible, size_of_body
 from .external_loads import ExternalLoads, Load
-from .force_plates import UP, ForcePlates, between, recorded, standing
+from .force_plates import UP, ForcePlates, check_longest_axis, drop_unreadable_plates, interpolate
 from .frames import DataSet, Frames
 from .joined import Joined
 from .opensim_storage import Storage as Storage
@@ -94,29 +94,29 @@ def plates(table: Storage, unit: str = "m", up: str = "y", loads: ExternalLoads 
     if unit not in METRES or up not in UP:
         raise ValueError(f"unit, up: expected one of {', '.join(METRES)} and of x, y, z, got {unit!r} and {up!r}")
     wrenches = (
-        [_loaded(table, load, loads.source) for load in loads.loads]
+        [_external_force(table, load, loads.source) for load in loads.loads]
         if loads is not None and loads.loads
-        else [found for name in table.columns if (found := _wrench(table, name)) is not None]
+        else [measured for name in table.columns if (measured := _wrench(table, name)) is not None]
     )
     if not wrenches:
-        has = some([*table.columns])
+        has = first_names([*table.columns])
         raise ValueError(f"{table.source}: expected ground forces, such as ground_force_vx, it has {has}")
     forces, points, moments = (np.stack(part, axis=1) for part in zip(*wrenches, strict=True))
     scale = METRES[unit]
     forces, points, moments = (  # beside NaN, infinity: a centre of pressure without a load
         np.where(np.isfinite(part), part, np.nan) for part in (forces, points * scale, moments * scale)
     )
-    found = ForcePlates(table.times, forces, points, moments, UP[up], table.source, notes=table.notes)
-    _plausible(found, up)
-    if loads is not None and (unnamed := _unnamed(table, found)):
+    measured = ForcePlates(table.times, forces, points, moments, UP[up], table.source, notes=table.notes)
+    _check_plates(measured, up)
+    if loads is not None and (unnamed := _unnamed(table, measured)):
         note = f"forces that {loads.source} does not name are left out: {', '.join(unnamed)}"
-        found = replace(found, notes=(*found.notes, note))
-    return recorded(on_the_body(found))
+        measured = replace(measured, notes=(*measured.notes, note))
+    return drop_unreadable_plates(reverse_forces_on_plates(measured))
 
 
-def _unnamed(table: Storage, found: ForcePlates) -> list[str]:
+def _unnamed(table: Storage, plates: ForcePlates) -> list[str]:
     """The first columns of plates that carry a load and are not among those found."""
-    known = [found.forces[:, plate] for plate in range(found.forces.shape[1])]
+    known = [plates.forces[:, plate] for plate in range(plates.forces.shape[1])]
     names = []
     for name in table.columns:
         wrench = _wrench(table, name)
@@ -126,33 +126,32 @@ def _unnamed(table: Storage, found: ForcePlates) -> list[str]:
     return names
 
 
-def on_the_body(found: ForcePlates) -> ForcePlates:
+def reverse_forces_on_plates(plates: ForcePlates) -> ForcePlates:
     """With forces that act on the body, also of plates of which the file has the opposite: nobody pulls at a plate."""
     with np.errstate(invalid="ignore"):
-        loads = np.nansum(np.where(np.abs(found.loads) > LOADED, found.loads, 0.0), axis=0)
+        loads = np.nansum(np.where(np.abs(plates.loads) > LOADED, plates.loads, 0.0), axis=0)
     if (loads >= 0).all():
-        return found
+        return plates
     sign = np.where(loads < 0, -1.0, 1.0)[:, None]
     which = "" if (loads < 0).all() else f" of plate {', '.join(str(plate + 1) for plate in np.flatnonzero(loads < 0))}"
     note = f"the forces{which} point down, as those on the plates do; they were turned round"
-    return replace(found, forces=sign * found.forces, moments=sign * found.moments, notes=(*found.notes, note))
+    return replace(plates, forces=sign * plates.forces, moments=sign * plates.moments, notes=(*plates.notes, note))
 
 
-def loaded(found: ForcePlates, times: Array) -> list[Finding]:
-    """Whether the plates tell anything of a recording with these times (T,): that both were at the same time, and that
-    some plate carried a load then."""
-    begin, end = float(found.times[0]), float(found.times[-1])
+def check_loads(plates: ForcePlates, times: Array) -> list[Finding]:
+    """Findings if the plates are of no use for a recording with these times (T,) s: no overlap in time, or no load."""
+    begin, end = float(plates.times[0]), float(plates.times[-1])
     first, last = float(times[0]), float(times[-1])
-    said = f"forces t {begin:.2f} to {end:.2f} s, markers t {first:.2f} to {last:.2f} s"
+    spans = f"forces t {begin:.2f} to {end:.2f} s, markers t {first:.2f} to {last:.2f} s"
     if end < first or begin > last:
-        return [Finding("wrong", f"times do not overlap: {said}", "are both of one recording, with one clock?")]
-    if end - begin > LONGER * (last - first) and len(found) < LONGER * len(times):
-        return [Finding("wrong", f"times look like milliseconds: {said}", "expected seconds")]
-    during = (found.times >= first) & (found.times <= last)
-    loads = found.loads[during]
+        return [Finding("wrong", f"times do not overlap: {spans}", "are both of one recording, with one clock?")]
+    if end - begin > LONGER * (last - first) and len(plates) < LONGER * len(times):
+        return [Finding("wrong", f"times look like milliseconds: {spans}", "expected seconds")]
+    during = (plates.times >= first) & (plates.times <= last)
+    loads = plates.loads[during]
     most = float(np.nanmax(loads)) if np.isfinite(loads).any() else 0.0
     if not most > LOADED:
-        what = f"no frame has a loaded plate: the largest load is {most:.0f} N, expected over {LOADED:.0f} N ({said})"
+        what = f"no frame has a loaded plate: the largest load is {most:.0f} N, expected over {LOADED:.0f} N ({spans})"
         return [Finding("wrong", what, "are these the recording's forces, in newtons?")]
     return []
 
@@ -180,18 +179,18 @@ def _wrench(table: Storage, name: str) -> tuple[Array, Array, Array] | None:
     return table.vectors((f[0], f[1], f[2])), table.vectors((p[0], p[1], p[2])), moment
 
 
-def _loaded(table: Storage, load: Load, source: str) -> tuple[Array, Array, Array]:
+def _external_force(table: Storage, load: Load, source: str) -> tuple[Array, Array, Array]:
     """Force, point and moment of an ExternalForce, whose columns begin with its identifiers."""
-    force, point = (_three(table, name) for name in (load.force, load.point))
+    force, point = (_vector_columns(table, name) for name in (load.force, load.point))
     if force is None or point is None:
         missing = load.force if force is None else load.point
-        has = f"{table.source} has {some([*table.columns])}"
+        has = f"{table.source} has {first_names([*table.columns])}"
         raise ValueError(f"{source}: expected three columns that begin with {missing!r}; {has}")
-    torque = _three(table, load.torque) if load.torque else None
+    torque = _vector_columns(table, load.torque) if load.torque else None
     return force, point, np.zeros_like(force) if torque is None else torque
 
 
-def _three(table: Storage, begin: str) -> Array | None:
+def _vector_columns(table: Storage, begin: str) -> Array | None:
     """The columns (T, 3) whose names begin so: with x, y, z behind it, or the only three."""
     for ends in ("xyz", "XYZ", "123"):
         if all(f"{begin}{end}" in table.columns for end in ends):
@@ -200,23 +199,23 @@ def _three(table: Storage, begin: str) -> Array | None:
     return table.vectors((names[0], names[1], names[2])) if len(names) == 3 else None
 
 
-def _plausible(found: ForcePlates, up: str) -> None:
+def _check_plates(plates: ForcePlates, up: str) -> None:
     with np.errstate(invalid="ignore"):
-        heavy = np.linalg.norm(found.forces, axis=-1) > 10 * LOADED
+        heavy = np.linalg.norm(plates.forces, axis=-1) > 10 * LOADED
     if not heavy.any():
         return
-    away = float(np.nanmedian(np.abs(found.points[heavy]).max(axis=-1)))
+    away = float(np.nanmedian(np.abs(plates.points[heavy]).max(axis=-1)))
     if away > FAR:
         other = "" if away > 100 * FAR else ", or unit='cm' for centimetres (--force-units cm)"
         raise ValueError(
-            f"{found.source}: looks like millimetres: centres of pressure {away:.4g} from the origin, expected metres, "
-            f"up to {FAR:g}; say unit='mm' if so (--force-units mm){other}"
+            f"{plates.source}: looks like millimetres: centres of pressure {away:.4g} from the origin, expected "
+            f"metres, up to {FAR:g}; say unit='mm' if so (--force-units mm){other}"
         )
-    push = np.median(np.abs(found.forces[heavy]), axis=0)  # of either sign: `on_the_body` turns each plate by itself
+    push = np.median(np.abs(plates.forces[heavy]), axis=0)  # of either sign: see `reverse_forces_on_plates`
     axis = "xyz"[int(push.argmax())]
     if axis != up:
         raise ValueError(
-            f"{found.source}: looks like {axis} up: loaded plates push along {axis} ({push[0]:.0f}, {push[1]:.0f}, "
+            f"{plates.source}: looks like {axis} up: loaded plates push along {axis} ({push[0]:.0f}, {push[1]:.0f}, "
             f"{push[2]:.0f} N), expected along {up}; say up={axis!r} if so (--force-up {axis})"
         )
 
@@ -240,29 +239,29 @@ def open(path: str | os.PathLike[str], split: str | None = None) -> DataSet:
         raise ValueError(f"split: recordings have none, got {split!r}")
     files = sequences.recordings(path, ".trc")
     tracks = [trc.read(file) for file in files]
-    markers = list(dict.fromkeys(name for found in tracks for name in found.names))
-    beside = _beside(Path(path), files)
+    markers = list(dict.fromkeys(name for recording in tracks for name in recording.names))
+    beside = _companion_files(Path(path), files)
     for other, file in beside.pairs.rivals.items():
         raise ValueError(f"{other}: expected one of its kind for {file.name}, got another beside it; take one away")
     parts = [
-        _frames(name, found, markers, *beside.of(file))
-        for name, file, found in zip(beside.names, files, tracks, strict=True)
+        _frames(name, recording, markers, *beside.of(file))
+        for name, file, recording in zip(beside.names, files, tracks, strict=True)
     ]
-    return demanded(Path(path), Joined(sequences.measured_alike(parts)))
+    return require_plausible(Path(path), Joined(sequences.fill_missing(parts)))
 
 
 def _frames(
     name: str, tracks: Tracks, markers: list[str], forces: Path | None, loads: ExternalLoads | None, com: Path | None
 ) -> Frames:
     joints = np.full((len(tracks), len(markers), 3), np.nan)
-    seen = np.where(tracks.confidence[..., None] > 0, tracks.points, np.nan)
+    points = np.where(tracks.confidence[..., None] > 0, tracks.points, np.nan)
     column = {marker: index for index, marker in enumerate(markers)}
-    joints[:, [column[marker] for marker in tracks.names]] = seen
-    demand(tracks.source, size_of_body("joints", joints))
+    joints[:, [column[marker] for marker in tracks.names]] = points
+    raise_if_wrong(tracks.source, size_of_body("joints", joints))
     at = None if forces is None else plates(storage(forces), loads=loads).at(tracks.times)
     lasted = float(tracks.times[-1] - tracks.times[0])  # the times of single samples are often rounded to milliseconds
     return Frames(
-        names=sequences.numbered(name, len(tracks)),
+        names=sequences.frame_names(name, len(tracks)),
         sequences=np.full(len(tracks), name),
         ground=Ground.y_up(),
         frame_rate=round((len(tracks) - 1) / lasted, 2) if lasted > 0 else None,
@@ -276,24 +275,24 @@ def _frames(
 
 def _com_at(table: Storage, tracks: Tracks) -> Array:
     """(T, 3) m at the markers' times; NaN outside the storage's. ValueError if it is nowhere near the markers."""
-    found = between(table.times, center_of_mass(table), tracks.times)
-    for each in among(found, tracks, "centre of mass"):
+    centers = interpolate(table.times, center_of_mass(table), tracks.times)
+    for each in check_near_markers(centers, tracks, "centre of mass"):
         raise ValueError(f"{table.source}: {each.what}; {each.advice}")
-    return found
+    return centers
 
 
-def among(points: Array, tracks: Tracks, what: str) -> list[Finding]:
+def check_near_markers(points: Array, tracks: Tracks, what: str) -> list[Finding]:
     """Whether a centre of mass or of pressure (T, 3) m, NaN where there is none, is where the markers are."""
-    seen = tracks.confidence.any(axis=1)
-    shown = tracks.confidence[seen][..., None] > 0
-    low = np.where(shown, tracks.points[seen], np.inf).min(axis=1)
-    high = np.where(shown, tracks.points[seen], -np.inf).max(axis=1)
-    away = np.linalg.norm(np.maximum(0, np.maximum(low - points[seen], points[seen] - high)), axis=1)
+    recorded = tracks.confidence.any(axis=1)
+    shown = tracks.confidence[recorded][..., None] > 0
+    low = np.where(shown, tracks.points[recorded], np.inf).min(axis=1)
+    high = np.where(shown, tracks.points[recorded], -np.inf).max(axis=1)
+    away = np.linalg.norm(np.maximum(0, np.maximum(low - points[recorded], points[recorded] - high)), axis=1)
     away = away[np.isfinite(away)]
     if not len(away) or np.median(away) <= BESIDE:
         return []
-    said = f"the {what} is {np.median(away):.2f} m outside the markers of {tracks.source}"
-    return [Finding("wrong", said, "expected it among them: are both in metres, y up, and of one recording?")]
+    message = f"the {what} is {np.median(away):.2f} m outside the markers of {tracks.source}"
+    return [Finding("wrong", message, "expected it among them: are both in metres, y up, and of one recording?")]
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
@@ -302,55 +301,59 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         files = sequences.recordings(path, ".trc")
     except ValueError as error:
         return [Finding("missing", str(error), "expected a .trc file or a folder of them")]
-    found = [Finding("ok", f"{len(files)} .trc {'file' if len(files) == 1 else 'files'}")]
-    beside = _beside(Path(path), files)
-    found += [Finding("wrong", what) for what in beside.unreadable]
-    found += [Finding("odd", note) for note in beside.pairs.notes]
+    findings = [Finding("ok", f"{len(files)} .trc {'file' if len(files) == 1 else 'files'}")]
+    beside = _companion_files(Path(path), files)
+    findings += [Finding("wrong", what) for what in beside.unreadable]
+    findings += [Finding("odd", note) for note in beside.pairs.notes]
     for other, why in beside.pairs.left.items():
         level = "wrong" if other in beside.pairs.rivals else "odd"
-        found.append(Finding(level, f"{other.name}: not used, for {why}"))
+        findings.append(Finding(level, f"{other.name}: not used, for {why}"))
     for name, file in zip(beside.names, files, strict=True):
         forces, loads, com = beside.of(file)
         for what, other, ending in (("forces", forces, "_grf.mot"), ("centre of mass", com, "_com.sto")):
             if other is None:
-                found.append(Finding("missing", f"{file.name}: no {what}", f"expected such as {file.stem}{ending}"))
+                findings.append(Finding("missing", f"{file.name}: no {what}", f"expected such as {file.stem}{ending}"))
             else:
-                found.append(Finding("ok", f"{file.name}: {what} in {other.name}"))
+                findings.append(Finding("ok", f"{file.name}: {what} in {other.name}"))
         try:
             tracks = trc.read(file)
-            of_markers = _of_markers(tracks, file.name)
-            found += of_markers
+            of_markers = _check_markers(tracks, file.name)
+            findings += of_markers
             if any(each.level == "wrong" for each in of_markers):
                 continue  # what else can be told of them only repeats it
-            found += sequences.told(file.name, _frames(name, tracks, list(tracks.names), forces, loads, com))
+            findings += sequences.check_recording(
+                file.name, _frames(name, tracks, list(tracks.names), forces, loads, com)
+            )
             if forces is not None:
-                found += _of_forces(plates(storage(forces), loads=loads), tracks, forces.name)
+                findings += _check_forces(plates(storage(forces), loads=loads), tracks, forces.name)
         except ValueError as error:
-            found.append(Finding("wrong", str(error)))
-    return found
+            findings.append(Finding("wrong", str(error)))
+    return findings
 
 
-def _of_markers(tracks: Tracks, name: str) -> list[Finding]:
+def _check_markers(tracks: Tracks, name: str) -> list[Finding]:
     """What `ipman fit` says of them, and how they stand where nobody knows the places of their names."""
     from ipman_rs.data.markers import judged
 
-    found = [Finding("odd", note) for note in tracks.notes] + judged.of_tracks(tracks)
-    found = [replace(each, what=f"{name}: {each.what}") for each in found if each.level != "ok"]
-    if any(each.level == "wrong" for each in found):
-        return found
-    return found + standing(name, tracks.points, tracks.confidence > 0, "y")
+    findings = [Finding("odd", note) for note in tracks.notes] + judged.check_tracks(tracks)
+    findings = [replace(each, what=f"{name}: {each.what}") for each in findings if each.level != "ok"]
+    if any(each.level == "wrong" for each in findings):
+        return findings
+    return findings + check_longest_axis(name, tracks.points, tracks.confidence > 0, "y")
 
 
-def _of_forces(found: ForcePlates, tracks: Tracks, name: str) -> list[Finding]:
-    judged = loaded(found, tracks.times) or among(found.at(tracks.times).center(), tracks, "centre of pressure")
-    said = [Finding("odd", f"{name}: {note}") for note in found.notes]
-    return said + [Finding(each.level, f"{name}: {each.what}", each.advice) for each in judged]
+def _check_forces(plates: ForcePlates, tracks: Tracks, name: str) -> list[Finding]:
+    findings = check_loads(plates, tracks.times) or check_near_markers(
+        plates.at(tracks.times).center(), tracks, "centre of pressure"
+    )
+    notes = [Finding("odd", f"{name}: {note}") for note in plates.notes]
+    return notes + [Finding(each.level, f"{name}: {each.what}", each.advice) for each in findings]
 
 
 @dataclass(frozen=True)
-class Beside:
-    """What lies beside the markers' files: `pairs` of them, in which columns the forces of a file are, the recordings'
-    `names`, and what is wrong with files that cannot be read."""
+class CompanionFiles:
+    """The files that belong to marker files: `pairs`, the columns of forces (`loads`) by file, the recordings' `names`,
+    and what is wrong with `unreadable` files."""
 
     pairs: pairing.Pairs
     loads: Mapping[Path, ExternalLoads]
@@ -363,7 +366,7 @@ class Beside:
         return forces, None if forces is None else self.loads.get(forces), self.pairs.com.get(file)
 
 
-def _beside(path: Path, files: list[Path]) -> Beside:
+def _companion_files(path: Path, files: list[Path]) -> CompanionFiles:
     """Forces and centre of mass of each recording, anywhere below a folder or in the folder of the only file."""
     root = path if path.is_dir() else path.parent
     below = sorted(each for each in (root.rglob("*") if path.is_dir() else root.iterdir()) if each.is_file())
@@ -378,10 +381,10 @@ def _beside(path: Path, files: list[Path]) -> Beside:
             what, unreadable[other] = "forces", str(error)  # it is told again, where it belongs to a recording
         if what is not None:
             kinds[other] = what
-    loads, aliases, wrong = external_loads.beside(below)
+    loads, aliases, wrong = external_loads.find(below)
     kinds |= dict.fromkeys(loads, "forces")
     pairs = pairing.pair(files, kinds, root, aliases=aliases)
     used = {*pairs.forces.values(), *pairs.com.values()}
-    told = [what for other, what in unreadable.items() if other not in used]
+    damaged = [what for other, what in unreadable.items() if other not in used]
     pairs.notes += wrong
-    return Beside(pairs, loads, pairing.names(files, root), told)
+    return CompanionFiles(pairs, loads, pairing.names(files, root), damaged)

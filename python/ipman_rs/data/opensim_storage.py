@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import text_file
-from .check import some
+from .check import first_names
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,9 @@ class Storage:
         """(T, 3) of three columns. ValueError for one that is missing."""
         missing = [name for name in names if name not in self.columns]
         if missing:
-            raise ValueError(f"{self.source}: no column {missing[0]!r}; it has {some([*self.columns]) or 'none'}")
+            raise ValueError(
+                f"{self.source}: no column {missing[0]!r}; it has {first_names([*self.columns]) or 'none'}"
+            )
         return np.stack([self.columns[name] for name in names], axis=1)
 
 
@@ -54,22 +56,22 @@ def storage(path: str | os.PathLike[str]) -> Storage:
     labels, table = _labels(lines[rows[0][0] - 1], rows), rows[1:]
     twice = _twice(labels)
     if labels[0].lower() != "time" or twice:
-        told = f"the column {twice!r} twice" if twice else f"{labels[0]!r} first"
-        raise ValueError(f"{path}: line {rows[0][0]}: expected the time first and different names, got {told}")
+        problem = f"the column {twice!r} twice" if twice else f"{labels[0]!r} first"
+        raise ValueError(f"{path}: line {rows[0][0]}: expected the time first and different names, got {problem}")
     cut = len(table) > 1 and _is_cut(table[-1][1], len(labels))
     whole = table[:-1] if cut else table
     numbers, spread = _numbers(str(path), whole, len(labels)), list[str]()
     if not len(numbers):
         raise ValueError(f"{path}: expected rows of numbers, got none")
     times = text_file.seconds(numbers[:, 0], [number for number, _ in whole], str(path), spread)
-    said = _said(header)
+    declared = _said(header)
     notes = [
-        f"its header says {said[name]} {name}, it has {got}"
+        f"its header says {declared[name]} {name}, it has {got}"
         for name, got in (("rows", len(table)), ("columns", len(labels)))
-        if name in said and said[name] != got
+        if name in declared and declared[name] != got
     ]
     notes += [f"the last line, {table[-1][0]}, is cut short and left out: is the file complete?"] if cut else []
-    degrees = {"yes": True, "no": False}.get(str(said.get("indegrees", "")).lower())
+    degrees = {"yes": True, "no": False}.get(str(declared.get("indegrees", "")).lower())
     columns = dict(zip(labels[1:], numbers.T[1:], strict=True))
     return Storage(times, columns, degrees, str(path), (*notes, *spread))
 
@@ -113,14 +115,14 @@ def _numbers(path: str, table: list[tuple[int, list[str]]], width: int) -> Array
 
 def _said(header: list[str]) -> dict[str, int | str]:
     """What the header says of the table: "nRows=29" in OpenSim's own, "datarows 101" in SIMM's."""
-    said: dict[str, int | str] = {}
+    declared: dict[str, int | str] = {}
     for line in header:
         key, _, value = line.strip().replace("=", " ", 1).partition(" ")
         key, value = key.lower().removeprefix("n").removeprefix("data"), value.strip()
         if key in ("rows", "columns") and value.isdecimal():
-            said[key] = (
+            declared[key] = (
                 int(value) if len(value) <= 18 else f"{value[:12]}…"
             )  # Python refuses to read thousands of digits
         elif key == "indegrees":
-            said[key] = value
-    return said
+            declared[key] = value
+    return declared

@@ -25,50 +25,50 @@ STILL = ("static", "stand", "neutral", "calib", "t-pose", "tpose")
 Words = tuple[str, ...]
 
 
-def words(name: str) -> Words:
-    """What of a file's or a folder's name says whose it is: "grf_walk-2" is ("walk", "2")."""
+def distinctive_words(name: str) -> Words:
+    """The words of a name that do not describe the kind of file: "grf_walk-2" gives ("walk", "2")."""
     parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
-    found = tuple(re.findall(r"[^\W_]+", parted.lower()))
-    return () if name.lower() in KINDS else tuple(word for word in found if word not in KINDS)
+    parts = tuple(re.findall(r"[^\W_]+", parted.lower()))
+    return () if name.lower() in KINDS else tuple(word for word in parts if word not in KINDS)
 
 
-def still(name: str) -> bool:
-    """Whether a name says that somebody stands still."""
+def is_static(name: str) -> bool:
+    """Whether a name is that of a static trial."""
     return any(word in name.lower() for word in STILL)
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where a file is below `root`: `owner`, the folders that say whose it is, and the `words` of its own name, or of
-    its folder's where its own has none."""
+class ParsedPath:
+    """The path of a file below `root`, parsed: `owner`, the folders that name a person, and the distinctive `words` of
+    its name, or of its folder's name if its own has none."""
 
     path: Path
     owner: Words
     words: Words
 
     @classmethod
-    def of(cls, path: Path, root: Path) -> Place:
-        folders = [part for part in path.parent.relative_to(root).parts if words(part)]
-        own = words(path.stem)
+    def of(cls, path: Path, root: Path) -> ParsedPath:
+        folders = [part for part in path.parent.relative_to(root).parts if distinctive_words(part)]
+        own = distinctive_words(path.stem)
         if not own and folders:
-            own = words(folders.pop())
+            own = distinctive_words(folders.pop())
         return cls(path, tuple(folders), own)
 
-    def rank(self, other: Place) -> int | None:
-        """How well another file's name says that it belongs to this recording, 0 best; None: it does not say so."""
+    def rank(self, other: ParsedPath) -> int | None:
+        """How well another file's name matches this recording, 0 best; None: not at all."""
         if self.words == other.words and (self.words or self.path.parent == other.path.parent):
             return 0
         if self.words and other.words and _inside(self.words, other.words):
             return 1
         stem = self.path.stem.lower()
-        if words(stem):
+        if distinctive_words(stem):
             begin = r"(?<!\d)" if stem[0].isdigit() else ""
             if re.search(rf"{begin}{re.escape(stem)}(?!\d)", other.path.stem.lower()):
                 return 2
         return 3 if other.words and _inside(other.words, self.words) else None
 
-    def akin(self, other: Place) -> bool:
-        """Whether their folders can be of one person."""
+    def may_share_person(self, other: ParsedPath) -> bool:
+        """Whether the folders of both allow that they are of one person."""
         shared = min(len(self.owner), len(other.owner))
         return self.owner[:shared] == other.owner[:shared]
 
@@ -89,113 +89,118 @@ def pair(
     markers: Sequence[Path],
     tables: Mapping[Path, str],
     root: Path,
-    given: Iterable[Path] = (),
+    with_plates: Iterable[Path] = (),
     aliases: Mapping[Path, Path] | None = None,
 ) -> Pairs:
     """Gives each table, whose kind is "forces" or "com", to the recording that it belongs to.
 
     `given`: recordings that bring their own forces. `aliases`: a file whose name counts for a table, too.
     """
-    found = Pairs(forces={path: path for path in given})
-    recordings = [Place.of(path, root) for path in markers]
-    for kind, paired in (("forces", found.forces), ("com", found.com)):
-        places = [Place.of(path, root) for path, what in tables.items() if what == kind]
-        strangers = _by_name(places, recordings, paired, found, aliases or {}, root)
-        _by_number(kind, strangers, places, recordings, found, root)
-    return found
+    pairs = Pairs(forces={path: path for path in with_plates})
+    recordings = [ParsedPath.of(path, root) for path in markers]
+    for kind, paired in (("forces", pairs.forces), ("com", pairs.com)):
+        places = [ParsedPath.of(path, root) for path, what in tables.items() if what == kind]
+        strangers = _by_name(places, recordings, paired, pairs, aliases or {}, root)
+        _by_number(kind, strangers, places, recordings, pairs, root)
+    return pairs
 
 
 def _by_name(
-    tables: list[Place],
-    recordings: list[Place],
+    tables: list[ParsedPath],
+    recordings: list[ParsedPath],
     paired: dict[Path, Path],
-    found: Pairs,
+    pairs: Pairs,
     aliases: Mapping[Path, Path],
     root: Path,
-) -> list[Place]:
+) -> list[ParsedPath]:
     """Those tables of which no name says whose they are."""
-    strangers: list[Place] = []
+    strangers: list[ParsedPath] = []
     claims: dict[Path, list[tuple[tuple[int, int, int], Path]]] = {}
     for table in tables:
-        names = [table, *([Place.of(aliases[table.path], root)] if table.path in aliases else [])]
+        names = [table, *([ParsedPath.of(aliases[table.path], root)] if table.path in aliases else [])]
         able = sorted(
             ((rank, _steps(one.path, table.path), -len(one.path.stem)), one.path)
             for one in recordings
-            if one.akin(table)
+            if one.may_share_person(table)
             for rank in [min((r for r in map(one.rank, names) if r is not None), default=None)]
             if rank is not None
         )
         if not able:
             strangers.append(table)
         elif len(able) > 1 and able[0][0] == able[1][0]:
-            which = " and ".join(_under(path, root) for score, path in able if score == able[0][0])
-            found.left[table.path] = f"it can belong to {which}; give it the name of one of them"
+            which = " and ".join(_relative(path, root) for score, path in able if score == able[0][0])
+            pairs.left[table.path] = f"it can belong to {which}; give it the name of one of them"
         else:
             claims.setdefault(able[0][1], []).append((able[0][0], table.path))
     for recording, claimed in claims.items():
         for _, path in sorted(claimed):
             if recording in paired:
-                found.left[path] = (
-                    f"{_under(recording, root)} has {_what(paired, found)} {_from(recording, paired, root)}"
+                pairs.left[path] = (
+                    f"{_relative(recording, root)} has {_what(paired, pairs)} {_source(recording, paired, root)}"
                 )
-                found.rivals[path] = recording
+                pairs.rivals[path] = recording
             else:
                 paired[recording] = path
     return strangers
 
 
 def _by_number(
-    kind: str, strangers: list[Place], tables: list[Place], recordings: list[Place], found: Pairs, root: Path
+    kind: str,
+    strangers: list[ParsedPath],
+    tables: list[ParsedPath],
+    recordings: list[ParsedPath],
+    pairs: Pairs,
+    root: Path,
 ) -> None:
     """Gives those tables to a recording which are the only ones of their kind, in a folder or of a person."""
-    paired = found.forces if kind == "forces" else found.com
+    paired = pairs.forces if kind == "forces" else pairs.com
     what = "forces" if kind == "forces" else "centre of mass"
     for table in strangers:
-        owner, why = _only(table, tables, recordings, paired, None if kind == "forces" else found.forces)
+        owner, why = _only_candidate(table, tables, recordings, paired, None if kind == "forces" else pairs.forces)
         if owner is None:
-            found.left[table.path] = (
+            pairs.left[table.path] = (
                 "its name has no recording's name in it; expected such as "
                 f"{recordings[0].path.stem}_{'grf' if kind == 'forces' else 'com'}{table.path.suffix}"
             )
         else:
             paired[owner.path] = table.path
-            found.notes.append(
-                f"{_under(table.path, root)}: taken as the {what} of {_under(owner.path, root)}, the only recording "
-                f"{why}"
+            pairs.notes.append(
+                f"{_relative(table.path, root)}: taken as the {what} of {_relative(owner.path, root)}, "
+                f"the only recording {why}"
             )
 
 
-def _only(
-    table: Place,
-    tables: list[Place],
-    recordings: list[Place],
+def _only_candidate(
+    table: ParsedPath,
+    tables: list[ParsedPath],
+    recordings: list[ParsedPath],
     paired: dict[Path, Path],
     forces: dict[Path, Path] | None,
-) -> tuple[Place | None, str]:
+) -> tuple[ParsedPath | None, str]:
     """The one recording that a table can belong to: in its folder, or else among those of one person; and in words
     which one that is."""
     for near, where in (
         (lambda other: other.path.parent == table.path.parent, "in its folder"),
-        (lambda other: other.akin(table), "there is"),
+        (lambda other: other.may_share_person(table), "there is"),
     ):
         able = [one for one in recordings if near(one)]
         if sum(map(near, tables)) > 1 or not able:
             continue
-        move = [one for one in able if not still(one.path.stem) and not still(" ".join(one.words))]
+        move = [one for one in able if not is_static(one.path.stem) and not is_static(" ".join(one.words))]
         loaded = [] if forces is None else [one for one in able if one.path in forces]
-        for some, why in ((able, where), (loaded, "with forces"), (move, "in which nobody stands still")):
-            if len(some) == 1 and some[0].path not in paired:
-                return some[0], why
+        for candidates, why in ((able, where), (loaded, "with forces"), (move, "in which nobody stands still")):
+            if len(candidates) == 1 and candidates[0].path not in paired:
+                return candidates[0], why
     return None, ""
 
 
-def _what(paired: dict[Path, Path], found: Pairs) -> str:
-    return "forces" if paired is found.forces else "a centre of mass"
+def _what(paired: dict[Path, Path], pairs: Pairs) -> str:
+    return "forces" if paired is pairs.forces else "a centre of mass"
 
 
-def _from(recording: Path, paired: dict[Path, Path], root: Path) -> str:
+def _source(recording: Path, paired: dict[Path, Path], root: Path) -> str:
     own = paired[recording] == recording
-    return "of its own" if own else f"from {_under(paired[recording], root)}"
+    return "of its own" if own else f"from {_relative(paired[recording], root)}"
 
 
 def _inside(few: Words, many: Words) -> bool:
@@ -203,28 +208,30 @@ def _inside(few: Words, many: Words) -> bool:
 
 
 def _steps(one: Path, other: Path) -> int:
-    """From folder to folder."""
+    """The number of steps from folder to folder."""
     a, b = one.parent.parts, other.parent.parts
     shared = next((k for k, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
     return len(a) + len(b) - 2 * shared
 
 
-def _under(path: Path, root: Path) -> str:
+def _relative(path: Path, root: Path) -> str:
     return path.relative_to(root).as_posix()
 
 
 def names(markers: Sequence[Path], root: Path) -> list[str]:
     """Names of recordings that tell them apart and can be those of folders: the file's, or its folder's where the
     file's says nothing, with folders before it where several have the same."""
-    places = [Place.of(path, root) for path in markers]
+    places = [ParsedPath.of(path, root) for path in markers]
     short = [
-        place.path.parent.name if not words(place.path.stem) and place.path.parent != root else place.path.stem
+        place.path.parent.name
+        if not distinctive_words(place.path.stem) and place.path.parent != root
+        else place.path.stem
         for place in places
     ]
     longer = ["_".join([*place.owner, name]) for place, name in zip(places, short, strict=True)]
     whole = ["_".join(path.relative_to(root).with_suffix("").parts) for path in markers]
     ended = ["_".join([*path.relative_to(root).with_suffix("").parts, path.suffix[1:]]) for path in markers]
-    found = list(short)
+    unique = list(short)
     for better in (longer, whole, ended):
-        found = [name if found.count(name) == 1 else better[row] for row, name in enumerate(found)]
-    return found
+        unique = [name if unique.count(name) == 1 else better[row] for row, name in enumerate(unique)]
+    return unique

@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.body import pose_arrays
+from ipman_rs.body.formats import FORMATS
 from ipman_rs.body.hands import Hands
 from ipman_rs.body.joints import SMPLX
 from ipman_rs.files import safe_pickle
@@ -42,7 +42,7 @@ from . import naming, sequences
 from .check import Finding
 from .frames import Cameras, DataSet, Frames
 from .rich_scene import (
-    Scene,
+    RichScene,
     calibration_folder,
     ground_mesh_file,
     read_scene,
@@ -107,7 +107,7 @@ def open(
     views = [view for folder in folders for view in _views(root, folder, _cameras(root, folder, split, cameras))]
     read = lru_cache(maxsize=None)(read_scene)  # of a place, whose files are those of all its sequences
     scenes = {folder: read(*scene_files(root, folder)) for folder in folders}
-    _alike(root, scenes)
+    _require_same_parts(root, scenes)
     rate = _rate(views)
     pictured = any(_image_folder(root, view).is_dir() for view in views)
 
@@ -115,10 +115,10 @@ def open(
         frames = _frames(root, views[index], scenes[views[index].folder], hands, rate)
         return frames if not pictured else replace(frames, images=_images(root, views[index]))
 
-    return sequences.demanded(root, sequences.sequences([len(view.files) for view in views], sequence, path))
+    return sequences.require_plausible(root, sequences.sequences([len(view.files) for view in views], sequence, path))
 
 
-def _alike(root: Path, scenes: dict[Path, Scene]) -> None:
+def _require_same_parts(root: Path, scenes: dict[Path, RichScene]) -> None:
     """ValueError if some scenes lack what others have."""
     for what, there, file in (
         ("ground", {folder: scene.ground is not None for folder, scene in scenes.items()}, "ground_mesh.ply"),
@@ -179,7 +179,7 @@ def _rate(views: list[View]) -> float | None:
     return RATE / steps.pop() if len(steps) == 1 else None
 
 
-def _frames(root: Path, view: View, scene: Scene, hands: Hands | None, rate: float | None) -> Frames:
+def _frames(root: Path, view: View, scene: RichScene, hands: Hands | None, rate: float | None) -> Frames:
     bodies = [_body(file, hands) for file in view.files]
     pose, betas, transl = (np.stack(part) for part in zip(*bodies, strict=True))
     count = len(view.files)
@@ -202,7 +202,7 @@ def _frames(root: Path, view: View, scene: Scene, hands: Hands | None, rate: flo
         transl=transl,
         cameras=spread,
     )
-    return sequences.plausible(view.folder, frames)
+    return sequences.require_plausible_units(view.folder, frames)
 
 
 def _body(file: Path, hands: Hands | None) -> tuple[Array, Array, Array]:
@@ -216,7 +216,7 @@ def _body(file: Path, hands: Hands | None) -> tuple[Array, Array, Array]:
     pose = np.zeros((len(SMPLX), 3))
     for name in PIECES:
         if name in content:
-            joints = [SMPLX.index(joint) for joint in pose_arrays.PIECES[name][0]]
+            joints = [SMPLX.index(joint) for joint in FORMATS["smplx"].pieces[name][0]]
             pose[joints] = _array(file, name, content[name], 3 * len(joints)).reshape(-1, 3)
     if hands is not None and all(name in content for name in HANDS):
         weights = [_array(file, name, content[name], None) for name in HANDS]
@@ -261,26 +261,28 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
     except ValueError as error:
         return [Finding("missing", str(error), "fetch the bodies of a split and unpack them")]
     counts = {split: sum(folder.parent.name == split for folder in folders) for split in SPLITS}
-    found = [Finding("ok", f"{len(folders)} sequences ({', '.join(f'{n} in {split}' for split, n in counts.items())})")]
+    findings = [
+        Finding("ok", f"{len(folders)} sequences ({', '.join(f'{n} in {split}' for split, n in counts.items())})")
+    ]
     for split, names in IPMAN.items():
         lacking = [name for name in names if name not in {folder.name for folder in folders}]
         if lacking:
-            found.append(Finding("missing", f"{split}: {', '.join(lacking)}"))
+            findings.append(Finding("missing", f"{split}: {', '.join(lacking)}"))
         else:
-            found.append(Finding("ok", f"{split}: all {len(names)} sequences"))
+            findings.append(Finding("ok", f"{split}: all {len(names)} sequences"))
     read, cached_scene = [], lru_cache(maxsize=None)(read_scene)
     for folder in folders:
-        found += _around(root, folder)
+        findings += _check_companions(root, folder)
         try:
             scene = cached_scene(*scene_files(root, folder))
             for view in _views(root, folder, (0,)):
                 read.append((view.sequence, lambda v=view, s=scene: _frames(root, v, s, None, None)))
         except ValueError as error:
-            found.append(Finding("wrong", str(error)))
-    return found + sequences.judged(read)
+            findings.append(Finding("wrong", str(error)))
+    return findings + sequences.check_sequences(read)
 
 
-def _around(root: Path, folder: Path) -> list[Finding]:
+def _check_companions(root: Path, folder: Path) -> list[Finding]:
     """What is missing beside the bodies of a sequence."""
     needed = (
         ("ground", ground_mesh_file(root, folder), "scan_calibration/SCENE/ground_mesh.ply"),

@@ -29,10 +29,10 @@ IMAGE = re.compile(r"([^/]+)/data/(?:.*/)?(\d+)_(\d+)\.\w+$")
 
 def label(image: str) -> tuple[str, str]:
     """`SEQUENCE/00042_00` and `SEQUENCE/00`: what one camera saw."""
-    found = IMAGE.search(image)
-    if found is None:
+    match = IMAGE.search(image)
+    if match is None:
         return spin.image_by_itself(image)
-    return f"{found[1]}/{found[2]}_{found[3]}", f"{found[1]}/{found[3]}"
+    return f"{match[1]}/{match[2]}_{match[3]}", f"{match[1]}/{match[3]}"
 
 
 def camera_t(rotation: Array, translation: Array, images: NDArray[np.str_]) -> Array:

@@ -21,7 +21,7 @@ TILT = 30.0  # degrees: more than that from the scan's z is no ground
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class RichScene:
     """What belongs to a place: its ground in camera 0's axes, and its cameras' rotation, translation, intrinsics."""
 
     ground: Ground | None
@@ -51,9 +51,9 @@ def scene_files(root: Path, folder: Path) -> tuple[Path | None, Path, Path]:
     return ground_mesh_file(root, folder), to_world_file(root, folder), calibration_folder(root, folder)
 
 
-def read_scene(mesh: Path | None, to_world: Path, calibration: Path) -> Scene:
+def read_scene(mesh: Path | None, to_world: Path, calibration: Path) -> RichScene:
     files = sorted(file for file in calibration.glob("*.xml") if file.stem.isdigit())
-    return Scene(
+    return RichScene(
         ground=None if mesh is None else ground(mesh, to_world),
         cameras={int(file.stem): camera(file) for file in files},
     )
@@ -77,9 +77,9 @@ def camera(file: Path) -> tuple[Array, Array, Array]:
 
 
 def _matrix(root: Any, name: str, size: int, file: Path) -> Array:
-    said = safe_xml.text(root, f"{name}/data", file).split()
+    words = safe_xml.text(root, f"{name}/data", file).split()
     try:
-        numbers = np.array(said, np.float64)
+        numbers = np.array(words, np.float64)
     except ValueError as error:
         raise ValueError(f"{file}: {name}: expected numbers: {error}") from None
     if numbers.size != size or not np.isfinite(numbers).all():
@@ -114,10 +114,10 @@ def ground(mesh: Path, to_world: Path) -> Ground:
 
 def _transform(file: Path) -> tuple[Array, Array, float]:
     """R, t and c of world = c · X R + t."""
-    said = read_json(file)
+    content = read_json(file)
     try:
-        rotation, translation = np.array(said["R"], float), np.array(said["t"], float).reshape(3)
-        scale = float(np.array(said["c"], float).reshape(()))
+        rotation, translation = np.array(content["R"], float), np.array(content["t"], float).reshape(3)
+        scale = float(np.array(content["c"], float).reshape(()))
     except (ValueError, LookupError, TypeError, OverflowError) as error:
         raise ValueError(f"{file}: expected R, t and c of the way to the scan's world: {error!r}") from None
     if rotation.shape != (3, 3) or np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3:

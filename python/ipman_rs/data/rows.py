@@ -1,4 +1,4 @@
-"""Arrays of an `.npz` file with a row a frame, mapped into memory: a row costs what its own bytes cost.
+"""Arrays of an `.npz` file with one row per frame, mapped into memory: only the rows that are used are read.
 
 numpy.savez stores its arrays as they are, so nothing is read before its rows are asked for, in a file of any length. A
 file of numpy.savez_compressed has to be unpacked: once, when it is opened, up to 4 GB, which stay in memory.
@@ -73,20 +73,20 @@ class RowFile:
         return texts
 
     def scan(self) -> Iterator[Finding]:
-        """Every number of the file, whether it is one."""
+        """Findings about NaN and infinity in all arrays of the file."""
         for name, array in self.arrays.items():
             if self.shapes[name] == TEXT:
                 continue
             bad = sum(_not_finite(array[start : start + PIECE]) for start in range(0, self.count, PIECE))
             if bad:
-                said = f"{name}: NaN or infinity in {bad} of {self.count} rows"
-                yield Finding("missing", said, "no figure is computed for them")
+                message = f"{name}: NaN or infinity in {bad} of {self.count} rows"
+                yield Finding("missing", message, "no figure is computed for them")
 
     def _opened(self, names: Iterable[str]) -> dict[str, NDArray[Any]]:
         arrays: dict[str, NDArray[Any]] = {}
         unpacked = 0
         for name in names:
-            arrays[name] = safe_npz.mapped(self.path, name)
+            arrays[name] = safe_npz.memory_map(self.path, name)
             unpacked += 0 if isinstance(arrays[name], np.memmap) else arrays[name].nbytes
             if unpacked > UNPACKED:
                 advice = "save it again with numpy.savez, which need not be unpacked"

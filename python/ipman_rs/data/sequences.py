@@ -1,4 +1,4 @@
-"""Data sets whose sequences lie in files of their own: read when they are asked for, judged by a sample."""
+"""Data sets with one file per sequence: read on demand, checked by a sample."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from . import check
 from .frames import Frames, Rows
-from .joined import Joined, concatenated
+from .joined import Joined, concatenate
 
-KEPT = 4  # sequences that stay in memory: rows are mostly asked for one after the other
-SAMPLED = 16  # sequences, and frames of each, that are looked at
-ENOUGH = 8  # sequences, of which not everybody lies: only then the way from feet to head tells where up is
+KEPT = 4  # sequences that stay in memory, because rows are mostly read in order
+SAMPLED = 16  # sequences, and frames of each, that are checked
+ENOUGH = 8  # sequences: in so many not everybody lies, so the direction from feet to head shows where up is
 
 
 @dataclass(frozen=True)
@@ -56,12 +56,12 @@ def sequences(lengths: Sequence[int], read: Callable[[int], Frames], source: str
     """
     if not sum(lengths):
         raise ValueError(f"{source}: no frame at all: is the download complete?")
-    kept = lru_cache(KEPT)(read)
-    return Joined([OnDemand(length, partial(kept, index)) for index, length in enumerate(lengths)])
+    cached = lru_cache(KEPT)(read)
+    return Joined([OnDemand(length, partial(cached, index)) for index, length in enumerate(lengths)])
 
 
-def measured_alike(parts: Sequence[Frames]) -> list[Frames]:
-    """With NaN for what only others of the parts have measured, and as many force plates in each."""
+def fill_missing(parts: Sequence[Frames]) -> list[Frames]:
+    """The parts with NaN for measurements that only other parts have, and the same number of force plates in each."""
     plates = max((part.forces.shape[1] for part in parts if part.forces is not None), default=0)
     return [_with_nothing(part, parts, plates) for part in parts]
 
@@ -80,48 +80,49 @@ def _with_nothing(part: Frames, parts: Sequence[Frames], plates: int) -> Frames:
     return replace(part, **lacking)
 
 
-def demanded(path: str | os.PathLike[str], data: Joined) -> Joined:
+def require_plausible(path: str | os.PathLike[str], data: Joined) -> Joined:
     """`data`, if a sample of it has plausible units and, where it has enough sequences to tell, axes and ground."""
     chosen = [data.parts[index] for index in check.evenly(len(data.parts), SAMPLED) if len(data.parts[index])]
-    frames = concatenated([part[check.evenly(len(part), SAMPLED)] for part in chosen])
-    check.demand(Path(path), check.of_frames(frames if len(chosen) >= ENOUGH else replace(frames, ground=None)))
+    frames = concatenate([part[check.evenly(len(part), SAMPLED)] for part in chosen])
+    check.raise_if_wrong(
+        Path(path), check.check_frames(frames if len(chosen) >= ENOUGH else replace(frames, ground=None))
+    )
     return data
 
 
-def plausible(file: Path, frames: Frames) -> Frames:
+def require_plausible_units(file: Path, frames: Frames) -> Frames:
     """The frames of one sequence, if their units can be right. Its axes do not tell: its person may lie throughout."""
-    check.demand(file, check.of_frames(replace(check.sample(frames), ground=None)))
+    check.raise_if_wrong(file, check.check_frames(replace(check.sample(frames), ground=None)))
     return frames
 
 
-def judged(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Finding]:
-    """What can be told of sequences that are read one after the other: what is not right in each, and of all, by a
-    sample."""
-    found, some = [], []
+def check_sequences(parts: Sequence[tuple[str, Callable[[], Frames]]]) -> list[check.Finding]:
+    """Findings about sequences that are read one by one: what is wrong with each, and checks of a sample of all."""
+    findings, samples = [], []
     for index, (name, read) in enumerate(parts):
         try:
             frames = read()
         except (ValueError, ImportError) as error:
-            found.append(check.Finding("wrong", str(error)))
+            findings.append(check.Finding("wrong", str(error)))
             continue
-        few = frames[check.evenly(len(frames), check.SAMPLE)]
-        for each in check.of_frames(replace(few, ground=None)):
+        sample = frames[check.evenly(len(frames), check.SAMPLE)]
+        for each in check.check_frames(replace(sample, ground=None)):
             if each.level != "ok":
-                found.append(check.Finding(each.level, f"{name}: {each.what}", each.advice))
+                findings.append(check.Finding(each.level, f"{name}: {each.what}", each.advice))
         if index in check.evenly(len(parts), SAMPLED**2):
-            some.append(frames[check.evenly(len(frames), SAMPLED)])
+            samples.append(frames[check.evenly(len(frames), SAMPLED)])
     try:
-        return found + (check.of_frames(concatenated(some)) if some else [])
+        return findings + (check.check_frames(concatenate(samples)) if samples else [])
     except ValueError as error:  # they have other joints, or only some have a ground
-        return [*found, check.Finding("missing", str(error))]
+        return [*findings, check.Finding("missing", str(error))]
 
 
-def told(name: str, frames: Frames) -> list[check.Finding]:
-    """What can be told of one recording, under its name."""
-    found = check.of_frames(check.sample(frames))
-    return [check.Finding(each.level, f"{name}: {each.what}", each.advice) for each in found]
+def check_recording(name: str, frames: Frames) -> list[check.Finding]:
+    """Findings about one recording, with its name."""
+    findings = check.check_frames(check.sample(frames))
+    return [check.Finding(each.level, f"{name}: {each.what}", each.advice) for each in findings]
 
 
-def numbered(name: str, count: int) -> NDArray[np.str_]:
+def frame_names(name: str, count: int) -> NDArray[np.str_]:
     """Names of the frames of a sequence: "name/00000", "name/00001", ..."""
     return np.array([f"{name}/{number:05d}" for number in range(count)], np.str_)

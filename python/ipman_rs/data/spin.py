@@ -1,6 +1,6 @@
-"""Annotations in the form of SPIN: one `.npz` with a row a person, which many data sets of people are shared in.
+"""Annotations in the form of SPIN: one `.npz` with one row per person, in which many data sets are shared.
 
-imgname (N,), center (N, 2) px and scale (N,) = side of the square box / 200, and of the others those that there are:
+imgname (N,), center (N, 2) px and scale (N,) = side of the square box / 200, and any of the following:
 
     part (N, 24, 3)         x, y in pixels and 1 where labelled, of the joints JOINTS
     openpose (N, 25, 3)     x, y and confidence of OpenPose's BODY_25
@@ -33,7 +33,7 @@ from ipman_rs.data.keypoints.openpose import BODY_25
 from ipman_rs.ground import Ground
 
 from . import naming
-from .check import Finding, demand, of_frames, sample, stance
+from .check import Finding, check_frames, raise_if_wrong, sample, stance
 from .frames import Array, Cameras, Frames, Rows
 from .rows import TEXT, RowFile
 
@@ -90,7 +90,7 @@ class Form:
         """
         file = _file(self, Path(path), split)
         data = Spin(RowFile(file, SHAPES, REQUIRED), self, frame, height)
-        demand(file, _plausible(data))
+        raise_if_wrong(file, _check_rows(data))
         return data
 
     def check(self, path: str | os.PathLike[str]) -> list[Finding]:
@@ -100,13 +100,13 @@ class Form:
             return _check_file(self, place)
         if not place.is_dir():
             return [Finding("wrong", f"{place}: no such file or folder")]
-        found: list[Finding] = []
+        findings: list[Finding] = []
         for split, name in self.files.items():
             if (place / name).is_file():
-                found += _check_file(self, place / name)
+                findings += _check_file(self, place / name)
             else:
-                found.append(Finding("missing", f"{name}: not in the folder", f"only the split {split!r} needs it"))
-        return found
+                findings.append(Finding("missing", f"{name}: not in the folder", f"only the split {split!r} needs it"))
+        return findings
 
 
 class Spin:
@@ -176,21 +176,21 @@ class Spin:
 
     def _body(self, rows: Rows) -> dict[str, Any]:
         """SMPL's parameters; NaN where the file says that a row has none."""
-        pose, known = ("pose_world", "has_smpl_world") if self.world else ("pose", "has_smpl")
+        pose, fitted = ("pose_world", "has_smpl_world") if self.world else ("pose", "has_smpl")
         if pose not in self.file:
             return {}
-        found = {"pose": self.file.numbers(pose, rows).reshape(-1, 24, 3)}
+        columns = {"pose": self.file.numbers(pose, rows).reshape(-1, 24, 3)}
         if "shape" in self.file:
-            found["betas"] = self.file.numbers("shape", rows)
+            columns["betas"] = self.file.numbers("shape", rows)
         if self.world and "transl_world" in self.file:
-            found["transl"] = self.file.numbers("transl_world", rows)
-        if known in self.file:
-            lacking = self.file.numbers(known, rows) == 0
-            found = {
+            columns["transl"] = self.file.numbers("transl_world", rows)
+        if fitted in self.file:
+            lacking = self.file.numbers(fitted, rows) == 0
+            columns = {
                 name: np.where(lacking.reshape(-1, *[1] * (each.ndim - 1)), np.nan, each)
-                for name, each in found.items()
+                for name, each in columns.items()
             }
-        return {"body": "smpl", "genders": self._genders(rows), **found}
+        return {"body": "smpl", "genders": self._genders(rows), **columns}
 
     def _genders(self, rows: Rows) -> NDArray[np.str_]:
         """SPIN's own fits are SMPL's neutral model."""
@@ -228,34 +228,34 @@ class Spin:
 
 def genders(file: RowFile, rows: Rows) -> NDArray[np.str_]:
     """The array `gender` in full words. ValueError for another word."""
-    given = file.texts("gender", rows).tolist()
-    unknown = set(given) - set(GENDERS)
+    words = file.texts("gender", rows).tolist()
+    unknown = set(words) - set(GENDERS)
     if unknown:
         raise ValueError(f"{file.path}: gender: expected one of {', '.join(GENDERS)}, got {unknown.pop()!r}")
-    return np.array([GENDERS[gender] for gender in given], np.str_)
+    return np.array([GENDERS[gender] for gender in words], np.str_)
 
 
 def _check_file(form: Form, file: Path) -> list[Finding]:
     try:
         data = Spin(RowFile(file, SHAPES, REQUIRED), form)
-        found = [Finding("ok", f"{len(data)} rows with {', '.join(data.file)}"), *_plausible(data)]
+        findings = [Finding("ok", f"{len(data)} rows with {', '.join(data.file)}"), *_check_rows(data)]
         if data.world and "S" in data.file:
-            seen = _plausible(Spin(data.file, form, "camera"))
-            found += [Finding(each.level, f"in the camera's axes: {each.what}", each.advice) for each in seen]
-        found += data.file.scan()
+            in_camera = _check_rows(Spin(data.file, form, "camera"))
+            findings += [Finding(each.level, f"in the camera's axes: {each.what}", each.advice) for each in in_camera]
+        findings += data.file.scan()
     except ValueError as error:
         return [Finding("wrong", str(error))]
     lacking = [
         Finding("missing", f"{name}: no such array", why) for name, why in form.wanted.items() if name not in data.file
     ]
-    return [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in [*found, *lacking]]
+    return [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in [*findings, *lacking]]
 
 
-def _plausible(data: Spin) -> list[Finding]:
+def _check_rows(data: Spin) -> list[Finding]:
     """Axes are judged where there is no floor, too. Cameras are held upright: up is -y in their axes."""
     frames = sample(data)
     up = data.form.up if data.world else (0.0, -1.0, 0.0)
-    return of_frames(frames) + (stance(frames, Ground(up)) if frames.ground is None and up is not None else [])
+    return check_frames(frames) + (stance(frames, Ground(up)) if frames.ground is None and up is not None else [])
 
 
 def _file(form: Form, path: Path, split: str | None) -> Path:
@@ -264,11 +264,11 @@ def _file(form: Form, path: Path, split: str | None) -> Path:
     if path.is_file():
         return path
     names = [form.files[split]] if split is not None else list(form.files.values())
-    found = [path / name for name in names if (path / name).is_file()]
-    if not found:
+    existing = [path / name for name in names if (path / name).is_file()]
+    if not existing:
         what = f"none of {', '.join(names)} in it" if path.is_dir() else "no such file or folder"
         raise ValueError(f"{path}: {what}; `ipman data check {form.name} {path}` tells what is expected")
-    return found[0]
+    return existing[0]
 
 
 def millimetres_or_metres(translation: Array) -> Array:

@@ -30,9 +30,9 @@ from ipman_rs.body import joints
 from ipman_rs.files import safe_pickle
 
 from . import naming, spin
-from .check import Finding, demanded, of_frames
+from .check import Finding, check_frames, require_plausible
 from .frames import Array, Cameras, Frames
-from .joined import concatenated
+from .joined import concatenate
 
 NAME = "3dpw"
 SPLITS = ("test", "validation", "train")
@@ -50,8 +50,8 @@ IMAGE = re.compile(r"(?:imageFiles/)?([^/]+)/(image_\d+)\.\w+$")
 
 def label(image: str) -> tuple[str, str]:
     """`downtown_arguing_00/image_00012` and `downtown_arguing_00`."""
-    found = IMAGE.search(image)
-    return (f"{found[1]}/{found[2]}", found[1]) if found else spin.image_by_itself(image)
+    match = IMAGE.search(image)
+    return (f"{match[1]}/{match[2]}", match[1]) if match else spin.image_by_itself(image)
 
 
 FORM = spin.Form(
@@ -78,7 +78,7 @@ def open(path: str | os.PathLike[str], split: str | None = None) -> Frames | spi
         return FORM.open(place, split)
     if not files:
         raise ValueError(f"{place}: no sequenceFiles/{split or 'test'}/*.pkl and no 3dpw_test.npz in it")
-    return demanded(place, concatenated([person for file in files for person in _people(file)]))
+    return require_plausible(place, concatenate([person for file in files for person in _people(file)]))
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
@@ -92,28 +92,28 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         return [Finding("wrong", f"{place}: no such file or folder")]
     if not (place / "sequenceFiles").is_dir() and (place / FORM.files["test"]).is_file():
         return FORM.check(place)
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for split, expected in FILES.items():
         files = _sequence_files(place, split)
-        found += _check_files(files)
+        findings += _check_files(files)
         if len(files) != expected:
-            said = f"sequenceFiles/{split}: {len(files)} of {expected} sequences"
-            found.append(Finding("missing", said, "unpack sequenceFiles.zip into the folder"))
-    return found
+            message = f"sequenceFiles/{split}: {len(files)} of {expected} sequences"
+            findings.append(Finding("missing", message, "unpack sequenceFiles.zip into the folder"))
+    return findings
 
 
 def _check_files(files: list[Path]) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for file in files:
         try:
-            frames = concatenated(_people(file))
+            frames = concatenate(_people(file))
         except ValueError as error:
-            found.append(Finding("wrong", str(error)))
+            findings.append(Finding("wrong", str(error)))
             continue
-        told = [Finding("ok", f"{len(frames)} frames of {len(set(frames.sequences))} people")]
-        told += of_frames(frames)
-        found += [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in told]
-    return found
+        own = [Finding("ok", f"{len(frames)} frames of {len(set(frames.sequences))} people")]
+        own += check_frames(frames)
+        findings += [Finding(each.level, f"{file.name}: {each.what}", each.advice) for each in own]
+    return findings
 
 
 def _sequence_files(folder: Path, split: str) -> list[Path]:
@@ -141,31 +141,31 @@ def _person(file: Path, content: Mapping[str, Any], number: int, cameras: Array)
         return _array(file, f"{name}[{number}]", content[name][number], shape)
 
     count = len(cameras)
-    known = np.flatnonzero(array("campose_valid", (count,)))
+    rows = np.flatnonzero(array("campose_valid", (count,)))
     betas = array("betas", (-1,))[:10]
     gender = content["genders"][number]
     if gender not in ("m", "f"):
         raise ValueError(f"{file}: genders[{number}]: expected 'm' or 'f', got {gender!r}")
     sequence = str(content["sequence"])
-    names = np.array([f"{sequence}/image_{frame:05d}" for frame in known], np.str_)
-    sequences = np.full(len(known), sequence)
-    people = np.full(len(known), number)
-    views = cameras[known]
+    names = np.array([f"{sequence}/image_{frame:05d}" for frame in rows], np.str_)
+    sequences = np.full(len(rows), sequence)
+    people = np.full(len(rows), number)
+    views = cameras[rows]
     intrinsics = _array(file, "cam_intrinsics", content["cam_intrinsics"], (3, 3))
     return Frames(
         names=naming.numbered(names, people),
         sequences=naming.numbered(sequences, people),
         frame_rate=RATE,
         body="smpl",
-        genders=np.full(len(known), spin.GENDERS[gender]),
-        pose=array("poses", (count, 72))[known].reshape(-1, 24, 3),
-        betas=np.tile(betas, (len(known), 1)),
-        transl=array("trans", (count, 3))[known],
-        joints=array("jointPositions", (count, 72))[known].reshape(-1, 24, 3),
+        genders=np.full(len(rows), spin.GENDERS[gender]),
+        pose=array("poses", (count, 72))[rows].reshape(-1, 24, 3),
+        betas=np.tile(betas, (len(rows), 1)),
+        transl=array("trans", (count, 3))[rows],
+        joints=array("jointPositions", (count, 72))[rows].reshape(-1, 24, 3),
         joint_names=joints.SMPL,
         images=np.array([f"imageFiles/{name}.jpg" for name in names.tolist()], np.str_),
-        cameras=Cameras(views[:, :3, :3], views[:, :3, 3], np.tile(intrinsics, (len(known), 1, 1))),
-        keypoints=array("poses2d", (count, 3, 18))[known].swapaxes(1, 2),
+        cameras=Cameras(views[:, :3, :3], views[:, :3, 3], np.tile(intrinsics, (len(rows), 1, 1))),
+        keypoints=array("poses2d", (count, 3, 18))[rows].swapaxes(1, 2),
         keypoint_names=COCO_18,
     )
 

@@ -1,4 +1,4 @@
-"""Recorded paths of markers."""
+"""Tracks: the recorded positions of markers over time."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ipman_rs.renamed import old_names
+
 from .units import METRES, metres
 
-__all__ = ["METRES", "TO_Y_UP", "Named", "Tracks", "named", "rate_of", "tracks"]
+__all__ = ["METRES", "TO_Y_UP", "MarkerColumns", "Tracks", "rate_of", "select_markers", "tracks"]
+
+__getattr__ = old_names(__name__, {"Named": "MarkerColumns", "named": "select_markers"})
 
 Array = NDArray[np.float64]
 
@@ -35,7 +39,7 @@ FEWEST_OF_A_PERSON = 6  # markers of one name before the colon: a ball, a bat or
 NAMELESS = re.compile(r"\*\d*|(?:unlabell?ed|unnamed|uname)[ _*-]*\d*", re.IGNORECASE)
 
 
-NOBODY = '"" (without a name before a colon)'
+NO_SUBJECT = '"" (without a name before a colon)'
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +106,8 @@ def tracks(
 ) -> Tracks:
     """From a file's own numbers: NaN, exactly the origin, or a number that stands for it is a marker that was not seen.
 
-    `unit`: its name, or metres in one; "" is guessed. Names as `named` has them. ValueError for an unknown unit, axis
-    or subject, for no marker or sample, for two people, if nothing was seen, and for infinite coordinates.
+    `unit`: its name, or metres in one; "" is guessed. Names as `select_markers` has them. ValueError for an unknown
+    unit, axis or subject, for no marker or sample, for two people, if nothing was seen, and for infinite coordinates.
     """
     if up not in TO_Y_UP:
         raise ValueError(f"{source}: up: expected x, y or z, got {up!r}")
@@ -112,18 +116,18 @@ def tracks(
     if np.isinf(points).any():
         sample, marker, _ = np.argwhere(np.isinf(points))[0]
         raise ValueError(f"{source}: sample {sample}, marker {names[marker]!r}: expected numbers, got infinity")
-    seen, said = seen_of(points, names)
-    chosen = named(names, seen, source, subject)
+    visible, mended = visibility(points, names)
+    chosen = select_markers(names, visible, source, subject)
     if not chosen.names:
         raise ValueError(f"{source}: expected markers with names, none of its {len(names)} points has one: label them")
-    points, seen = points[:, chosen.columns], seen[:, chosen.columns]
-    if not seen.any():
+    points, visible = points[:, chosen.columns], visible[:, chosen.columns]
+    if not visible.any():
         raise ValueError(f"{source}: expected coordinates, all are missing")
-    scale = _scale(unit, points[seen], source)
-    turned = np.where(seen[..., None], points, 0.0) * scale @ TO_Y_UP[up].T
-    guessed = [not_given(likely_unit(points[seen]))] if unit == "" else []
-    told = (*notes, *said, *chosen.notes, *guessed, *_gaps(times))
-    return Tracks(chosen.names, turned, seen.astype(float), np.asarray(times, float), source, told, up, scale)
+    scale = _scale(unit, points[visible], source)
+    turned = np.where(visible[..., None], points, 0.0) * scale @ TO_Y_UP[up].T
+    guessed = [unit_note(likely_unit(points[visible]))] if unit == "" else []
+    all_notes = (*notes, *mended, *chosen.notes, *guessed, *_gaps(times))
+    return Tracks(chosen.names, turned, visible.astype(float), np.asarray(times, float), source, all_notes, up, scale)
 
 
 def _gaps(times: Array) -> list[str]:
@@ -132,10 +136,10 @@ def _gaps(times: Array) -> list[str]:
     if not places:
         return []
     what = "a gap" if len(places) == 1 else f"{len(places)} gaps"
-    return [f"its times have {what}, at {and_more(places, 3)}: the frames before and after are taken as neighbours"]
+    return [f"its times have {what}, at {list_names(places, 3)}: the frames before and after are taken as neighbours"]
 
 
-def turned(tracks: Tracks, normal: Sequence[float]) -> Tracks:
+def turn_up(tracks: Tracks, normal: Sequence[float]) -> Tracks:
     """The tracks with this direction of theirs, (3,), turned to +y by the shortest way."""
     up = np.asarray(normal, float) / np.linalg.norm(normal)
     if up[1] < -1 + 1e-12:
@@ -146,8 +150,8 @@ def turned(tracks: Tracks, normal: Sequence[float]) -> Tracks:
     return replace(tracks, points=tracks.points @ rotation.T)
 
 
-def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], list[str]]:
-    """Where markers (T, M, 3) were seen (T, M); and in words which numbers stand for one that was not."""
+def visibility(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], list[str]]:
+    """Where markers (T, M, 3) were seen, (T, M); and notes on the numbers that mark a marker as not seen."""
     origin = (points == 0).all(-1)
     there = ~np.isnan(points).any(-1) & ~origin
     with np.errstate(invalid="ignore"):
@@ -159,56 +163,56 @@ def seen_of(points: Array, names: Sequence[str]) -> tuple[NDArray[np.bool_], lis
         alike = (size == size[..., :1]).all(-1)
     stands = far | (nines & (size >= 9999)).any(-1) | (alike & (nines.all(-1) | np.isin(size[..., 0], WORDS)))
     stands &= there
-    said = []
+    notes = []
     if origin.any():
-        said.append(_not_seen("0, 0, 0", origin, names))
+        notes.append(_not_seen("0, 0, 0", origin, names))
     if stands.any():
         first = points[stands][0]
-        said.append(_not_seen(f"{first[int(np.abs(first).argmax())]:.7g}", stands, names))
+        notes.append(_not_seen(f"{first[int(np.abs(first).argmax())]:.7g}", stands, names))
     again, place = _repeated(points, there & ~stands)
     if place is not None:
-        said.append(_not_seen(", ".join(f"{number:.7g}" for number in place), again, names))
-    return there & ~stands & ~again, said
+        notes.append(_not_seen(", ".join(f"{number:.7g}" for number in place), again, names))
+    return there & ~stands & ~again, notes
 
 
 def _not_seen(value: str, where: NDArray[np.bool_], names: Sequence[str]) -> str:
     which = [names[int(column)] or "one without a name" for column in np.flatnonzero(where.any(axis=0)).tolist()]
-    return f"{value} is taken as not seen ({and_more(which)})"
+    return f"{value} is taken as not seen ({list_names(which)})"
 
 
-def _repeated(points: Array, seen: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Array | None]:
+def _repeated(points: Array, visible: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Array | None]:
     """Where one exact place stands for what was not seen, such as -1, -1, -1; and that place, None if none does.
 
     It is where two markers that move apart were said to be, again and again; or thrice the same whole number, off the
     path of a marker.
     """
-    nowhere = np.zeros_like(seen)
-    alike = seen & (points == points[..., :1]).all(-1)
-    again = seen.copy()
+    nowhere = np.zeros_like(visible)
+    alike = visible & (points == points[..., :1]).all(-1)
+    again = visible.copy()
     again[1:] &= (points[1:] == points[:-1]).all(-1)
     again[:1] = False
     places, counts = np.unique(points[alike | again][:MOST], axis=0, return_counts=True)
     for place in places[np.argsort(-counts, kind="stable")[:CANDIDATES]]:
-        here = seen & (points == place).all(-1)
-        moving = np.flatnonzero(here.any(axis=0) & (seen & ~here).any(axis=0))
-        if here.sum() >= OFTEN and _is_nowhere(points, here, seen, moving.tolist(), place):
+        here = visible & (points == place).all(-1)
+        moving = np.flatnonzero(here.any(axis=0) & (visible & ~here).any(axis=0))
+        if here.sum() >= OFTEN and _is_nowhere(points, here, visible, moving.tolist(), place):
             return here, place
     return nowhere, None
 
 
 def _is_nowhere(
-    points: Array, here: NDArray[np.bool_], seen: NDArray[np.bool_], moving: Sequence[int], place: Array
+    points: Array, here: NDArray[np.bool_], visible: NDArray[np.bool_], moving: Sequence[int], place: Array
 ) -> bool:
     if any(not np.array_equal(points[:, moving[0]], points[:, column], equal_nan=True) for column in moving[1:]):
         return True
     if not moving or len(set(place.tolist())) > 1 or place[0] != np.round(place[0]):
         return False
-    others = points[(seen & ~here)[:, moving[0]], moving[0]]
+    others = points[(visible & ~here)[:, moving[0]], moving[0]]
     return bool(((place < others.min(axis=0)) | (place > others.max(axis=0))).any())
 
 
 @dataclass(frozen=True)
-class Named:
+class MarkerColumns:
     """Which of a file's points are markers of the person, and what they are called."""
 
     names: tuple[str, ...]
@@ -216,7 +220,9 @@ class Named:
     notes: tuple[str, ...]
 
 
-def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: str | None = None) -> Named:
+def select_markers(
+    names: Sequence[str], visible: NDArray[np.bool_], source: str, subject: str | None = None
+) -> MarkerColumns:
     """The markers by name, without the subject that stands before a colon ("S01:LASI").
 
     Left out, and named: points without a name, the shorter of two markers of one name, other people than `subject`.
@@ -225,36 +231,38 @@ def named(names: Sequence[str], seen: NDArray[np.bool_], source: str, subject: s
     ValueError for two people of whom none is chosen, and for an unknown one.
     """
     notes = []
-    known = [column for column, name in enumerate(names) if name.strip() and not _nameless(name)]
-    if len(known) < len(names):
-        notes.append(f"{_count(len(names) - len(known), 'point')} without a name left out")
-    split = {column: names[column].rpartition(":") for column in known}
-    people = dict.fromkeys(split[column][0].strip() for column in known)
-    chosen = _person([*people], split, seen, source, subject)
-    joined = [*dict.fromkeys(w for c, (who, _, _) in split.items() if (w := who.strip()) and seen[:, c].any())]
+    chosen_columns = [column for column, name in enumerate(names) if name.strip() and not _nameless(name)]
+    if len(chosen_columns) < len(names):
+        notes.append(f"{_count(len(names) - len(chosen_columns), 'point')} without a name left out")
+    split = {column: names[column].rpartition(":") for column in chosen_columns}
+    people = dict.fromkeys(split[column][0].strip() for column in chosen_columns)
+    chosen = _person([*people], split, visible, source, subject)
+    joined = [*dict.fromkeys(w for c, (who, _, _) in split.items() if (w := who.strip()) and visible[:, c].any())]
     if chosen is None and len(joined) > 1:
-        notes.append(f"the markers of {and_more(joined)} are taken as one person's (subject, --subject: those of one)")
+        notes.append(
+            f"the markers of {list_names(joined)} are taken as one person's (subject, --subject: those of one)"
+        )
     if chosen is not None:
-        own = {split[column][2].strip() for column in known if split[column][0].strip() == chosen}
-        nobodys = {split[column][2].strip() for column in known if not split[column][0].strip()}
+        own = {split[column][2].strip() for column in chosen_columns if split[column][0].strip() == chosen}
+        nobodys = {split[column][2].strip() for column in chosen_columns if not split[column][0].strip()}
         with_him = {chosen} if own & nobodys else {"", chosen}  # names without a person are another one's, or his too
-        others = [column for column in known if split[column][0].strip() not in with_him]
-        known = [column for column in known if split[column][0].strip() in with_him]
+        others = [column for column in chosen_columns if split[column][0].strip() not in with_him]
+        chosen_columns = [column for column in chosen_columns if split[column][0].strip() in with_him]
         if others:
-            of = ", ".join(dict.fromkeys(split[column][0].strip() or NOBODY for column in others))
-            notes.append(f"the markers of {chosen or NOBODY} are taken, those of {of} left out ({len(others)})")
+            of = ", ".join(dict.fromkeys(split[column][0].strip() or NO_SUBJECT for column in others))
+            notes.append(f"the markers of {chosen or NO_SUBJECT} are taken, those of {of} left out ({len(others)})")
     best: dict[str, int] = {}
     twice = []
-    for column in known:
+    for column in chosen_columns:
         name = split[column][2].strip()
         if name in best:
             twice.append(name)
-        if name not in best or seen[:, column].sum() > seen[:, best[name]].sum():
+        if name not in best or visible[:, column].sum() > visible[:, best[name]].sum():
             best[name] = column
     if twice:
-        of = and_more([*dict.fromkeys(twice)])
+        of = list_names([*dict.fromkeys(twice)])
         notes.append(f"more than one marker is called {of}: of each the one that was seen the longest is taken")
-    return Named(tuple(best), list(best.values()), tuple(notes))
+    return MarkerColumns(tuple(best), list(best.values()), tuple(notes))
 
 
 def _nameless(name: str) -> bool:
@@ -262,20 +270,24 @@ def _nameless(name: str) -> bool:
 
 
 def _person(
-    people: list[str], split: dict[int, tuple[str, str, str]], seen: NDArray[np.bool_], source: str, subject: str | None
+    people: list[str],
+    split: dict[int, tuple[str, str, str]],
+    visible: NDArray[np.bool_],
+    source: str,
+    subject: str | None,
 ) -> str | None:
     """The chosen subject; None where all the markers can be of one person."""
     if subject is not None:
-        known = {person.lower(): person for person in people}
+        spellings = {person.lower(): person for person in people}
         wanted = subject.strip().rstrip(":").lower()
-        if wanted not in known or not any(people):
-            have = [person or NOBODY for person in people]
+        if wanted not in spellings or not any(people):
+            have = [person or NO_SUBJECT for person in people]
             expected = f"one of {', '.join(have)}" if any(people) else "none, for no marker has one"
             raise ValueError(f"{source}: subject: expected {expected}, got {subject!r}")
-        return known[wanted]
+        return spellings[wanted]
     markers: dict[str, set[str]] = {person: set() for person in people}
     shown, of_marker = dict.fromkeys(people, False), dict[str, list[str]]()
-    there = {*np.flatnonzero(seen.any(axis=0)).tolist()}
+    there = {*np.flatnonzero(visible.any(axis=0)).tolist()}
     for column, (person, _, marker) in split.items():
         person, marker = person.strip(), marker.strip()
         if marker not in markers[person]:
@@ -291,7 +303,7 @@ def _person(
         hidden = {person for each in of_marker.values() if not all(map(shown.get, each)) for person in each}
         return next((person for person in people if person and shown[person] and person in hidden), None)
     first, *more = [person for person in people if person in rivals]
-    of = [f"{person or NOBODY} ({_count(len(markers[person]), 'marker')})" for person in [first, *more]]
+    of = [f"{person or NO_SUBJECT} ({_count(len(markers[person]), 'marker')})" for person in [first, *more]]
     one = first or more[0]
     raise ValueError(f"{source}: two people in it, {_and(of)}: say which one (subject={one!r}, --subject {one})")
 
@@ -300,8 +312,8 @@ def _and(people: Sequence[str], most: int = 4) -> str:
     return " and ".join([*people[:most], *([f"{len(people) - most} more"] if len(people) > most else [])])
 
 
-def _scale(unit: str | float, seen: Array, source: str) -> float:
-    """Metres a unit."""
+def _scale(unit: str | float, points: Array, source: str) -> float:
+    """Metres per unit of length."""
     if not isinstance(unit, str):
         return float(unit)
     if unit:
@@ -309,7 +321,7 @@ def _scale(unit: str | float, seen: Array, source: str) -> float:
         if scale is None:
             raise ValueError(f"{source}: units: expected one of {', '.join(METRES)}, got {unit!r}")
         return scale
-    return METRES[likely_unit(seen)]
+    return METRES[likely_unit(points)]
 
 
 def likely_unit(points: Array) -> str:
@@ -317,8 +329,8 @@ def likely_unit(points: Array) -> str:
     return "mm" if np.ptp(points, axis=0).max() > LARGEST else "m"
 
 
-def not_given(unit: str | float) -> str:
-    """The note on a unit that a file does not say."""
+def unit_note(unit: str | float) -> str:
+    """The note for a file that does not state its unit."""
     return f"its unit of length is not given: taken as {unit} (--units)"
 
 
@@ -326,11 +338,11 @@ def _count(number: int, what: str) -> str:
     return f"{number} {what}" + ("" if number == 1 else "s")
 
 
-def and_more(names: Sequence[str], most: int = 6) -> str:
+def list_names(names: Sequence[str], most: int = 6) -> str:
     """The first of the names, and how many more there are."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
-def letters(name: str) -> str:
+def alphanumeric(name: str) -> str:
     """The letters and digits of a name alone, lower case."""
     return re.sub(r"[\W_]", "", name).lower()

@@ -62,8 +62,8 @@ def read(
     )
     points = numbers[:, 1 : 1 + 3 * len(names)].reshape(len(times), len(names), 3)
     _compare(header, times, notes)
-    said = header.get("units", "") if unit is None else unit
-    return tracks(names, points, times, said, up or "y", source, subject=subject, notes=notes)
+    file_unit = header.get("units", "") if unit is None else unit
+    return tracks(names, points, times, file_unit, up or "y", source, subject=subject, notes=notes)
 
 
 def _mark(names: str) -> str:
@@ -81,9 +81,9 @@ def _header(lines: Sequence[str]) -> dict[str, str]:
         while fields and not fields[-1].strip():
             fields.pop()
         if len(fields) == len(values) or (len(fields) > 1 and not "".join(values[len(fields) :]).strip()):
-            found = {field.strip().lower(): value.strip() for field, value in zip(fields, values, strict=False)}
-            if not _is_number(found.get("units", "")):
-                return found
+            pairs = {field.strip().lower(): value.strip() for field, value in zip(fields, values, strict=False)}
+            if not _is_number(pairs.get("units", "")):
+                return pairs
     words = [value for value in filled[1].split() if not _is_number(value)]
     return {"units": words[0] if words else ""}
 
@@ -120,10 +120,10 @@ def _names(line: str, axes: str) -> tuple[list[str], list[str]]:
 def _headings(cells: list[str], places: list[int], markers: int) -> int:
     """How many of a line's cells, which stand at these places, are Frame# and Time; of `markers`, 0 if unknown."""
     frame = int(FRAME.fullmatch(cells[0]) is not None)
-    known = frame + (TIME.fullmatch(cells[frame]) is not None)
+    recognised = frame + (TIME.fullmatch(cells[frame]) is not None)
     if markers:  # in other words
-        return max(known, min(2, len(cells) - markers))
-    return max(known, sum(place < 2 for place in places[:2]))
+        return max(recognised, min(2, len(cells) - markers))
+    return max(recognised, sum(place < 2 for place in places[:2]))
 
 
 @dataclass(frozen=True)
@@ -142,16 +142,16 @@ def _table_of(
     """The names, of two readings of them, and the rows that go together."""
     by_place, filled = names
     declared = header.get("nummarkers", "")
-    said = int(float(declared)) if _is_number(declared) else None
+    count = int(float(declared)) if _is_number(declared) else None
     try:
-        return by_place, _table(rows, len(by_place), said, source)
+        return by_place, _table(rows, len(by_place), count, source)
     except ValueError:
         if filled == by_place:
             raise
-        return filled, _table(rows, len(filled), said, source)
+        return filled, _table(rows, len(filled), count, source)
 
 
-def _table(rows: Sequence[tuple[int, str]], markers: int, said: int | None, source: str) -> _Table:
+def _table(rows: Sequence[tuple[int, str]], markers: int, declared: int | None, source: str) -> _Table:
     """`markers` have names, `said` are in the file by its header."""
     width = 2 + 3 * markers
     split, tabs = _split([line for _, line in rows], width)
@@ -161,7 +161,7 @@ def _table(rows: Sequence[tuple[int, str]], markers: int, said: int | None, sour
             widest > width and (len(cells) < widest or (widest - width) % 3)
         )
         expected = f"expected {width} columns for {markers} markers"
-        if wrong or (widest < width and said != markers):
+        if wrong or (widest < width and declared != markers):
             raise ValueError(f"{source}: line {number}: {expected}, got {len(cells)}")
     whole = max(widest, width)
     filled = [[cell.strip() or "nan" for cell in [*cells[1:], *[""] * (whole - len(cells))]] for cells in split]

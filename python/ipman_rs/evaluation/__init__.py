@@ -1,8 +1,10 @@
-"""How far estimated bodies are from true ones, whether they stand, and what of a difference is chance.
+"""Metrics of estimated bodies: their errors, their balance, and the statistics of differences between methods.
 
-Metrics take numpy arrays or torch tensors and give one number a body, (...), in metres, radians or shares; NaN where
-there is none (`alike`). `Accumulator` adds them up over shards, exactly.
+Metrics take numpy arrays or torch tensors and return one number per body, (...), in metres, radians or shares; NaN
+where a metric is undefined (`numpy_or_torch`). `Accumulator` sums them over shards, exactly.
 """
+
+from ipman_rs.renamed import old_names
 
 from .body_errors import BodyErrors, body_errors
 from .bose import BoseMode, bose
@@ -19,7 +21,7 @@ from .pve import pve
 from .reasons import reasons
 from .statistics.accumulator import Accumulator
 from .statistics.bootstrap import Interval, bootstrap, paired
-from .statistics.comparison import Comparison, compare
+from .statistics.comparison import PairedComparison, compare
 from .statistics.metric_sums import Summary
 from .statistics.permutation_test import paired_test, sign_flip
 from .tilt import root_tilt, tilt
@@ -28,10 +30,10 @@ __all__ = [
     "Accumulator",
     "BodyErrors",
     "BoseMode",
-    "Comparison",
     "Interval",
     "Mat",
     "MoyoFigures",
+    "PairedComparison",
     "PressureFigures",
     "PressureMode",
     "Summary",
@@ -61,3 +63,5 @@ __all__ = [
     "similarity",
     "tilt",
 ]
+
+__getattr__ = old_names(__name__, {"Comparison": "PairedComparison"})

@@ -9,7 +9,7 @@ from .pve import pve
 
 
 class BodyErrors(NamedTuple):
-    """(...) m each: of the joints, of the joints after the best similarity, and of the vertices."""
+    """(...) m each: mean distance of the joints, of the joints after the best similarity, and of the vertices."""
 
     mpjpe: Any
     pa_mpjpe: Any

@@ -1,6 +1,6 @@
 """BoSE (Eq. 10): does the centre of mass lie over the base of support?
 
-As the paper, its code and a stricter reading have it.
+Three definitions: the paper's, that of its released code, and a stricter one.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from ipman_rs.quantities import Method
 from ipman_rs.support import support_margin
 from ipman_rs.template import BodyTemplate
 
-from .numpy_or_torch import AnyGround, alike
+from .numpy_or_torch import AnyGround, numpy_or_torch
 
 BoseMode = Literal["paper", "released", "strict"]
 
 THRESHOLDS = {"paper": 0.1, "released": 0.1, "strict": 0.025}  # τ, m
 
 
-@alike
+@numpy_or_torch
 def bose(
     vertices: ArrayLike,
     template: BodyTemplate,
@@ -34,7 +34,7 @@ def bose(
     method: Method = "pcom",
     labels: ArrayLike | None = None,
 ) -> Any:
-    """One number a body, (...), whose mean is the BoSE; NaN for a body that is not finite. vertices (..., V, 3) m.
+    """One number per body, (...), whose mean is the BoSE; NaN for a body that is not finite. vertices (..., V, 3) m.
 
     - "paper": 1 over the base of support, 0 outside or without contact (a hovering body is supported by nothing).
       Contacts are the samples with |h| < τ = 10 cm.
@@ -46,7 +46,7 @@ def bose(
 
     Args:
         threshold: another τ, m, such as 0.03.
-        method: the centre of mass.
+        method: how the centre of mass is computed (`center_of_mass`).
         labels: (...) 1, 0 or −1, the true bodies' verdicts (`in_bos_label`); NaN where there is none. "released" only.
 
     Raises:
@@ -58,7 +58,7 @@ def bose(
     shape = Bodies(vertices, template).shape
     truth = None if labels is None else real_array("labels", labels).astype(float)
     if truth is not None and truth.shape != shape:
-        raise ValueError(f"labels: expected one a body, {shape}, got {truth.shape}")
+        raise ValueError(f"labels: expected one per body, {shape}, got {truth.shape}")
     tau = THRESHOLDS[bose_mode] if threshold is None else threshold
     floor = Ground.under(vertices, ground.normal) if bose_mode == "strict" else ground
     contact = "released" if bose_mode == "released" else "paper"

@@ -6,16 +6,19 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from .numpy_or_torch import AnyGround, alike
+from .numpy_or_torch import AnyGround, numpy_or_torch
 from .points import norm, vectors
 
 
-@alike
+@numpy_or_torch
 def cop_error(estimated: ArrayLike, true: ArrayLike, ground: AnyGround) -> Any:
-    """Distance along the ground of two centres of pressure, (..., 3) -> (...) m; NaN where one is not finite.
+    """Distance along the ground between two centres of pressure, (..., 3) -> (...) m; NaN where one is not finite.
 
-    Heights do not count: a mat measures none. ValueError where the shapes differ.
+    Heights do not count, because a mat measures none.
+
+    Raises:
+        ValueError: the shapes differ.
     """
     first, second = vectors("centres of pressure", estimated, true)
-    apart = first - second
-    return norm(apart - (apart * ground.normal).sum(axis=-1, keepdims=True) * ground.normal)
+    difference = first - second
+    return norm(difference - (difference * ground.normal).sum(axis=-1, keepdims=True) * ground.normal)

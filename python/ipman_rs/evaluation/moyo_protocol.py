@@ -1,7 +1,7 @@
 """The biomechanics protocol of MoYo: pressure and centre of pressure of a body on a mat.
 
-The paper chooses α and γ of the pressure for every single frame, by a look at what was measured there: the best of a
-grid of 150. Such an oracle flatters; beside it stand the figures at one α and γ for all frames.
+For every frame the paper chooses the pressure's α and γ, the best of a grid of 150, by that frame's own measurement.
+Such an oracle is too favourable, so results with one α and γ for all frames are given, too.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.checks import number
 
-from .numpy_or_torch import AnyGround, alike, as_array
+from .numpy_or_torch import AnyGround, as_array, numpy_or_torch
 from .points import Array, norm, points, vector
-from .pressure_iou import PressureMode, as_measured, best_iou
-from .pressure_map import Mat, cells_of, normalised
+from .pressure_iou import PressureMode, best_iou, scaled_measurement
+from .pressure_map import Mat, cell_numbers, normalised
 
 ALPHAS = np.linspace(10.0, 200.0, 10)  # 1/m
 GAMMAS = np.linspace(10.0, 5000.0, 15)  # 1/m
 
 
 class PressureFigures(NamedTuple):
-    """Figures of F frames, each (F,): pressure IoU, CoP error (m), mean difference of the maps, and at which α, γ."""
+    """Results of F frames, (F,) each: pressure IoU, CoP error (m), mean difference of the maps; the α, γ (1/m) used."""
 
     iou: Any
     cop_error: Any
@@ -33,7 +33,7 @@ class PressureFigures(NamedTuple):
 
 
 class MoyoFigures(NamedTuple):
-    """The three choices of the oracle, each by another figure, and the figures at fixed parameters."""
+    """Results with the oracle's three choices of α and γ, each by another metric, and with fixed α and γ."""
 
     best_iou: PressureFigures
     best_cop_error: PressureFigures
@@ -41,7 +41,7 @@ class MoyoFigures(NamedTuple):
     fixed: PressureFigures
 
 
-@alike
+@numpy_or_torch
 def moyo(
     samples: ArrayLike,
     ground: AnyGround,
@@ -58,13 +58,13 @@ def moyo(
     the measured centre is NaN; IoU 0 where no sample lies over the mat.
 
     Args:
-        mat: what was measured, `values` (F, H, W).
+        mat: the measured maps, `values` (F, H, W).
         center_of_pressure: (F, 3) m, measured.
-        alpha, gamma: 1/m, those of the fixed figures.
+        alpha, gamma: 1/m, of the results with fixed parameters.
         pressure_mode: "released" leaves the measured maps in their own unit, as the authors' code does.
 
     Raises:
-        ValueError: shapes do not fit.
+        ValueError: the shapes do not match.
     """
     bodies, centers = points("samples", samples), vector("center_of_pressure", center_of_pressure)
     measured = np.asarray(as_array(mat.values), float)
@@ -76,28 +76,31 @@ def moyo(
     own = number("alpha", alpha), number("gamma", gamma)
     heights = ground.signed_height(bodies)
     normals = np.broadcast_to(ground.normal, (len(bodies), 3))
-    found = np.full((len(bodies), 4, 5), np.nan)
-    for frame, truth in enumerate(as_measured(measured, pressure_mode)):
+    results = np.full((len(bodies), 4, 5), np.nan)
+    for frame, truth in enumerate(scaled_measurement(measured, pressure_mode)):
         if np.isfinite(bodies[frame]).all():
-            cells = cells_of(bodies[frame], mat, frame)
+            cells = cell_numbers(bodies[frame], mat, frame)
             frame_of = _Frame(bodies[frame], heights[frame], normals[frame], cells, truth, centers[frame])
             grid = frame_of.figures(ALPHAS, GAMMAS)
             fixed = frame_of.figures(np.array(own[:1]), np.array(own[1:]))
-            found[frame] = [*_choices(grid), fixed[0]]
-    return MoyoFigures(*(PressureFigures(*row.T) for row in found.transpose(1, 0, 2)))
+            results[frame] = [*_choices(grid), fixed[0]]
+    return MoyoFigures(*(PressureFigures(*row.T) for row in results.transpose(1, 0, 2)))
 
 
 def _choices(grid: Array) -> list[Array]:
-    """Of figures (G, 5) those with the largest IoU, the least CoP error and the least difference of the maps; of equal
-    ones the last."""
+    """Of results (G, 5) those with the largest IoU, the least CoP error and the least difference of the maps; the last
+    of equal ones."""
     costs = grid[:, :3] * [-1.0, 1.0, 1.0]
     rows = [len(grid) - 1 - np.argmin(cost[::-1]) for cost in np.nan_to_num(costs, nan=np.inf).T]
     return [np.where(np.isnan(grid[:, figure]).all(), np.nan, grid[row]) for figure, row in enumerate(rows)]
 
 
 class _Frame:
-    """One body over the mat. Pressure is 1 − αh below the ground and e^(−γh) above: sums of all samples are made of
-    sums that know α alone, or γ alone, so the grid of both costs their sum and not their product."""
+    """One body over the mat.
+
+    Pressure is 1 − αh below the ground and e^(−γh) above. A sum over all samples is therefore a sum that depends on α
+    alone plus one that depends on γ alone, and the grid costs A + G sums, not A · G.
+    """
 
     def __init__(
         self, body: Array, heights: Array, normal: Array, cells: NDArray[np.int64], truth: Array, center: Array
@@ -110,8 +113,8 @@ class _Frame:
         """(A · G, 5), the fields of `PressureFigures`, α changing slowest."""
         a, g = np.meshgrid(alphas, gammas, indexing="ij")
         maps, centers = self._maps(alphas, gammas), self._centers(alphas, gammas)
-        apart = centers - self.center
-        along = apart - (apart @ self.normal)[..., None] * self.normal
+        offset = centers - self.center
+        along = offset - (offset @ self.normal)[..., None] * self.normal
         figures = best_iou(maps, self.truth), norm(along), np.abs(maps - self.truth).mean(axis=(-2, -1)), a, g
         return np.stack(figures, axis=-1).reshape(-1, 5)
 

@@ -7,21 +7,21 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from .numpy_or_torch import alike
+from .numpy_or_torch import numpy_or_torch
 from .points import Array, norm, pair
-from .procrustes import moved
+from .procrustes import align
 
 
-@alike
+@numpy_or_torch
 def mpjpe(estimated: ArrayLike, true: ArrayLike, root: int | Sequence[int] | None = 0) -> Any:
     """Mean distance of corresponding joints, (..., J, 3) -> (...) m.
 
     Args:
-        root: the joint that both are moved to first, or several, whose mean it is (the two hips where a skeleton has no
-            pelvis); None leaves them in the world.
+        root: the joint at which both are aligned first, or several joints, at whose mean they are (both hips where a
+            skeleton has no pelvis); None: no alignment.
 
     Raises:
-        ValueError: shapes differ.
+        ValueError: the shapes differ.
     """
     first, second = pair("joints", estimated, true)
     if root is not None:
@@ -29,12 +29,16 @@ def mpjpe(estimated: ArrayLike, true: ArrayLike, root: int | Sequence[int] | Non
     return norm(first - second).mean(axis=-1)
 
 
-@alike
+@numpy_or_torch
 def pa_mpjpe(estimated: ArrayLike, true: ArrayLike) -> Any:
     """MPJPE, (..., J, 3) -> (...) m, after the similarity (rotation, scale, translation) that brings the estimated
-    joints closest. ValueError where the shapes differ."""
+    joints closest to the true ones.
+
+    Raises:
+        ValueError: the shapes differ.
+    """
     first, second = pair("joints", estimated, true)
-    return norm(moved(first, second) - second).mean(axis=-1)
+    return norm(align(first, second) - second).mean(axis=-1)
 
 
 def _pelvis(joints: Array, root: int | Sequence[int]) -> Array:

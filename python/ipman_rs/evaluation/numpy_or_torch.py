@@ -1,7 +1,7 @@
-"""numpy and torch alike: a metric is written once, on arrays, and given tensors it returns tensors.
+"""Metrics for numpy and torch: each is written once, for arrays, and returns tensors if it is given tensors.
 
-Metrics are no losses: the numbers of a tensor are copied to the CPU, computed there in float64 as those of an array
-are, so to the same bits, and the results go back to the tensor's device without a gradient.
+Metrics are not losses: tensors are copied to the CPU and computed there in float64, with the same bits as arrays; the
+results are returned on the tensor's device, without a gradient.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
 
-def alike(metric: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
-    """The metric for arrays and for tensors; a ground may be that of `ipman_rs` or of `ipman_rs.torch`."""
+def numpy_or_torch(metric: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Decorator: a metric of arrays that also takes tensors, and grounds of `ipman_rs` or of `ipman_rs.torch`."""
 
     @functools.wraps(metric)
     def either(*args: Parameters.args, **options: Parameters.kwargs) -> Result:
-        given: list[Any] = [*args, *options.values()]
-        if any(map(_is_torch, given)):
+        arguments: list[Any] = [*args, *options.values()]
+        if any(map(_is_torch, arguments)):
             named = {name: as_array(value) for name, value in options.items()}
-            found = metric(*[as_array(value) for value in args], **named)  # type: ignore[arg-type]
+            result = metric(*[as_array(value) for value in args], **named)  # type: ignore[arg-type]
         else:
-            found = metric(*args, **options)
-        devices = [value.device for value in given if _is_tensor(value)]
-        return _results(found, devices[0] if devices else None)
+            result = metric(*args, **options)
+        devices = [value.device for value in arguments if _is_tensor(value)]
+        return _to_device(result, devices[0] if devices else None)
 
     return either
 
 
 def as_array(value: Any) -> Any:
-    """A tensor's numbers, a ground on arrays; anything else as it is."""
+    """A tensor as an array, a ground of tensors as one of arrays; anything else unchanged."""
     if not _is_torch(value):
         return value
     import torch
@@ -62,13 +62,13 @@ def _is_torch(value: Any) -> bool:
     return _is_tensor(value) or type(value).__module__ == "ipman_rs.torch.ground"
 
 
-def _results(found: Any, device: Any) -> Any:
-    """Arrays as tensors on the device, or as they are where that is None; what has no dimension as a number."""
-    if isinstance(found, tuple):
-        parts = [_results(part, device) for part in found]
-        return type(found)(*parts) if hasattr(found, "_fields") else tuple(parts)
+def _to_device(result: Any, device: Any) -> Any:
+    """Arrays as tensors on the device, or unchanged if it is None; arrays without a dimension become numbers."""
+    if isinstance(result, tuple):
+        parts = [_to_device(part, device) for part in result]
+        return type(result)(*parts) if hasattr(result, "_fields") else tuple(parts)
     if device is None:
-        return found[()]
+        return result[()]
     import torch
 
-    return torch.from_numpy(np.array(found)).to(device)
+    return torch.from_numpy(np.array(result)).to(device)

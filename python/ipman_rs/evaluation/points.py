@@ -1,4 +1,4 @@
-"""Points of bodies as metrics take them."""
+"""Checked arrays of points and vectors, the arguments of metrics."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def points(name: str, value: ArrayLike) -> Array:
-    """(..., N, 3) in float64. ValueError for another shape, or no points; TypeError for what is no number."""
+    """`value` as points (..., N, 3) in float64. ValueError for another shape or no points; TypeError if not numbers."""
     array = real_array(name, value)
     if array.ndim < 2 or array.shape[-1] != 3 or not array.shape[-2]:
         raise ValueError(f"{name}: expected points (..., N, 3), got {array.shape}")
@@ -21,14 +21,14 @@ def points(name: str, value: ArrayLike) -> Array:
 
 
 def pair(name: str, estimated: ArrayLike, true: ArrayLike) -> tuple[Array, Array]:
-    """Two arrays of corresponding points, of one shape (..., N, 3)."""
+    """Two arrays of corresponding points, of the same shape (..., N, 3). ValueError where the shapes differ."""
     first, second = real_array(name, estimated), real_array(name, true)
     _same(name, first, second, "(..., N, 3)")
     return points(name, first), points(name, second)
 
 
 def vector(name: str, value: ArrayLike) -> Array:
-    """(..., 3) in float64."""
+    """`value` as vectors (..., 3) in float64. ValueError for another shape."""
     array = real_array(name, value)
     if not array.ndim or array.shape[-1] != 3:
         raise ValueError(f"{name}: expected (..., 3), got {array.shape}")
@@ -36,14 +36,14 @@ def vector(name: str, value: ArrayLike) -> Array:
 
 
 def vectors(name: str, estimated: ArrayLike, true: ArrayLike) -> tuple[Array, Array]:
-    """Two arrays of one shape (..., 3)."""
+    """Two arrays of vectors, of the same shape (..., 3). ValueError where the shapes differ."""
     first, second = real_array(name, estimated), real_array(name, true)
     _same(name, first, second, "(..., 3)")
     return vector(name, first), vector(name, second)
 
 
 def finite(bodies: Array) -> Array:
-    """Bodies (..., N, 3), NaN as a whole where one of their coordinates is not finite."""
+    """Bodies (..., N, 3); a body with a coordinate that is not finite is NaN throughout."""
     return np.where(np.isfinite(bodies).all(axis=(-2, -1), keepdims=True), bodies, np.nan)
 
 

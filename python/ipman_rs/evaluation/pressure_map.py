@@ -1,4 +1,4 @@
-"""The pressure of a body's samples as a mat under it would show it: a map on the mat's cells."""
+"""Pressure maps: the pressure of a body's samples, summed on the cells of a mat under it."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ipman_rs.checks import real_array
 
-from .numpy_or_torch import alike
+from .numpy_or_torch import numpy_or_torch
 from .points import Array, points
 
 
 class Mat(Protocol):
     """A mat on the ground with square cells, such as `ipman_rs.data.PressureMaps`: the point of cell (i, j) is
-    origin + (i + ½) cell e1 + (j + ½) cell e2. A mat that was moved has a row of origin, e1 and e2 for each body."""
+    origin + (i + ½) cell e1 + (j + ½) cell e2. A mat that was moved has one row of origin, e1 and e2 per body."""
 
     @property
     def values(self) -> NDArray[Any]: ...  # (..., H, W)
@@ -29,28 +29,31 @@ class Mat(Protocol):
     def cell(self) -> float: ...  # m
 
 
-@alike
+@numpy_or_torch
 def pressure_map(samples: ArrayLike, pressure: ArrayLike, mat: Mat) -> Any:
-    """What each cell carries: samples (..., S, 3) m and their pressure (..., S) -> (..., H, W), in the pressure's unit.
+    """The pressure on each cell: samples (..., S, 3) m and their pressure (..., S) -> (..., H, W), in its unit.
 
-    Samples off the mat are left out. A body that is not finite has a map of NaN. ValueError where shapes do not fit.
+    Samples off the mat are left out. A body that is not finite has a map of NaN.
+
+    Raises:
+        ValueError: the shapes do not match.
     """
     where = points("samples", samples)
     weights = real_array("pressure", pressure).astype(np.float64)
     if weights.shape != where.shape[:-1]:
-        raise ValueError(f"pressure: expected one a sample, {where.shape[:-1]}, got {weights.shape}")
+        raise ValueError(f"pressure: expected one per sample, {where.shape[:-1]}, got {weights.shape}")
     height, width = mat.values.shape[-2:]
     bodies = where.reshape(-1, *where.shape[-2:]), weights.reshape(-1, weights.shape[-1])
     maps = np.full((len(bodies[0]), height * width), np.nan)
-    for number, (found, body, weight) in enumerate(zip(maps, *bodies, strict=True)):
+    for number, (cell_sums, body, weight) in enumerate(zip(maps, *bodies, strict=True)):
         if np.isfinite(body).all():
-            cells = cells_of(body, mat, number)
+            cells = cell_numbers(body, mat, number)
             on = cells >= 0
-            found[:] = np.bincount(cells[on], weight[on], height * width)
+            cell_sums[:] = np.bincount(cells[on], weight[on], height * width)
     return maps.reshape(*where.shape[:-2], height, width)
 
 
-def cells_of(samples: Array, mat: Mat, body: int) -> NDArray[np.int64]:
+def cell_numbers(samples: Array, mat: Mat, body: int) -> NDArray[np.int64]:
     """The number i · W + j of the cell under each sample (S, 3) of the body of this number; −1 off the mat."""
     height, width = mat.values.shape[-2:]
     origin, e1, e2 = (place[body] if place.ndim == 2 else place for place in (mat.origin, mat.e1, mat.e2))
@@ -61,7 +64,7 @@ def cells_of(samples: Array, mat: Mat, body: int) -> NDArray[np.int64]:
 
 
 def normalised(values: Array, axes: int | tuple[int, ...]) -> Array:
-    """Moved and scaled so that the least is 0 and the largest 1 along the axes; 0 where all are one."""
+    """Values shifted and scaled to run from 0 to 1 along the axes; 0 where all are equal."""
     least = values.min(axis=axes, keepdims=True)
     span = values.max(axis=axes, keepdims=True) - least
     return (values - least) / np.where(span == 0, 1.0, span)

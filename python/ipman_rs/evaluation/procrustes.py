@@ -7,29 +7,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .numpy_or_torch import alike
+from .numpy_or_torch import numpy_or_torch
 from .points import Array, finite, pair
 
 
-@alike
+@numpy_or_torch
 def similarity(points: ArrayLike, target: ArrayLike) -> Any:
     """scale (...), rotation (..., 3, 3) and shift (..., 3) that minimise Σ |scale · R p + shift − q|², for points and
     target (..., N, 3).
 
-    Never a reflection. Points that are all one have scale 1. NaN where a point is not finite. ValueError where the
-    shapes differ.
+    Never a reflection. If all points coincide the scale is 1. NaN where a point is not finite.
+
+    Raises:
+        ValueError: the shapes differ.
     """
     return _similarity(*pair("points", points, target))
 
 
-@alike
+@numpy_or_torch
 def aligned(points: ArrayLike, target: ArrayLike) -> Any:
-    """Points (..., N, 3) moved by the similarity that brings them closest to the target. ValueError where the shapes
-    differ."""
-    return moved(*pair("points", points, target))
+    """Points (..., N, 3) moved by the similarity that brings them closest to the target.
+
+    Raises:
+        ValueError: the shapes differ.
+    """
+    return align(*pair("points", points, target))
 
 
-def moved(points: Array, target: Array) -> Array:
+def align(points: Array, target: Array) -> Array:
+    """`aligned` of checked arrays."""
     scale, rotation, shift = _similarity(points, target)
     return scale[..., None, None] * points @ rotation.swapaxes(-1, -2) + shift[..., None, :]
 

@@ -6,21 +6,21 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from .numpy_or_torch import alike
+from .numpy_or_torch import numpy_or_torch
 from .points import norm, pair, vector
 
 
-@alike
+@numpy_or_torch
 def pve(
     estimated: ArrayLike, true: ArrayLike, root: ArrayLike | None = None, true_root: ArrayLike | None = None
 ) -> Any:
     """Mean distance of corresponding vertices, (..., V, 3) -> (...) m: in the world, or aligned at the roots.
 
     Args:
-        root, true_root: (..., 3), such as the pelvis of each: both bodies are moved there first. Both or none.
+        root, true_root: (..., 3), such as the pelvis of each, at which both bodies are aligned first. Both or none.
 
     Raises:
-        ValueError: shapes differ, or one root is missing.
+        ValueError: the shapes differ, or one root is missing.
     """
     first, second = pair("vertices", estimated, true)
     if (root is None) != (true_root is None):

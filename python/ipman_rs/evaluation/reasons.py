@@ -1,4 +1,4 @@
-"""Why a frame has no figure."""
+"""Reasons for missing values: why a frame has no metric."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from .numpy_or_torch import as_array
 
 
 def reasons(conditions: Mapping[str, ArrayLike]) -> NDArray[np.str_]:
-    """For each frame the first of the conditions that holds, (F,), "" where none does: {what: (F,) bool}, such as
-    {"no ground truth": …, "prediction not finite": …}. For `Accumulator.add(why=...)`."""
+    """The first condition that holds for each frame, (F,) text, "" where none does.
+
+    conditions: {reason: (F,) bool}, such as {"no ground truth": …, "prediction not finite": …}. The result is what
+    `Accumulator.add(why=...)` takes.
+    """
     flags = [np.asarray(as_array(flag), bool) for flag in conditions.values()]
     return np.select(flags, list(conditions), default="")

@@ -1,4 +1,4 @@
-"""The one way in which a file fails: which file, what is wrong with it, and what to do."""
+"""`FileError`: which file, what is wrong with it, and what to do."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
-from .regular import regular
+from .regular import regular_file
 
 SMALLEST = 32  # pixels: nobody is found in less
 
@@ -17,7 +17,7 @@ def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     """The pixels (height, width, 3) of an image, turned as its EXIF says. ValueError if unreadable or tiny."""
     from PIL import Image, ImageOps
 
-    regular(path)
+    regular_file(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)

@@ -1,4 +1,4 @@
-"""JSON that anybody may have written: damage of any kind ends in a ValueError that names the file."""
+"""Untrusted JSON: damage of any kind gives a ValueError that names the file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LONG = re.compile(r"\d{300}")
 _SURROGATE = re.compile(r"\\[uU][dD][89a-fA-F]")
 
 
-Pairs = Callable[[list[tuple[str, Any]]], Any]  # what an object becomes, given its names and values
+Pairs = Callable[[list[tuple[str, Any]]], Any]  # makes a value of an object's names and values
 
 
 def read_json(path: str | os.PathLike[str], pairs: Pairs | None = None) -> Any:

@@ -1,4 +1,4 @@
-"""How the templates of the pages are read."""
+"""Jinja templates of pages."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import jinja2
 
 
 def environment(folder: Path, **filters: Callable[..., Any]) -> jinja2.Environment:
-    """For the templates in a folder; `filters` by the names that they have there."""
-    found = jinja2.Environment(
+    """The environment of the templates in a folder, with these filters."""
+    templates = jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder), trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
     )
-    found.filters |= filters
-    return found
+    templates.filters |= filters
+    return templates

@@ -1,4 +1,4 @@
-"""Which paths may be opened: ordinary files. A pipe waits for ever for a writer, and a device never ends."""
+"""Only ordinary files are opened, because a pipe waits for a writer and a device never ends."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _KINDS = {
 }
 
 
-def regular(path: str | os.PathLike[str]) -> Path:
+def regular_file(path: str | os.PathLike[str]) -> Path:
     """The path of an ordinary file, or of a link to one.
 
     Raises:
@@ -38,7 +38,7 @@ def read_bytes(path: str | os.PathLike[str], most: int) -> bytes:
     Raises:
         ValueError: as `regular`, or the file is larger or cannot be read; the message begins with the path.
     """
-    place = regular(path)
+    place = regular_file(path)
     try:
         with place.open("rb") as stream:
             data = stream.read(most + 1)  # the size that a file of /proc claims is 0

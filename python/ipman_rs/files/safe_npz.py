@@ -16,7 +16,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from ipman_rs.files import read_bytes, regular
+from ipman_rs.files import read_bytes, regular_file
 
 MAX_BYTES = 1 << 30  # of one array, unpacked
 LISTED = 40  # names of arrays in a message
@@ -24,31 +24,31 @@ LISTED = 40  # names of arrays in a message
 
 def names(path: Path) -> set[str]:
     """Names of the arrays in `path`; ValueError if it is no `.npz` file."""
-    regular(path)
+    regular_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            found = {name.removesuffix(".npy") for name in archive.namelist()}
-        for name in found:
+            arrays = {name.removesuffix(".npy") for name in archive.namelist()}
+        for name in arrays:
             name.encode()  # half a character cannot be written anywhere
-        return found
+        return arrays
     except Exception as error:  # damaged bytes can fail in any way
         raise ValueError(f"{path}: not a .npz file ({error}); is the download complete?") from error
 
 
-def listed(names: Iterable[str]) -> str:
+def list_arrays(names: Iterable[str]) -> str:
     """The names of a file's arrays for a message, those of vertices first."""
     ordered = sorted(names, key=lambda name: ("vert" not in name.lower(), name))
-    return first([name[:40] for name in ordered], LISTED) or "nothing"
+    return first_arrays([name[:40] for name in ordered], LISTED) or "nothing"
 
 
-def first(names: Sequence[str], most: int) -> str:
+def first_arrays(names: Sequence[str], most: int) -> str:
     """The first of the arrays' names, and how many there are in all where there are more."""
     return ", ".join(names[:most]) + (f", … ({len(names)} arrays)" if len(names) > most else "")
 
 
 def read(path: Path, name: str) -> NDArray[Any]:
     """Array `name` of `path`; ValueError when it is damaged, holds Python objects, or claims more than it carries."""
-    regular(path)
+    regular_file(path)
     try:
         with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as stream:
             packed = archive.getinfo(f"{name}.npy")
@@ -57,14 +57,14 @@ def read(path: Path, name: str) -> NDArray[Any]:
             shape, order, dtype = _header(stream)
             data = stream.read(packed.file_size)
             _fits(shape, dtype, len(data))
-            return checked_text(np.frombuffer(data, dtype).reshape(shape, order=order))
+            return check_text(np.frombuffer(data, dtype).reshape(shape, order=order))
     except Exception as error:  # damaged bytes can fail in any way (zlib, struct, header syntax)
         raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
 
 
 def shape_of(path: Path, name: str) -> tuple[int, ...]:
     """The shape that array `name` of `path` claims; a few bytes are read. Raises as `read`."""
-    regular(path)
+    regular_file(path)
     try:
         with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as stream:
             return tuple(int(size) for size in _header(stream)[0])
@@ -72,19 +72,19 @@ def shape_of(path: Path, name: str) -> tuple[int, ...]:
         raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
 
 
-def mapped(path: Path, name: str) -> NDArray[Any]:
-    """Array `name` of `path` without reading it: the rows that are looked at come from the disk, however long it is.
+def memory_map(path: Path, name: str) -> NDArray[Any]:
+    """Array `name` of `path`, mapped into memory: rows are read from disk when they are used.
 
     numpy.savez stores its arrays as they are, so they can be mapped into memory in place, read-only (and, unlike with
     `read`, without a comparison of checksums). A packed one (numpy.savez_compressed) is read as a whole, once.
     """
-    regular(path)
+    regular_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
             packed = archive.getinfo(f"{name}.npy")
         if packed.compress_type != zipfile.ZIP_STORED:
             return read(path, name)
-        place = place_in(path, packed)
+        place = locate_array(path, packed)
         if 0 in place.shape:
             return np.empty(place.shape, place.dtype)
         return np.memmap(path, place.dtype, "r", place.offset, place.shape, place.order)  # type: ignore[call-overload]
@@ -96,8 +96,8 @@ def mapped(path: Path, name: str) -> NDArray[Any]:
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where an array lies in a file: from the byte `offset` on, "C" row after row or "F" column after column."""
+class ArrayLocation:
+    """The location of an array in a file: from byte `offset` on, row by row ("C") or column by column ("F")."""
 
     offset: int
     shape: tuple[int, ...]
@@ -105,8 +105,8 @@ class Place:
     dtype: np.dtype[Any]
 
 
-def place_in(path: Path, member: zipfile.ZipInfo | None = None) -> Place:
-    """Where the array of an `.npy` file lies, or that of a member of an archive that is stored as it is.
+def locate_array(path: Path, member: zipfile.ZipInfo | None = None) -> ArrayLocation:
+    """The location of the array of an `.npy` file, or of an uncompressed member of an archive.
 
     Raises:
         ValueError: it is damaged, holds Python objects, or the file lacks some of the bytes that it claims.
@@ -117,7 +117,7 @@ def place_in(path: Path, member: zipfile.ZipInfo | None = None) -> Place:
         shape, order, dtype = _header(stream)
         offset = stream.tell()
     _fits(shape, dtype, min(end, length) - offset)
-    return Place(offset, tuple(int(size) for size in shape), order, dtype)
+    return ArrayLocation(offset, tuple(int(size) for size in shape), order, dtype)
 
 
 def read_npy(path: str | os.PathLike[str]) -> NDArray[Any]:
@@ -127,12 +127,12 @@ def read_npy(path: str | os.PathLike[str]) -> NDArray[Any]:
         shape, order, dtype = _header(data)
         rest = data.read()
         _fits(shape, dtype, len(rest))
-        return checked_text(np.frombuffer(rest, dtype).reshape(shape, order=order))
+        return check_text(np.frombuffer(rest, dtype).reshape(shape, order=order))
     except Exception as error:  # damaged bytes can fail in any way (header syntax, tokens, depth)
         raise ValueError(f"{path}: is no readable .npy file ({error or type(error).__name__})") from error
 
 
-def checked_text(array: NDArray[Any]) -> NDArray[Any]:
+def check_text(array: NDArray[Any]) -> NDArray[Any]:
     """The array, if its text, where it holds any, is text. numpy and Python do not look before they use it.
 
     Raises:

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files import regular
+from ipman_rs.files import regular_file
 
-from .safe_npz import checked_text
+from .safe_npz import check_text
 
 BODY_MODEL, BODY_MODELS = "body model", "an unmodified SMPL, SMPL+H or SMPL-X file"
 MAX_BYTES = 1 << 30  # the largest upstream file (SMPL-X with 400 components, in float64) has about half of that
@@ -65,15 +65,15 @@ class ChumpyRecord(Record):
     """`chumpy.ch.Ch`: the array is under "x"."""
 
     def resolve(self) -> NDArray[Any]:
-        return _resolved(self.state["x"], ArrayRecord)
+        return _resolve(self.state["x"], ArrayRecord)
 
 
 class SelectRecord(Record):
     """`chumpy.reordering.Select`, a slice of another chumpy array: elements `idxs` of "a", in `preferred_shape`."""
 
     def resolve(self) -> NDArray[Any]:
-        source = _resolved(self.state["a"], (ChumpyRecord, ArrayRecord))
-        chosen = source.ravel()[_resolved(self.state["idxs"], ArrayRecord)]
+        source = _resolve(self.state["a"], (ChumpyRecord, ArrayRecord))
+        chosen = source.ravel()[_resolve(self.state["idxs"], ArrayRecord)]
         return chosen.reshape(self.state["preferred_shape"])
 
 
@@ -87,7 +87,7 @@ class SparseRecord(Record):
         return tuple(int(size) for size in self.state["_shape" if "_shape" in self.state else "shape"])
 
     def dense(self) -> NDArray[Any]:
-        data, indices, starts = (_resolved(self.state[key], ArrayRecord) for key in ("data", "indices", "indptr"))
+        data, indices, starts = (_resolve(self.state[key], ArrayRecord) for key in ("data", "indices", "indptr"))
         lines, length = self.shape[::-1] if self.by_column else self.shape
         counts = np.diff(starts.astype(np.int64))
         if len(starts) != lines + 1 or (counts < 0).any() or counts.sum() != len(data) or len(data) != len(indices):
@@ -111,12 +111,12 @@ class ScalarRecord(Record):
         return _array(data, dtype.resolve(), (), "C")
 
 
-class Marker(Record):
-    """A class that the file may name (`numpy.ndarray`, `object`) and a set, whose contents nobody needs."""
+class InertObject(Record):
+    """Stands for a class that the file may name (`numpy.ndarray`, `object`), and for a set, without its contents."""
 
 
-class Stranger(Record):
-    """An object of some other program's class, such as its settings. Whatever is put into it is dropped."""
+class ForeignObject(Record):
+    """Stands for an object of another program's class, such as its settings; its contents are dropped."""
 
     def append(self, _: Any) -> None: ...
 
@@ -136,7 +136,7 @@ def _array(data: Any, dtype: np.dtype, shape: Any, order: str) -> NDArray[Any]:
     return np.frombuffer(data, dtype).reshape(shape, order=order)  # type: ignore[call-overload]
 
 
-def _resolved(value: Any, kinds: type[Record] | tuple[type[Record], ...]) -> NDArray[Any]:
+def _resolve(value: Any, kinds: type[Record] | tuple[type[Record], ...]) -> NDArray[Any]:
     if not isinstance(value, kinds):
         raise ValueError(f"expected an array inside a chumpy or scipy object, found {type(value).__name__}")
     return value.resolve()  # type: ignore[attr-defined]
@@ -175,7 +175,7 @@ def _no_bytes() -> bytes:
 
 def _allowed() -> dict[tuple[str, str], Callable[..., Any]]:
     table: dict[tuple[str, str], Callable[..., Any]] = {
-        ("numpy", "ndarray"): Marker,
+        ("numpy", "ndarray"): InertObject,
         ("numpy", "dtype"): DtypeRecord,
         ("_codecs", "encode"): _encode,
         ("chumpy", "Ch"): ChumpyRecord,
@@ -187,8 +187,8 @@ def _allowed() -> dict[tuple[str, str], Callable[..., Any]]:
         table[f"{core}.multiarray", "scalar"] = ScalarRecord
         table[f"{core}.numeric", "_frombuffer"] = _from_buffer
     for builtins, copyreg in (("__builtin__", "copy_reg"), ("builtins", "copyreg")):  # Python 2 and 3
-        table[builtins, "object"] = Marker
-        table[builtins, "set"] = Marker
+        table[builtins, "object"] = InertObject
+        table[builtins, "set"] = InertObject
         table[builtins, "bytes"] = _no_bytes
         table[copyreg, "_reconstructor"] = _new_object
     for form, record in (("csc", SparseRecord), ("csr", SparseRowsRecord)):
@@ -246,7 +246,7 @@ class RestrictedUnpickler(_Interpreter):
     def _fill(self, items: list[Any]) -> None:
         """Keys are plain: hashing a tuple nested a million deep would overflow the stack."""
         target = self.stack[-1]
-        if isinstance(target, Stranger):
+        if isinstance(target, ForeignObject):
             return
         if not isinstance(target, dict) or not all(isinstance(key, (str, bytes, int, float)) for key in items[::2]):
             raise pickle.UnpicklingError("has a dictionary key that is neither text nor a number")
@@ -262,7 +262,7 @@ class RestrictedUnpickler(_Interpreter):
 
 
 class TolerantUnpickler(RestrictedUnpickler):
-    """Classes of other programs become strangers, which do nothing; the standard library's functions stay refused."""
+    """Classes of other programs become inert objects; the standard library's functions stay refused."""
 
     def find_class(self, module: str, name: str) -> Callable[..., Any]:
         if (module, name) in ALLOWED:
@@ -272,7 +272,7 @@ class TolerantUnpickler(RestrictedUnpickler):
         else:
             first = module.partition(".")[0]
             harmless = first in HARMLESS or first not in sys.stdlib_module_names
-        return Stranger if harmless else super().find_class(module, name)
+        return ForeignObject if harmless else super().find_class(module, name)
 
     def load_additems(self) -> None:
         """A set's contents are dropped: nobody needs them, and hashing runs what they say."""
@@ -280,7 +280,7 @@ class TolerantUnpickler(RestrictedUnpickler):
 
     def load_frozenset(self) -> None:
         self.pop_mark()
-        self.append(Stranger())
+        self.append(ForeignObject())
 
     dispatch = RestrictedUnpickler.dispatch | {
         pickle.ADDITEMS[0]: load_additems,
@@ -297,7 +297,7 @@ def read(path: Path, what: str = BODY_MODEL, expected: str = BODY_MODELS, tolera
     dictionary, or names anything not allowed.
     """
     try:
-        size = regular(path).stat().st_size
+        size = regular_file(path).stat().st_size
         if size > MAX_BYTES:
             raise ValueError(f"{path}: {size} bytes is more than any {what} has ({MAX_BYTES}); is it the right file?")
         data = path.read_bytes()
@@ -326,6 +326,6 @@ def as_array(value: Any, shape: tuple[int, ...] | None = None) -> NDArray[Any]:
             if value.shape != shape:
                 raise ValueError(f"expected shape {shape}, got a sparse matrix of shape {value.shape}")
             return value.dense()
-        return checked_text(_resolved(value, (ArrayRecord, ChumpyRecord, ScalarRecord, SelectRecord)))
+        return check_text(_resolve(value, (ArrayRecord, ChumpyRecord, ScalarRecord, SelectRecord)))
     except (ArithmeticError, AttributeError, LookupError, TypeError) as error:  # state of another kind than expected
         raise ValueError(f"is no array that can be read: {type(error).__name__}: {error}") from None

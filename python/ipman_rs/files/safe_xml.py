@@ -51,18 +51,18 @@ def read(path: str | os.PathLike[str]) -> ElementTree.Element:
 
 def text(element: ElementTree.Element, path: str, source: str | os.PathLike[str]) -> str:
     """The text of the first element at `path` ("clip/cell_size/x"). ValueError, naming the file, if there is none."""
-    found = element.find(path)
-    if found is None or not (found.text or "").strip():
+    child = element.find(path)
+    if child is None or not (child.text or "").strip():
         raise ValueError(
             f"{source}: expected <{path.removeprefix('.//').replace('/', '><')}> with text in it, got none"
         )
-    return (found.text or "").strip()
+    return (child.text or "").strip()
 
 
 def number(element: ElementTree.Element, path: str, source: str | os.PathLike[str]) -> float:
     """The number at `path`; raises as `text`."""
-    said = text(element, path, source)
+    content = text(element, path, source)
     try:
-        return float(said)
+        return float(content)
     except ValueError:
-        raise ValueError(f"{source}: {path.removeprefix('.//')}: expected a number, got {said[:40]!r}") from None
+        raise ValueError(f"{source}: {path.removeprefix('.//')}: expected a number, got {content[:40]!r}") from None

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, whoever else writes into the folder and whenever the process ends."""
+"""Atomic writing: a file is complete or absent, whenever the process ends and whoever else writes there."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ except ImportError:  # Windows, which deletes no file that is open
 _PART = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{12}\.part")
 
 
-class being_written:
-    """A file that appears under its name when it is whole: a process that dies leaves the old one, or none.
+class atomic_write:
+    """A file that appears under its name when it is complete: a killed process leaves the old file, or none.
 
-    with being_written(path) as file: file.write(...)
+    with atomic_write(path) as file: file.write(...)
 
-    It is written beside its place, under a name of its own, and then moved; a failure removes it. What a killed process
-    left of the same file is removed by the next that writes it: a living writer holds a lock.
+    It is written in the same folder under a temporary name and then renamed; a failure removes it. Leftovers of a
+    killed process are removed by the next writer of the same file; a living writer holds a lock.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -52,7 +52,7 @@ class being_written:
 
 def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
     """Write a file, text as UTF-8, so that it is there whole or not at all. Raises OSError."""
-    with being_written(path) as file:
+    with atomic_write(path) as file:
         file.write(content.encode(errors="replace") if isinstance(content, str) else content)  # names need not be text
 
 
@@ -88,8 +88,8 @@ def _remove_leftovers(path: Path) -> None:
     except OSError:
         return
     for entry in entries:
-        known = _PART.fullmatch(entry.name)
-        if known is None or known["name"] != name:
+        match = _PART.fullmatch(entry.name)
+        if match is None or match["name"] != name:
             continue
         with contextlib.suppress(OSError), open(entry.path, "rb") as left:
             _lock(left)

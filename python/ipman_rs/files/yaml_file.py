@@ -1,4 +1,4 @@
-"""YAML that anybody may have written: plain values only; any damage ends in a ValueError that names the file."""
+"""Untrusted YAML: plain values only; any damage gives a ValueError that names the file."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ from ipman_rs.evaluation.tables.job import Source
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.evaluation.tables.predictions import fingerprint
 from ipman_rs.evaluation.tables.resumable import Resumable
-from ipman_rs.files import being_written, regular, write_whole
+from ipman_rs.files import atomic_write, regular_file, write_whole
 
 from ..data import keypoints
 from ..data.keypoints.detections import Detections, join
@@ -149,7 +149,7 @@ class DataFit(Resumable):
         self.mark_folder(self.folder)
 
     @cached_property
-    def made_of(self) -> dict[str, Any]:
+    def manifest(self) -> dict[str, Any]:
         """All that decides the fits, as plain values; no paths, for a folder may be moved."""
         files = [] if self.models is None else self.bodies.files(str(self.data[slice(0, 1)].body))
         given = (self.body, self.pose, self.contact)
@@ -157,7 +157,7 @@ class DataFit(Resumable):
         listed = [] if self.keypoints is None else sorted(self.keypoints.rglob("*.json"))
         content = hashlib.sha256()
         for path in listed:
-            content.update(str(path.relative_to(self.keypoints or path)).encode() + regular(path).read_bytes())
+            content.update(str(path.relative_to(self.keypoints or path)).encode() + regular_file(path).read_bytes())
         return {
             "data": self.source.name,
             "split": self.source.split,
@@ -258,7 +258,8 @@ class DataFit(Resumable):
         if self.keypoints is None:
             return data_frames.detections_of(frame)
         name = str(frame.names[0])
-        places = [self.keypoints / f"{name}{ending}" for ending in (".json", "_keypoints.json")]
+        endings = [f"{said}{suffix}" for suffix in keypoints.suffixes() for said in ("", "_keypoints")]
+        places = [self.keypoints / f"{name}{ending}" for ending in endings]
         place = next((place for place in places if place.is_file()), None)
         if place is None:
             raise ValueError(f"no keypoint file {places[0]}")
@@ -357,9 +358,9 @@ class DataFit(Resumable):
             for name in filled[0]
             if name not in ("left_out", "why")
         }
-        kind = embedded.kind_of(self.model(str(arrays["genders"][0])))
+        kind = self.model(str(arrays["genders"][0])).kind
         columns = {name: arrays[name] for name in _COLUMNS if name in arrays}
-        with being_written(self.folder / PREDICTIONS) as out:
+        with atomic_write(self.folder / PREDICTIONS) as out:
             np.savez(out, allow_pickle=False, body=np.array(kind), **columns)
         record = {
             "data": self.source.name,

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import ipman_rs.torch as ipt
-from ipman_rs.body import BodyModel, embedded, joints, pose_arrays
+from ipman_rs.body import BodyModel, formats, pose_arrays
 from ipman_rs.data.frames import Frames
-from ipman_rs.evaluation.tables.models import Bodies
+from ipman_rs.evaluation.tables.models import FrameBodies
 
 from ..data.keypoints.detections import Detections
 from .camera import Camera
@@ -104,7 +104,7 @@ def image_size(frame: Frames) -> Array | None:
     return None if frame.cameras is None else 2 * np.asarray(frame.cameras.intrinsics[0], float)[:2, 2]
 
 
-def presented_of(frame: Frames, own: Bodies, body: BodyModel) -> tuple[PresentedBody, World]:
+def presented_of(frame: Frames, own: FrameBodies, body: BodyModel) -> tuple[PresentedBody, World]:
     """The recorded pose of one frame, presented to `body`, and the world in which its root joint is the body's.
 
     own: the data set's own body of that frame. If it is of the same model, the presented floor is the data set's, and
@@ -112,9 +112,9 @@ def presented_of(frame: Frames, own: Bodies, body: BodyModel) -> tuple[Presented
     """
     if frame.pose is None or own.joints is None:
         raise ValueError(f"{frame.names[0]}: no recorded pose to present")
-    same = frame.body == embedded.kind_of(body)
+    same = frame.body == body.kind
     whole = World.of(frame)
-    pose = _on_joints(np.asarray(frame.pose, float), body)[0]
+    pose = _on_joints(np.asarray(frame.pose, float), body, frame.body)[0]
     pose[0] = (Rotation.from_matrix(whole.turn) * Rotation.from_rotvec(pose[0])).as_rotvec()
     betas = np.asarray(frame.betas, float)[0, : body.num_betas] if same and frame.betas is not None else None
     contact = touching(body, pose, betas)
@@ -128,9 +128,9 @@ def presented_of(frame: Frames, own: Bodies, body: BodyModel) -> tuple[Presented
     return found, World(whole.turn, shift)
 
 
-def _on_joints(pose: Array, body: BodyModel) -> Array:
+def _on_joints(pose: Array, body: BodyModel, kind: str | None) -> Array:
     """Absolute rotation vectors (F, j, 3) of a data set on the joints of a body, relative to its mean hands."""
-    names = joints.BY_COUNT.get(pose.shape[1], joints.BODY)
+    names = formats.joints_of_pose(pose.shape[1], body, kind)
     return pose_arrays.place([pose_arrays.Piece(pose, names)], body.joint_names, len(pose)) - body.pose_mean
 
 

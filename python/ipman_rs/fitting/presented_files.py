@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ipman_rs.body import BodyModel, embedded, joints, pose_arrays
-from ipman_rs.files import read_json, regular, safe_npz, safe_pickle
+from ipman_rs.body import BodyModel, embedded, formats, joints, pose_arrays
+from ipman_rs.files import read_json, regular_file, safe_npz, safe_pickle
 from ipman_rs.ground import Ground
 
 Array = NDArray[Any]
@@ -34,6 +34,7 @@ LARGEST_ANGLE = 4 * np.pi  # a turn and more in a rotation vector are degrees
 FARTHEST = 10.0  # m, of a pelvis above or below its floor
 _Z_UP = ("poses", "fullpose", "root_orient")  # arrays of AMASS and MoYo, whose worlds have z up
 _ABSOLUTE = ("poses", "fullpose", "pose_hand", "full_pose")  # whose fingers are not relative to the mean hand
+_KINDS = ("model", "body", "model_type")
 _HANDS = {"left_hand_pose": joints.LEFT_HAND, "right_hand_pose": joints.RIGHT_HAND}
 
 
@@ -61,7 +62,7 @@ def read(path: Path, body: BodyModel, frame: int | None = None, up: Axis | None 
     stored = _Stored.open(path)
     pieces = _hands_turned(stored, body)
     if not pieces:
-        listed = safe_npz.listed(stored.names)
+        listed = safe_npz.list_arrays(stored.names)
         raise ValueError(
             f"{stored.path}: holds {listed}; expected a pose such as global_orient with body_pose, or pose"
         )
@@ -73,7 +74,7 @@ def read(path: Path, body: BodyModel, frame: int | None = None, up: Axis | None 
     if stored.is_absolute:
         pose = pose - body.pose_mean
     notes: list[str] = []
-    own = _kind(stored, pieces) == embedded.kind_of(body)
+    own = _kind(stored, pieces) == body.kind
     if not own and stored.names & {"ground", "ground_height", "contact"}:
         notes.append(f"{stored.path}: is of another body than {body.name}: its floor and contact are not used")
     normal, height = _ground(stored, row) if own else (None, None)
@@ -102,7 +103,7 @@ def read_contact(path: Path, body: BodyModel) -> NDArray[np.int64]:
         stored = _Stored.open(path)
         found = stored.first("contact")
         if found is None:
-            raise ValueError(f"{path}: expected an array contact, it has {safe_npz.listed(stored.names)}")
+            raise ValueError(f"{path}: expected an array contact, it has {safe_npz.list_arrays(stored.names)}")
         return _indices(found, f"{path}: contact", body)
     content = read_json(path)
     try:
@@ -130,7 +131,7 @@ class _Stored:
 
     @classmethod
     def open(cls, path: Path) -> _Stored:
-        regular(path)
+        regular_file(path)
         if path.suffix.lower() == ".npz":
             return cls(path, safe_npz.names(path), lambda name: safe_npz.read(path, name))
         content = safe_pickle.read(path, "presented pose", "a pose of SMPL, SMPL-X or MoYo", tolerant=True)
@@ -186,7 +187,10 @@ def _hands_turned(stored: _Stored, body: BodyModel) -> list[pose_arrays.Piece]:
     weights = {name: stored.first(name) for name in _HANDS}
     weights = {name: each for name, each in weights.items() if each is not None and _are_weights(each)}
     try:
-        pieces = pose_arrays.read(lambda *names: None if names[0] in weights else stored.first(*names))
+        pieces = pose_arrays.read(
+            lambda *names: None if names[0] in weights else stored.first(*names),
+            kind=formats.kind_named(stored.word(*_KINDS)) or body.kind,
+        )
     except ValueError as error:
         raise ValueError(f"{stored.path}: {error}") from None
     if body.hands is None:
@@ -228,9 +232,12 @@ def _row(stored: _Stored, length: int, frame: int | None) -> int:
 
 def _kind(stored: _Stored, pieces: Sequence[pose_arrays.Piece]) -> str:
     """What the parameters are of: what the file says, or what its joints tell."""
-    said = stored.word("model", "body", "model_type")
-    if said is not None and said.lower() in (*embedded.NAMES, "smpl", "smplh", "smplx"):
+    said = stored.word(*_KINDS)
+    if said is not None and said.lower() in (*embedded.NAMES, *formats.FORMATS):
         return said.lower()
+    own = next((name for name, each in formats.FORMATS.items() if pieces[0].joints == each.joints), None)
+    if own is not None:
+        return own
     turned = {name for piece in pieces for name in piece.joints}
     if "left_hand" in turned:
         return "smpl"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..body import pose_arrays, rotations
+from ..body import formats, pose_arrays, rotations
 from ..body.joints import LEFT_HAND, RIGHT_HAND
 from ..body.sequence import Index, PosedSequence, rows_of
 from ..data import check, judge
@@ -28,22 +28,31 @@ _VERTICES = ("vertices", "verts", "v")
 _BETAS = ("betas", "shape", "shapes", "smpl_betas")
 _TRANSLATIONS = ("trans", "transl", "Th", "smpl_trans", "cam_trans")
 _FRAME_RATES = ("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate", "framerate")
+_KINDS = ("model", "model_type", "surface_model_type", "body")
 _MODEL_BETAS = 10  # that a model file is asked for at least
 
 
 class _Npz:
-    """Arrays of a file by name; nothing in it is executed. `used`: those that were read."""
+    """Arrays of a file by name; nothing in it is executed. `arrays`: what the file holds, where that is in memory;
+    `used`: the names of those that were read."""
 
-    def __init__(self, path: Path) -> None:
-        self.path, self.names = path, safe_npz.names(path)
+    def __init__(self, path: Path, arrays: Mapping[str, np.ndarray] | None = None) -> None:
+        self.path, self.arrays = path, arrays
+        self.names = safe_npz.names(path) if arrays is None else {*arrays}
         self.used: set[str] = set()
+
+    def read(self, name: str) -> np.ndarray:
+        return safe_npz.read(self.path, name) if self.arrays is None else self.arrays[name]
+
+    def shape_of(self, name: str) -> tuple[int, ...]:
+        return safe_npz.shape_of(self.path, name) if self.arrays is None else self.arrays[name].shape
 
     def first(self, *names: str) -> np.ndarray | None:
         """The first of these that is there, as numbers."""
         name = self.name(*names)
         if name is None:
             return None
-        array = safe_npz.read(self.path, name)
+        array = self.read(name)
         if array.dtype.kind not in "fiu":
             raise FileError(self.path, f"{name} holds {array.dtype}, not numbers; save plain numbers")
         self.used.add(name)
@@ -58,7 +67,10 @@ class _Npz:
         if name not in self.names:
             return ""
         self.used.add(name)
-        value = safe_npz.read(self.path, name).reshape(-1)
+        return self._word(name)
+
+    def _word(self, name: str) -> str:
+        value = self.read(name).reshape(-1)
         if value.dtype.kind not in "US" or len(value) != 1:
             return ""
         return value[0].decode("latin1") if value.dtype.kind == "S" else str(value[0])
@@ -70,21 +82,39 @@ class _Npz:
         named = self.word("model")
         return named if named in embedded.NAMES else "anny"
 
+    def kind(self) -> str | None:
+        """What kind of model the parameters are of, where the file says."""
+        for name in (name for name in _KINDS if name in self.names):
+            try:
+                found = formats.kind_named(self._word(name))
+            except ValueError:  # Python objects
+                continue
+            if found is not None:
+                return found
+        return None
+
     def unused(self) -> tuple[str, ...]:
         return tuple(sorted(self.names - self.used))
 
 
 def read_npz(
-    path: Path, model: str | None, *, unit: float = 1.0, degrees: bool = False, rate: float | None = None
+    path: Path,
+    model: str | None,
+    *,
+    unit: float = 1.0,
+    degrees: bool = False,
+    rate: float | None = None,
+    arrays: Mapping[str, np.ndarray] | None = None,
 ) -> Recording:
     """The bodies of an .npz file; `model` None: of the body that the file names, or anny. Raises FileError.
 
     unit: metres in one of the file's lengths. degrees: rotation vectors are degrees. rate: Hz, instead of the file's.
+    arrays: what the file holds, by a caller that has just written it.
     """
     try:
-        stored = _Npz(path)
+        stored = _Npz(path, arrays)
         model = model or stored.model()
-        has_pose = bool(stored.names & {*pose_arrays.NAMES})
+        has_pose = bool(stored.names & pose_arrays.names())
         if stored.names & {*_VERTICES} and not (has_pose and _are_of_another_body(stored, model)):
             found = _read_vertices(stored, model, unit, rate)
         elif has_pose:
@@ -100,11 +130,11 @@ def _no_bodies(stored: _Npz) -> str:
     """What is there instead."""
     for name in sorted(stored.names):
         try:
-            safe_npz.shape_of(stored.path, name)
+            stored.shape_of(name)
         except ValueError as error:
             if "Python objects" in str(error):
                 return f"{name} holds Python objects, which are not loaded; save what is in it as plain arrays"
-    return f"holds {safe_npz.listed(stored.names)}; {_EXPECTED}"
+    return f"holds {safe_npz.list_arrays(stored.names)}; {_EXPECTED}"
 
 
 def _are_of_another_body(stored: _Npz, model: str) -> bool:
@@ -113,7 +143,7 @@ def _are_of_another_body(stored: _Npz, model: str) -> bool:
 
     if stored.names & {"faces", "f"}:
         return False
-    shape = safe_npz.shape_of(stored.path, str(stored.name(*_VERTICES)))
+    shape = stored.shape_of(str(stored.name(*_VERTICES)))
     return len(shape) < 2 or shape[-2] != ip.load_body(model).num_vertices
 
 
@@ -143,7 +173,7 @@ def _read_vertices(stored: _Npz, model: str, unit: float, rate: float | None) ->
         )
     mesh = repair.Mesh(vertices[0], faces)
     if match_body(faces, vertices.shape[1], model) is None:
-        mesh = repair.without_unused(repair.welded(mesh) if len(vertices) == 1 else mesh)
+        mesh = repair.drop_unused_vertices(repair.weld(mesh) if len(vertices) == 1 else mesh)
     if len(vertices) == 1:
         vertices = mesh.vertices[None]
     elif mesh.vertex_map is not None:
@@ -159,7 +189,7 @@ def _read_parameters(stored: _Npz, model: str, unit: float, degrees: bool, rate:
     easymocap = "Rh" in stored.names
     amass = not easymocap and bool(stored.names & {"poses", "root_orient"})
     body = _body(stored, model, amass)
-    pieces = pose_arrays.read(stored.first, degrees)
+    pieces = pose_arrays.read(stored.first, degrees, stored.kind() or body.kind)
     pose = _Pose(pieces, body)
     trans = _translations(stored, len(pose), unit)
     betas, shape = _betas(stored, body, len(pose), amass or easymocap)
@@ -193,7 +223,7 @@ def _body(stored: _Npz, model: str, amass: bool) -> Any:
     import ipman_rs as ip
 
     name = stored.name(*_BETAS)
-    width = () if name is None else safe_npz.shape_of(stored.path, name)[-1:]
+    width = () if name is None else stored.shape_of(name)[-1:]
     # AMASS stores absolute hand angles, the smplx package angles relative to the mean hand.
     return ip.load_body(model, num_betas=max((_MODEL_BETAS, *width)), flat_hand_mean=amass)
 
@@ -341,7 +371,7 @@ def _places(stored: _Npz, trans: np.ndarray | None, seconds: np.ndarray | None) 
     if trans is None:
         return []
     name = str(stored.name(*_TRANSLATIONS))
-    return check.place(name, trans[check.evenly(len(trans))]) or judge.speed(name, trans, seconds)
+    return check.near_origin(name, trans[check.evenly(len(trans))]) or judge.speed(name, trans, seconds)
 
 
 def _gender(stored: _Npz, body: Any, model: str) -> list[Finding]:
@@ -361,12 +391,13 @@ def _gender(stored: _Npz, body: Any, model: str) -> list[Finding]:
 def _pass_over_repeated(stored: _Npz, pieces: Sequence[pose_arrays.Piece]) -> None:
     """Pieces of a pose that are in the whole pose beside them, too, are not missed."""
     for piece in pieces:
-        for name in pose_arrays.PIECES.keys() & stored.names - stored.used:
-            joints = next((one for one in pose_arrays.PIECES[name] if set(one) <= set(piece.joints)), None)
+        known = pose_arrays.pieces_of()
+        for name in known.keys() & stored.names - stored.used:
+            joints = next((one for one in known[name] if set(one) <= set(piece.joints)), None)
             if joints is None:
                 continue
             columns = [piece.joints.index(joint) for joint in joints]
-            array = safe_npz.read(stored.path, name)
+            array = stored.read(name)
             whole = piece.rotations[:, columns].reshape(len(piece.rotations), -1)
             if array.size == whole.size and np.allclose(array.reshape(whole.shape), whole, equal_nan=True):
                 stored.used.add(name)

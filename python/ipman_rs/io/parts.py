@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..files import read_json, regular, safe_npz
+from ..files import read_json, regular_file, safe_npz
 from ..files.errors import FileError
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def read_parts(
 def _read(
     path: Path, faces: np.ndarray, vertex_map: np.ndarray | None, face_map: np.ndarray | None
 ) -> tuple[np.ndarray, tuple[str, ...]]:
-    regular(path)
+    regular_file(path)
     names: list[str] | None = None
     if path.suffix.lower() == ".json":
         content = read_json(path)

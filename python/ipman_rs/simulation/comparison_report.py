@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..evaluation.statistics.bootstrap import Interval
-from ..files import being_written
+from ..files import atomic_write
 from ..files.errors import FileError
 from ..jsonable import jsonable
 from ..view.picture import settle
@@ -159,9 +159,9 @@ def write_comparison(one: Simulation, other: Simulation, paths: tuple[Path, Path
         text.set_parse_math(False)
     settle(figure, PNG_DPI)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}):
-        with being_written(output / f"{NAME}.svg") as file:
+        with atomic_write(output / f"{NAME}.svg") as file:
             figure.savefig(file, format="svg", metadata={"Date": None})
-        with being_written(output / f"{NAME}.png") as file:
+        with atomic_write(output / f"{NAME}.png") as file:
             figure.savefig(file, format="png", dpi=PNG_DPI)
 
 

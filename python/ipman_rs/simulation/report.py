@@ -11,7 +11,7 @@ import numpy as np
 
 from ..analysis import PIECE
 from ..body.sequence import pieces
-from ..files import being_written, write_whole
+from ..files import atomic_write, safe_names, write_whole
 from ..files.errors import FileError
 from ..ground import Ground
 from ..jsonable import jsonable
@@ -20,7 +20,6 @@ from ..status import Status, status_names
 from ..study import Study, study
 from ..study.study import evenly, marked
 from ..view.filmstrip import draw_filmstrip
-from ..view.report import safe_names
 from . import FALLEN, VERDICT, Simulation, TipTest, simulate, tip_test
 from .inputs import Bodies
 
@@ -249,7 +248,7 @@ def write_falls(falls: Sequence[Fall], output: Path, record: str, progress: Prog
         for one, name in zip(falls, names, strict=True):
             folder = output if len(falls) == 1 else output / name
             folder.mkdir(exist_ok=True)
-            with being_written(folder / "simulation.npz") as file:
+            with atomic_write(folder / "simulation.npz") as file:
                 np.savez_compressed(file, allow_pickle=False, **one.arrays())
             bar.one()
             for film in one.films:

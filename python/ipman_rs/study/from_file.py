@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +17,7 @@ from ..analysis import PIECE
 from ..body.sequence import pieces
 from ..data import check, judge, separate_pieces
 from ..data.check import Finding
-from ..files import regular, safe_npz
+from ..files import regular_file, safe_npz
 from ..files.errors import FileError
 from ..io.meshes import read_mesh
 from ..io.parameters import read_npz
@@ -25,6 +25,8 @@ from ..io.parts import match_body, read_parts
 from ..io.recording import Recording
 from ..progress import Progress, silent
 from .study import Study, study
+
+Arrays = Mapping[str, np.ndarray]
 
 SAMPLED_VERTICES = 800_000  # of the bodies that are judged: 65 of the embedded one, a fraction of a second
 WEIGHED = 16  # bodies
@@ -49,15 +51,19 @@ class Request:
 _DEFAULT = Request()
 
 
-def analyze_file(path: Path, request: Request = _DEFAULT, progress: Progress = silent) -> Study:
+def analyze_file(
+    path: Path, request: Request = _DEFAULT, progress: Progress = silent, arrays: Arrays | None = None
+) -> Study:
     """The study of the bodies in one file; what is odd about them stands in its flags.
+
+    arrays: what an .npz file holds, by a caller that has just written it; then the file is not read.
 
     Raises:
         FileError: the file cannot be read, or what it holds cannot be a person (`Request.force` lets it in).
     """
     with odd_sizes() as found:
         try:
-            analysed = _analyzed(path, request, progress)
+            analysed = _analyzed(path, request, progress, arrays)
         except (ValueError, TypeError) as error:
             raise FileError(path, str(error)) from error
         except MemoryError as error:
@@ -82,8 +88,8 @@ def with_sizes(flags: Sequence[str], sizes: Sequence[str]) -> tuple[str, ...]:
     return (*flags, *([] if said else sizes[:1]))
 
 
-def _analyzed(path: Path, request: Request, progress: Progress) -> Study:
-    recording, template, ground, notes = on_ground(path, request, progress=progress)
+def _analyzed(path: Path, request: Request, progress: Progress, arrays: Arrays | None) -> Study:
+    recording, template, ground, notes = on_ground(path, request, progress=progress, arrays=arrays)
     if template.num_parts == 1:
         notes.append("one part: the centre of mass is the exact one of the volume, not the paper's part-wise pCoM")
     if not template.watertight:
@@ -101,12 +107,14 @@ def on_ground(
     own: ip.Ground | None = None,
     read_elsewhere: Collection[str] = (),
     progress: Progress = silent,
+    arrays: Arrays | None = None,
 ) -> tuple[Recording, Any, ip.Ground, list[str]]:
     """The bodies of a file, judged, their template and ground, and what was assumed. Raises FileError.
 
-    own: the ground that the file itself gives. read_elsewhere: arrays of the file that the caller reads.
+    own: the ground that the file itself gives. read_elsewhere: arrays of the file that the caller reads. arrays: as for
+    `analyze_file`.
     """
-    recording = read(path, request)
+    recording = read(path, request) if arrays is None else _parameters(path, request, arrays)
     admitted = judge.admit(path, recording.findings, request.force)
     template, notes = _template(recording, request)
     normal = request.up or recording.up if own is None else np.atleast_2d(own.normal)[0]
@@ -135,7 +143,7 @@ def _judged(recording: Recording, template: Any, normal: np.ndarray, up_is_said:
     findings = judge.bodies(few, template, normal, up_is_said=up_is_said)
     whole = few[np.isfinite(few).all(axis=(1, 2))]
     if recording.template is None and len(whole):  # a body model's own pieces are known
-        findings += separate_pieces.judged(whole[0], recording.faces, normal)
+        findings += separate_pieces.check_pieces(whole[0], recording.faces, normal)
     if not any(each.level == "wrong" for each in findings):
         weighed = few[check.evenly(len(few), WEIGHED)]
         findings += judge.masses(ip.mass_properties(weighed, template).mass, weighed)
@@ -144,21 +152,25 @@ def _judged(recording: Recording, template: Any, normal: np.ndarray, up_is_said:
 
 def _not_used(recording: Recording, read_elsewhere: Collection[str]) -> list[str]:
     names = [name for name in recording.unused if name not in read_elsewhere]
-    return [f"not used: {safe_npz.first(names, LISTED)}"] if names else []
+    return [f"not used: {safe_npz.first_arrays(names, LISTED)}"] if names else []
 
 
 def read(path: Path, request: Request) -> Recording:
     """The bodies in a file, by the ending of its name."""
     try:
-        regular(path)
+        regular_file(path)
     except ValueError as error:
         raise FileError(path, str(error)) from None
     if path.stat().st_size == 0:
         raise FileError(path, "is empty; export it again")
     if path.suffix.lower() == ".npz":
-        return read_npz(path, request.model, unit=request.units, degrees=request.degrees, rate=request.rate)
+        return _parameters(path, request)
     recording = read_mesh(path)
     return recording if request.units == 1.0 else replace(recording, vertices=recording.vertices[:] * request.units)
+
+
+def _parameters(path: Path, request: Request, arrays: Arrays | None = None) -> Recording:
+    return read_npz(path, request.model, unit=request.units, degrees=request.degrees, rate=request.rate, arrays=arrays)
 
 
 def _lowest(recording: Recording, normal: np.ndarray, progress: Progress) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ipman_rs.body import joints, load_body, poses
-from ipman_rs.files import being_written
+from ipman_rs.files import atomic_write
 from ipman_rs.synthetic.at_rest import FAMILIES, TRIES, perturbed, settle
 
 Array = NDArray[np.floating]
@@ -44,7 +44,7 @@ class Bodies:
         return Bodies(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
     def save(self, path: Path) -> None:
-        with being_written(path) as file:
+        with atomic_write(path) as file:
             np.savez_compressed(file, **vars(self))
 
     @classmethod

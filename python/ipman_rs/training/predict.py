@@ -17,7 +17,6 @@ from scipy.spatial.transform import Rotation
 
 import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel
-from ipman_rs.body.embedded import kind_of
 from ipman_rs.body.joint_regressors import JointRegressor
 from ipman_rs.data import DataSet
 
@@ -109,7 +108,7 @@ class Trained:
         if not rows:
             raise ValueError("data: none of its images can be read")
         found = {key: np.array(column) for key, column in zip(PREDICTED, zip(*rows, strict=True), strict=True)}
-        return {**found, "body": np.array(kind_of(body))}
+        return {**found, "body": np.array(body.kind)}
 
     @torch.no_grad()
     def predict(self, image: Any, box: Sequence[float], focal: float | None = None, pitch: float = 0.0) -> Prediction:

@@ -1,18 +1,20 @@
 """Fitted bodies against measurements: force plates, and centres of mass by others.
 
-compared = Comparison("squats", times, computed(bodies, template, plates), plates, reference)
+compared = MeasuredComparison("squats", times, computed(bodies, template, plates), plates, reference)
 figures(compared)["mass"]                  # plain values; `report` makes tables of them
 """
 
+from ipman_rs.renamed import old_names
+
 from .acceleration import accelerations
-from .comparison import Comparison
+from .comparison import MeasuredComparison
 from .computed import Computed, computed
 from .figures import figures
 from .zero_moment_point import along_force, zero_moment_point, zero_moment_point_of_parts
 
 __all__ = [
-    "Comparison",
     "Computed",
+    "MeasuredComparison",
     "accelerations",
     "along_force",
     "computed",
@@ -20,3 +22,5 @@ __all__ = [
     "zero_moment_point",
     "zero_moment_point_of_parts",
 ]
+
+__getattr__ = old_names(__name__, {"Comparison": "MeasuredComparison"})

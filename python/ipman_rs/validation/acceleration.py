@@ -21,13 +21,13 @@ def accelerations(points: ArrayLike, rate: float, cutoff: float = CUTOFF) -> Arr
     points = np.asarray(points, float)
     if not rate >= 4 * cutoff:
         raise ValueError(f"rate: expected {4 * cutoff:g} points a second or more for accelerations, got {rate:g}")
-    found = np.full_like(points, np.nan)
+    second = np.full_like(points, np.nan)
     unsettled = int(np.ceil(rate / cutoff))
     if len(points) <= 2 * unsettled + 2:
-        return found
+        return second
     smooth = sosfiltfilt(butter(2, cutoff, fs=rate, output="sos"), points, axis=0)
     inner = slice(unsettled, len(points) - unsettled)
-    found[1:-1] = (smooth[2:] - 2 * smooth[1:-1] + smooth[:-2]) * rate**2
-    kept = np.full_like(found, np.nan)
-    kept[inner] = found[inner]
-    return kept
+    second[1:-1] = (smooth[2:] - 2 * smooth[1:-1] + smooth[:-2]) * rate**2
+    settled = np.full_like(second, np.nan)
+    settled[inner] = second[inner]
+    return settled

@@ -1,4 +1,4 @@
-"""A recording's bodies beside what was measured of them."""
+"""Fitted bodies of a recording, compared with measurements."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ipman_rs.ground import Ground
 
 from ..data.force_plates import ForcePlates
 from .acceleration import CUTOFF, accelerations
-from .computed import Computed, carried
-from .movement import LOW, SLOW, Movement, smoothed
+from .computed import Computed, plate_loads
+from .movement import LOW, SLOW, Movement, smooth
 from .zero_moment_point import along_force, zero_moment_point, zero_moment_point_of_parts
 
 Array = NDArray[np.float64]
@@ -27,12 +27,14 @@ ANYWHERE = 0.5  # m: a reference farther from the body is in other units or axes
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class MeasuredComparison:
     """T frames at `times`; `plates`, y up, and `reference`, a centre of mass (T, 3) m, at these times.
 
-    NaN where nothing was measured. `seen` (T,): where enough markers were seen to say where the body is. `judge`: whose
-    reference it is. `standing`: the person's mass, kg, by plates on which they stood still; NaN where nobody knows.
-    ValueError where what was measured is nowhere near the body: in other units or axes.
+    NaN where nothing was measured. `seen` (T,): frames with enough visible markers to locate the body. `judge`: the
+    source of the reference. `standing`: the person's mass, kg, by plates on which they stood still; NaN if unknown.
+
+    Raises:
+        ValueError: the measurements are far from the body, as in other units or axes.
     """
 
     name: str
@@ -83,7 +85,7 @@ class Comparison:
         """(3,) N: the median of all plates' force in the frames in which none carries a load; 0 if there are none."""
         if self.plates is None:
             return np.zeros(3)
-        empty = (carried(self.plates) == 0).all(axis=1) & np.isfinite(self.plates.forces).all(axis=(1, 2))
+        empty = (plate_loads(self.plates) == 0).all(axis=1) & np.isfinite(self.plates.forces).all(axis=(1, 2))
         return np.median(self.plates.forces.sum(axis=1)[empty], axis=0) if empty.any() else np.zeros(3)
 
     @cached_property
@@ -111,7 +113,7 @@ class Comparison:
     @cached_property
     def forward(self) -> Array:
         """(T, 3): the level unit vectors along which the pelvis faces, on average over a second."""
-        return smoothed(self.computed.forward, round(self.rate))
+        return smooth(self.computed.forward, round(self.rate))
 
     def of_person(self, vectors: Array) -> Array:
         """Vectors (T, 3) by their components forward, left and up, as the person faces."""
@@ -120,7 +122,7 @@ class Comparison:
 
     @cached_property
     def lacking(self) -> Mask:
-        """(T, P): plates whose force is no number while another's is: nobody knows what is on them."""
+        """(T, P): plates whose force is NaN while that of another plate is not, so that their load is unknown."""
         if self.plates is None:
             return np.zeros((len(self.times), 0), bool)
         known = np.asarray(np.isfinite(self.plates.forces).all(axis=-1))
@@ -152,10 +154,10 @@ class Comparison:
 
     @cached_property
     def kind(self) -> str:
-        """What the person does, as `Movement.kind` says."""
-        seen = np.ones(len(self.times), bool) if self.seen is None or not self.seen.any() else self.seen
+        """The kind of movement, see `Movement.kind`."""
+        visible = np.ones(len(self.times), bool) if self.seen is None or not self.seen.any() else self.seen
         paths = (self.com, self.acceleration, self.computed.soles, self.forward)
-        com, acceleration, soles, forward = (path[seen] for path in paths)
+        com, acceleration, soles, forward = (path[visible] for path in paths)
         floor = float(self.floor.height)
         return Movement(com, acceleration, soles, self.computed.left, forward, floor, self.rate or 1.0).kind
 
@@ -166,7 +168,7 @@ class Comparison:
             return {}
         if self.kind != "walking":
             return {"all": self.complete}
-        count = (carried(self.plates) > 0).sum(axis=1)
+        count = (plate_loads(self.plates) > 0).sum(axis=1)
         return {"single support": self.complete & (count == 1), "double support": self.complete & (count == 2)}
 
     @cached_property
@@ -195,12 +197,12 @@ class Comparison:
     def centers(self) -> Mapping[str, Array]:
         """Where the centre of pressure should be (T, 3) m, by name: of a body at rest, of a moving one, and by the
         paper's formula for each γ."""
-        found = {"at rest: g(CoM)": self.floor.project(self.com)}
+        centers_by_name = {"at rest: g(CoM)": self.floor.project(self.com)}
         if self.plates is not None:
-            found["moving: ZMP of the CoM"] = zero_moment_point(self.com, self.acceleration, self.floor)
-            found["moving: ZMP of the parts"] = self.zmp
-            found["CoM along the force"] = along_force(self.com, self.force, self.floor)
-        return {**found, **{f"γ = {gamma}": points for gamma, points in self.computed.cop.items()}}
+            centers_by_name["moving: ZMP of the CoM"] = zero_moment_point(self.com, self.acceleration, self.floor)
+            centers_by_name["moving: ZMP of the parts"] = self.zmp
+            centers_by_name["CoM along the force"] = along_force(self.com, self.force, self.floor)
+        return {**centers_by_name, **{f"γ = {gamma}": points for gamma, points in self.computed.cop.items()}}
 
 
 def beside_centers(computed: Computed, rate: float, floor: Ground, plates: ForcePlates) -> Mask:
@@ -208,7 +210,7 @@ def beside_centers(computed: Computed, rate: float, floor: Ground, plates: Force
 
     A plate that carries both feet at other times, its centre under both or between them, says nothing of that.
     """
-    loaded = carried(plates) > 0
+    loaded = plate_loads(plates) > 0
     soles = [computed.soles[:, side] for side in (computed.left, ~computed.left)]
     if len(loaded) < 2:
         return np.zeros(len(loaded), bool)

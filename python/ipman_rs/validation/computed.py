@@ -1,4 +1,4 @@
-"""What the engine says of bodies over time."""
+"""Masses, centres of mass and centres of pressure that the engine computes for bodies over time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 METHODS = ("exact", "pcom", "sample_mean", "face_area", "vertex_mean")
 GAMMAS = (5, 10, 20, 50, 100, 200)  # 1/m; the paper's is 10
 ALPHA, GAMMA = 100.0, 10.0
-SOLE = 0.03  # m: so thick are the soles of people who may wear shoes
+SOLE = 0.03  # m: thickness of the soles of people who may wear shoes
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +54,14 @@ def computed(
     """The engine's figures of bodies, y up, vertices (T, V, 3) m; `plates` at the same times.
 
     Each body's ground for the pressure lies under its lowest vertex: people wear shoes, fitted bodies do not, and the
-    formula knows heights only. `progress` hears how many bodies are done.
+    formula depends on heights only. `progress(done)` is called with the number of finished bodies.
     """
     rows: list[Computed] = []
     done = 0
     for vertices in pieces(bodies, PIECE):
         part = slice(done, done + len(vertices))
         rows.append(
-            _piece(vertices, template, None if plates is None else (carried(plates)[part], plates.points[part]))
+            _piece(vertices, template, None if plates is None else (plate_loads(plates)[part], plates.points[part]))
         )
         done += len(vertices)
         progress(done)
@@ -94,11 +94,11 @@ def _piece(vertices: NDArray[np.floating], template: ip.BodyTemplate, plates: tu
         shares = first_shares(np.asarray(ip.sample_surface(vertices, template), float), rho, *plates)
     sole = sole_vertices(template, SOLE)
     left = np.isin(sole, _of_part(template, "left_lower_leg"))
-    soles, forward = np.asarray(vertices[:, sole], float), facing(vertices, template)
+    soles, forward = np.asarray(vertices[:, sole], float), facing_directions(vertices, template)
     return Computed(mass, masses, centers, ground.height, com, cop, soles, left, forward, shares)
 
 
-def facing(vertices: NDArray[np.floating], template: ip.BodyTemplate) -> Array:
+def facing_directions(vertices: NDArray[np.floating], template: ip.BodyTemplate) -> Array:
     """The level unit vectors (T, 3) along which the pelvis of bodies (T, V, 3), y up, faces.
 
     The pelvis is the lower half of the trunk, turned as a whole from the resting pose, which faces z. Square to its
@@ -124,7 +124,7 @@ def _of_part(template: ip.BodyTemplate, name: str) -> NDArray[np.int64]:
     return np.unique(template.faces[template.face_parts == template.part_names.index(name)])
 
 
-def carried(plates: ForcePlates) -> Array:
+def plate_loads(plates: ForcePlates) -> Array:
     """(T, P) N upwards; 0 for plates that carry no more than `LOADED`, of whose centres nothing is known."""
     return np.where(plates.loads > LOADED, plates.loads, 0.0)
 
@@ -134,9 +134,9 @@ def first_shares(points: Array, pressure: Array, loads: Array, centers: Array) -
 
     loads (T, P) and centers (T, P, 3) m of the plates; NaN where not exactly two carry a load.
     """
-    found = np.full(len(points), np.nan)
+    shares = np.full(len(points), np.nan)
     for row in np.flatnonzero((loads > 0).sum(axis=1) == 2):
         first, second = (centers[row, plate, [0, 2]] for plate in np.flatnonzero(loads[row] > 0))
         across = (points[row][:, [0, 2]] - (first + second) / 2) @ (second - first)
-        found[row] = pressure[row, across < 0].sum() / pressure[row].sum()
-    return found
+        shares[row] = pressure[row, across < 0].sum() / pressure[row].sum()
+    return shares

@@ -1,7 +1,7 @@
-"""What a folder of measurements holds: recordings of markers, and the forces and centres of mass that belong to them.
+"""The trials in a folder: recordings of markers with the forces and centres of mass that belong to them.
 
-Which belong together `data.pairing` says, by their names and folders; what a file holds its columns say. A `.c3d` with
-force plates brings its own forces, and one with Plug-in Gait's CentreOfMass its own centre of mass.
+`data.pairing` decides by names and folders which files belong together; the columns of a file decide what it holds. A
+`.c3d` with force plates brings its own forces, and one with Plug-in Gait's CentreOfMass its own centre of mass.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Trial:
     @property
     def still(self) -> bool:
         """Whether its name says that somebody stands still."""
-        return pairing.still(self.name)
+        return pairing.is_static(self.name)
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,9 @@ class Kinds:
     com: Callable[[Path], bool]
 
 
-def find(folder: Path, kinds: Kinds, apart: Path | None = None) -> tuple[list[Trial], list[str], dict[Path, str]]:
+def find_trials(
+    folder: Path, kinds: Kinds, apart: Path | None = None
+) -> tuple[list[Trial], list[str], dict[Path, str]]:
     """The recordings of a folder and those below it, by name, those of standing still first; what was not used, and
     why; and what is wrong with files that could not be read.
 
@@ -59,14 +61,14 @@ def find(folder: Path, kinds: Kinds, apart: Path | None = None) -> tuple[list[Tr
             f"{folder}: expected a folder of recordings, {'got a file' if folder.exists() else 'not there'}"
         )
     files = _files(folder, apart)
-    markers, notes = _one_of_a_name([path for path in files if path.suffix.lower() in MARKERS], folder)
+    markers, notes = _drop_copies([path for path in files if path.suffix.lower() in MARKERS], folder)
     if not markers:
         raise ValueError(f"{folder}: expected files of markers ({', '.join(MARKERS)}), got {_listed(files, folder)}")
     own = [path for path in markers if path.suffix.lower() == ".c3d"]
     tables: dict[Path, str] = {}
     others: dict[str, list[str]] = {}
     unreadable: dict[Path, str] = {}
-    loads, aliases, wrong = external_loads.beside(files)
+    loads, aliases, wrong = external_loads.find(files)
     for path in files:
         if path.suffix.lower() not in TABLES:
             continue
@@ -89,7 +91,7 @@ def find(folder: Path, kinds: Kinds, apart: Path | None = None) -> tuple[list[Tr
         forces, com = paired.forces.get(path), paired.com.get(path)
         if com is None and path in own and kinds.com(path):
             com = path
-        owner = pairing.Place.of(path, folder).owner
+        owner = pairing.ParsedPath.of(path, folder).owner
         trials.append(Trial(name, path, forces, com, owner, None if forces is None else loads.get(forces)))
     if not any(trial.forces or trial.com for trial in trials):
         raise ValueError(
@@ -104,16 +106,16 @@ def find(folder: Path, kinds: Kinds, apart: Path | None = None) -> tuple[list[Tr
 def _files(folder: Path, apart: Path | None) -> list[Path]:
     """All but hidden ones."""
     away = None if apart is None else apart.resolve()
-    found = []
+    files = []
     for path in sorted(folder.rglob("*")):
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
         if hidden or not path.is_file() or (away is not None and path.resolve().is_relative_to(away)):
             continue
-        found.append(path)
-    return found
+        files.append(path)
+    return files
 
 
-def _one_of_a_name(markers: Sequence[Path], root: Path) -> tuple[list[Path], list[str]]:
+def _drop_copies(markers: Sequence[Path], root: Path) -> tuple[list[Path], list[str]]:
     """Without the `.trc` that lies beside a `.c3d` of the same name: it was made of it; and which those are."""
     whole = {path.with_suffix("") for path in markers if path.suffix.lower() == ".c3d"}
     twice = [path for path in markers if path.suffix.lower() != ".c3d" and path.with_suffix("") in whole]

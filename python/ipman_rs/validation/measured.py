@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ..data import c3d, force_plates, opensim
 from ..data.external_loads import ExternalLoads
-from ..data.force_plates import ForcePlates, between
+from ..data.force_plates import ForcePlates, interpolate
 from ..data.tracks import TO_Y_UP
-from ..files import regular
+from ..files import regular_file
 
 Array = NDArray[np.float64]
 Up = tuple[float, float, float] | None  # a direction in a file's own axes; None: as it says
@@ -26,7 +26,7 @@ def kind_of(path: Path) -> tuple[str | None, str]:
     """What a table holds: "forces", "com", or None, and then why it is of no use. ValueError, naming the file, if it
     cannot be read."""
     if path.suffix.lower() == ".csv":
-        if not set(CSV_COLUMNS) <= set(_heads(path)):
+        if not set(CSV_COLUMNS) <= set(_column_names(path)):
             return None, NEITHER
         _csv(path)
         return "com", ""
@@ -62,9 +62,9 @@ def plates(
     `loads`: in which of its columns the forces are; `length`: metres in one of a `.c3d`'s, if it says that wrongly.
     """
     if path.suffix.lower() == ".c3d":
-        found = _recording(path, length)
-        axis = _axis(up, found.up, path)
-        return force_plates.of_recording(found, axis).turned(TO_Y_UP[axis])
+        recording = _recording(path, length)
+        axis = _axis(up, recording.up, path)
+        return force_plates.from_c3d(recording, axis).turned(TO_Y_UP[axis])
     axis = _axis(up, "y", path)
     return opensim.plates(opensim.storage(path), unit, axis, loads).turned(TO_Y_UP[axis])
 
@@ -77,22 +77,22 @@ def center_of_mass(
     `up` and `length` as in `plates`; `subject`: whose, where a `.c3d` has several people.
     """
     if path.suffix.lower() == ".c3d":
-        found = _recording(path, length)
-        points = found.center_of_mass(subject)
+        recording = _recording(path, length)
+        points = recording.center_of_mass(subject)
         if points is None:
             raise ValueError(f"{path}: expected a centre of mass by a model such as Plug-in Gait, it has none")
-        return between(found.times, points @ TO_Y_UP[_axis(up, found.up, path)].T, times)
+        return interpolate(recording.times, points @ TO_Y_UP[_axis(up, recording.up, path)].T, times)
     if path.suffix.lower() == ".csv":
         own, points = _csv(path)
     else:
         table = opensim.storage(path)
         own, points = table.times, opensim.center_of_mass(table)
-    return between(own, points @ TO_Y_UP[_axis(up, "y", path)].T, times)
+    return interpolate(own, points @ TO_Y_UP[_axis(up, "y", path)].T, times)
 
 
-def _recording(path: Path, length: float | None) -> c3d.Recording:
-    found = c3d.read(path)
-    return found if length is None else replace(found, unit=length)
+def _recording(path: Path, length: float | None) -> c3d.C3DFile:
+    recording = c3d.read(path)
+    return recording if length is None else replace(recording, unit=length)
 
 
 def _axis(up: Up, usual: str, path: Path) -> str:
@@ -112,7 +112,7 @@ def judge(path: Path) -> str:
     return path.stem if path.suffix.lower() == ".csv" and "opensim" not in path.stem.lower() else "OpenSim"
 
 
-def _heads(path: Path) -> list[str]:
+def _column_names(path: Path) -> list[str]:
     """The names of the columns, which may stand in a comment and have a remark behind them."""
     with path.open(encoding="utf-8", errors="replace", newline="") as stream:
         first = next(csv.reader(stream), [])
@@ -121,7 +121,7 @@ def _heads(path: Path) -> list[str]:
 
 def _csv(path: Path) -> tuple[Array, Array]:
     """Times (T,) s and centres of mass (T, 3) m."""
-    heads = _heads(regular(path))
+    heads = _column_names(regular_file(path))
     with path.open(encoding="utf-8", errors="replace", newline="") as stream:
         rows = [(number, row) for number, row in enumerate(csv.reader(stream), 1) if number > 1 and row]
     if not rows:

@@ -1,4 +1,4 @@
-"""What a recorded person does: stands, walks, runs, jumps, or moves in place."""
+"""The kind of a recorded movement: standing, walking, running, a jump, or movement in place."""
 
 from __future__ import annotations
 
@@ -91,19 +91,19 @@ class Movement:
         off = (self.heights > LOW).all(axis=1)
         falls = self.acceleration[:, 1]
         if np.isfinite(falls).any():
-            return longest(off & (np.nan_to_num(falls) < FALLS)) >= FLIGHT * self.rate
+            return longest_run(off & (np.nan_to_num(falls) < FALLS)) >= FLIGHT * self.rate
         contacts = np.flatnonzero(~off)
         far = np.asarray((self.heights > 3 * LOW).all(axis=1))
         return len(contacts) > 1 and bool(far[contacts[0] : contacts[-1]].any())
 
 
-def longest(mask: Mask) -> int:
+def longest_run(mask: Mask) -> int:
     """The most frames in a row in which it is true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return int((edges[1::2] - edges[::2]).max()) if len(edges) else 0
 
 
-def smoothed(ways: Array, width: int) -> Array:
+def smooth(ways: Array, width: int) -> Array:
     """Level unit vectors (T, 3) after a moving mean over that many frames."""
     half = max(0, min(width, len(ways)) // 2)
     total = np.cumsum(np.concatenate([np.zeros((1, 3)), ways]), axis=0)

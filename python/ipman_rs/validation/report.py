@@ -1,4 +1,4 @@
-"""What `ipman validate` says, as tables in Markdown and as files of numbers.
+"""The report of `ipman validate`: tables in Markdown, and series of numbers.
 
 Records are what `figures.figures` gives of a recording, with `body` (its model's name) and `fit` (how it was fitted:
 `markers`, mean distance from them in m, `shape_from`, `converged`), and `flags`, what is odd about it.
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..study.table import number
-from .comparison import Comparison
-from .computed import GAMMAS, METHODS, carried
+from .comparison import MeasuredComparison
+from .computed import GAMMAS, METHODS, plate_loads
 
 Record = dict[str, Any]
 
@@ -33,15 +33,15 @@ MODELS = ("at rest: g(CoM)", "moving: ZMP of the CoM", "moving: ZMP of the parts
 
 
 def markdown(records: Sequence[Record], source: str, notes: Sequence[str], pictures: Sequence[str]) -> str:
-    """The page: what is odd, every table that has rows, what was assumed, and the pictures."""
+    """The page: what is unusual, all tables that have rows, notes, and pictures."""
     lines = [f"# Bodies fitted to markers, against measurements: {source}", ""]
-    odd = [f"- {one['name']}: {flag}" for one in records for flag in one["flags"]]
+    odd = [f"- {record['name']}: {flag}" for record in records for flag in record["flags"]]
     if odd:
         lines += ["## Odd", "", *odd, ""]
-    for title, said, table in TABLES:
+    for title, explanation, table in TABLES:
         rows = list(table(records))
         if len(rows) > 2:
-            lines += [f"## {title}", "", said, "", *rows, ""]
+            lines += [f"## {title}", "", explanation, "", *rows, ""]
     if notes:
         lines += ["## Notes", "", *(f"- {note}" for note in notes), ""]
     if pictures:
@@ -55,57 +55,58 @@ def recordings(records: Iterable[Record]) -> Iterator[str]:
         "| by the plates, kg | standing still, kg | off | upward force, rms |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|---|---|"
-    for one in records:
-        mass, force = one["mass"], one["force"]
+    for record in records:
+        mass, force = record["mass"], record["force"]
         spread = f"{_number(mass['volume_mean'])} ({_number(mass['volume_least'])} to {_number(mass['volume_most'])})"
         plates = off = ""
         if mass["plates"] is not None:
             plates = f"{_number(mass['plates'])} ± {_number(mass['plates_std'])}"
-            plates += " !" if any(flag.startswith("weight by the plates") for flag in one["flags"]) else ""
-        if weighed(one) is not None:
-            off = f"{mass['volume_mean'] / weighed(one) - 1:+.1%}"
+            plates += " !" if any(flag.startswith("weight by the plates") for flag in record["flags"]) else ""
+        if weighed(record) is not None:
+            off = f"{mass['volume_mean'] / weighed(record) - 1:+.1%}"
         still = "" if mass["standing"] is None else _number(mass["standing"])
         pushed = f"{force['rms']:.0f} N, {force['share']:.1%} (at rest {force['at_rest']:.1%})" if force else ""
         yield (
-            f"| {one['name']} | {one['kind']} | {one['body']} | {one['fit']['shape_from']} | {one['frames']} "
-            f"| {one['rate_hz']:.0f} | {1e3 * one['fit']['markers']:.1f} | {spread} | {plates} | {still} | {off} "
+            f"| {record['name']} | {record['kind']} | {_body(record)} | {record['frames']} "
+            f"| {record['rate_hz']:.0f} | {1e3 * record['fit']['markers']:.1f} | {spread} | {plates} | {still} | {off} "
             f"| {pushed} |"
         )
 
 
-def weighed(one: Record) -> float | None:
+def weighed(record: Record) -> float | None:
     """The person's mass, kg: by plates on which they stood still, or else on which they move; None without plates."""
-    mass = one["mass"]
+    mass = record["mass"]
     return mass["plates"] if mass["standing"] is None else mass["standing"]
 
 
 def centers_of_mass(records: Iterable[Record]) -> Iterator[str]:
     yield "| recording | against | body | shape from | frames | forward, rms (mean) | left | up | distance, mean |"
     yield "|---|---|---|---|---|---|---|---|---|"
-    for one in _with(records, "com"):
-        exact = one["com"]["methods"]["exact"]
+    for record in _records_with(records, "com"):
+        exact = record["com"]["methods"]["exact"]
         axes = [f"{1e3 * rms:.1f} ({1e3 * mean:+.1f})" for rms, mean in zip(exact["rms"], exact["mean"], strict=True)]
         yield (
-            f"| {one['name']} | {one['com']['judge']} | {one['body']} | {one['fit']['shape_from']} "
-            f"| {one['com']['frames']} | {' | '.join(axes)} | {1e3 * exact['distance']:.1f} |"
+            f"| {record['name']} | {record['com']['judge']} | {_body(record)} "
+            f"| {record['com']['frames']} | {' | '.join(axes)} | {1e3 * exact['distance']:.1f} |"
         )
 
 
 def formulations(records: Iterable[Record]) -> Iterator[str]:
-    """A row a formulation, a column a recording, and the paper's figures."""
-    compared = list(_with(records, "com"))
+    """One row per formulation, one column per recording, and the paper's values."""
+    compared = list(_records_with(records, "com"))
     if not compared:
         return
     titles = [
-        f"{one['name']}, {one['body']}, shape from {one['fit']['shape_from']}, against {one['com']['judge']}"
-        for one in compared
+        f"{record['name']}, {record['body']}, shape from {record['fit']['shape_from']}, "
+        f"against {record['com']['judge']}"
+        for record in compared
     ]
     yield f"| formulation | {' | '.join(titles)} | the paper, on MoYo |"
     yield f"|---|{'---|' * len(titles)}---|"
     for method in reversed(METHODS):
-        cells = [one["com"]["methods"][method] for one in compared]
-        told = [f"{1e3 * cell['distance']:.1f} (up {1e3 * cell['mean'][2]:+.0f})" for cell in cells]
-        yield f"| {WORDS[method]} | {' | '.join(told)} | {PAPER.get(method, '')} |"
+        cells = [record["com"]["methods"][method] for record in compared]
+        texts = [f"{1e3 * cell['distance']:.1f} (up {1e3 * cell['mean'][2]:+.0f})" for cell in cells]
+        yield f"| {WORDS[method]} | {' | '.join(texts)} | {PAPER.get(method, '')} |"
 
 
 def standing(records: Iterable[Record]) -> Iterator[str]:
@@ -114,12 +115,12 @@ def standing(records: Iterable[Record]) -> Iterator[str]:
         "| sway of CoP |"
     )
     yield "|---|---|---|---|---|---|---|---|"
-    for one in _with(records, "standing"):
-        found = one["standing"]
-        forward, left = (1e3 * value for value in found["offset"])
-        rest = (found[name] for name in ("offset_length", "distance", "sway_com", "sway_cop"))
+    for record in _records_with(records, "standing"):
+        values = record["standing"]
+        forward, left = (1e3 * value for value in values["offset"])
+        rest = (values[name] for name in ("offset_length", "distance", "sway_com", "sway_cop"))
         yield (
-            f"| {one['name']} | {one['body']} | {one['fit']['shape_from']} | {forward:+.1f}, {left:+.1f} "
+            f"| {record['name']} | {_body(record)} | {forward:+.1f}, {left:+.1f} "
             f"| {' | '.join(f'{1e3 * value:.1f}' for value in rest)} |"
         )
 
@@ -130,14 +131,11 @@ def centers_of_pressure(records: Iterable[Record]) -> Iterator[str]:
         f"| {' | '.join(f'γ = {gamma}' for gamma in GAMMAS)} |"
     )
     yield f"|---|---|---|---|---|{'---|' * (len(MODELS) + len(GAMMAS))}"
-    for one in records:
-        for phase, found in one["cop"].items():
+    for record in records:
+        for phase, distances in record["cop"].items():
             names = [*MODELS, *(f"γ = {gamma}" for gamma in GAMMAS)]
-            cells = [_millimetres(found["distance"].get(name)) for name in names]
-            yield (
-                f"| {one['name']} | {phase} | {one['body']} | {one['fit']['shape_from']} | {found['frames']} "
-                f"| {' | '.join(cells)} |"
-            )
+            cells = [_millimetres(distances["distance"].get(name)) for name in names]
+            yield (f"| {record['name']} | {phase} | {_body(record)} | {distances['frames']} | {' | '.join(cells)} |")
 
 
 def references(records: Iterable[Record]) -> Iterator[str]:
@@ -146,17 +144,17 @@ def references(records: Iterable[Record]) -> Iterator[str]:
         "| reference along the force |"
     )
     yield "|---|---|---|---|---|---|---|---|---|"
-    for one in records:
-        for phase, found in one["cop"].items():
-            if not found.get("reference_frames"):
+    for record in records:
+        for phase, distances in record["cop"].items():
+            if not distances.get("reference_frames"):
                 continue
             cells = [
-                _millimetres(found[whose][name])
+                _millimetres(distances[whose][name])
                 for name in (MODELS[0], MODELS[3])
                 for whose in ("on_reference_frames", "reference")
             ]
             yield (
-                f"| {one['name']} | {phase} | {one['body']} | {one['fit']['shape_from']} | {found['reference_frames']} "
+                f"| {record['name']} | {phase} | {_body(record)} | {distances['reference_frames']} "
                 f"| {' | '.join(cells)} |"
             )
 
@@ -164,10 +162,10 @@ def references(records: Iterable[Record]) -> Iterator[str]:
 def shares(records: Iterable[Record]) -> Iterator[str]:
     yield "| recording | body | shape from | frames | measured | computed | apart, mean |"
     yield "|---|---|---|---|---|---|---|"
-    for one in _with(records, "shares"):
-        found = one["shares"]
-        told = (f"{found[name]:.1%}" for name in ("measured", "computed", "difference"))
-        yield f"| {one['name']} | {one['body']} | {one['fit']['shape_from']} | {found['frames']} | {' | '.join(told)} |"
+    for record in _records_with(records, "shares"):
+        values = record["shares"]
+        texts = (f"{values[name]:.1%}" for name in ("measured", "computed", "difference"))
+        yield f"| {record['name']} | {_body(record)} | {values['frames']} | {' | '.join(texts)} |"
 
 
 TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...] = (
@@ -214,22 +212,27 @@ TABLES: tuple[tuple[str, str, Callable[[Iterable[Record]], Iterator[str]]], ...]
 )
 
 
-def series(one: Comparison) -> dict[str, NDArray[Any]]:
+def series(comparison: MeasuredComparison) -> dict[str, NDArray[Any]]:
     """Everything over time, by name: columns (T,), and vectors (T, 3), metres, newtons, seconds."""
-    found: dict[str, NDArray[Any]] = {"time_s": one.times, "volume_mass_kg": one.computed.mass}
-    found |= {f"com_{method}_m": points for method, points in one.computed.com.items()}
-    found["com_acceleration_mps2"] = one.acceleration
-    found["forward_1"] = one.forward
-    found |= {f"cop_gamma_{gamma}_m": points for gamma, points in one.computed.cop.items()}
-    if one.reference is not None:
-        found["com_reference_m"] = one.reference
-    if one.plates is not None:
-        assert one.measured is not None
-        found |= {"force_N": one.force, "cop_measured_m": one.measured, "complete": one.complete, "beside": one.beside}
-        found |= {"loads_N": carried(one.plates), "first_share_computed": one.computed.shares}
+    columns: dict[str, NDArray[Any]] = {"time_s": comparison.times, "volume_mass_kg": comparison.computed.mass}
+    columns |= {f"com_{method}_m": points for method, points in comparison.computed.com.items()}
+    columns["com_acceleration_mps2"] = comparison.acceleration
+    columns["forward_1"] = comparison.forward
+    columns |= {f"cop_gamma_{gamma}_m": points for gamma, points in comparison.computed.cop.items()}
+    if comparison.reference is not None:
+        columns["com_reference_m"] = comparison.reference
+    if comparison.plates is not None:
+        assert comparison.measured is not None
+        columns |= {
+            "force_N": comparison.force,
+            "cop_measured_m": comparison.measured,
+            "complete": comparison.complete,
+            "beside": comparison.beside,
+        }
+        columns |= {"loads_N": plate_loads(comparison.plates), "first_share_computed": comparison.computed.shares}
         names = ("zmp_com_m", "zmp_parts_m", "com_along_force_m")
-        found |= {name: one.centers[model] for name, model in zip(names, MODELS[1:], strict=True)}
-    return found
+        columns |= {name: comparison.centers[model] for name, model in zip(names, MODELS[1:], strict=True)}
+    return columns
 
 
 def table(columns: dict[str, NDArray[Any]]) -> str:
@@ -285,8 +288,13 @@ def flag_lines(records: Sequence[Record]) -> list[str]:
     return [f"look: {record['name']}: {flag}" for record in records for flag in record["flags"]]
 
 
-def _with(records: Iterable[Record], key: str) -> Iterator[Record]:
-    return (one for one in records if one[key])
+def _records_with(records: Iterable[Record], key: str) -> Iterator[Record]:
+    return (record for record in records if record[key])
+
+
+def _body(record: Record) -> str:
+    """The cells of a row that name the body model and the source of its shape."""
+    return f"{record['body']} | {record['fit']['shape_from']}"
 
 
 def _number(value: float | None) -> str:

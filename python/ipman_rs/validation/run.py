@@ -1,4 +1,4 @@
-"""The work of `ipman validate`: fit each recording, compare it with what was measured, write what came out."""
+"""The work of `ipman validate`: fits each recording, compares it with measurements, writes the results."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ..body.sites import FEWEST_POINTS
 from ..data import check, judge, markers, opensim
 from ..data.force_plates import ForcePlates
 from ..data.markers import own
-from ..data.markers.judged import of_tracks
+from ..data.markers.judged import check_tracks
 from ..data.tracks import Tracks
-from ..files import safe_npz, write_whole
+from ..files import write_whole
 from ..files.errors import FileError
 from ..fitting import config
+from ..fitting.jobs.options import FitOptions
 from ..fitting.jobs.outputs import npz
-from ..fitting.jobs.recordings import Pace, Recording, kept
-from ..fitting.jobs.run import Settings
+from ..fitting.jobs.recordings import FittedRecording, Pace, Recording, fit_recording
 from ..io.parameters import read_npz
 from ..progress import Progress, silent
-from . import Comparison, computed, figures, measured, pictures, report
+from . import MeasuredComparison, computed, figures, measured, pictures, report
 from .figures import SPREAD
-from .folder import Kinds, Trial, find
+from .folder import Kinds, Trial, find_trials
 
 Record = dict[str, Any]
 
@@ -44,7 +44,7 @@ class Plan:
     folder: Path
     output: Path
     trials: list[Trial]
-    settings: Settings
+    settings: FitOptions
     person: str
     pace: float
     resume: bool
@@ -55,10 +55,10 @@ class Plan:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredTrial:
     """A recording as it was measured: plates at their own times, the reference (T, 3) m at the markers'.
 
-    `idle`: what was measured beside the markers is of no use; the recording can only give its shape to others.
+    `idle`: its measurements cannot be used; the recording can only give its shape to others.
     """
 
     trial: Trial
@@ -71,15 +71,15 @@ class Measured:
     @property
     def still(self) -> bool:
         """Whether the markers hardly move."""
-        seen = self.tracks.confidence > 0
-        paths = np.where(seen[..., None], self.tracks.points, np.nan)[:, seen.all(axis=0)]
+        visible = self.tracks.confidence > 0
+        paths = np.where(visible[..., None], self.tracks.points, np.nan)[:, visible.all(axis=0)]
         least, lasted = STILL[0], float(self.tracks.times[-1] - self.tracks.times[0])
         return paths.shape[1] >= FEWEST_POINTS and lasted >= STILL[1] and float(paths.std(axis=0).max()) < least
 
 
 @dataclass
-class Told:
-    """What is said beside the figures: notes, and the files that failed."""
+class RunLog:
+    """Notes and failed files of a run."""
 
     notes: list[str] = field(default_factory=list)
     failures: list[FileError] = field(default_factory=list)
@@ -96,17 +96,17 @@ def plan(
     force_up: tuple[float, float, float] | None = None,
     **of_markers: Any,
 ) -> Plan:
-    """`pace`: frames a second to fit; `of_markers`: what `Settings` has of marker files.
+    """`pace`: frames a second to fit; `of_markers`: what `FitOptions` has of marker files.
 
     ValueError for a folder without recordings to compare, a recording or body model that is not there.
     """
     import ipman_rs as ip
 
-    trials, notes, unreadable = find(folder, KINDS, output)
+    trials, notes, unreadable = find_trials(folder, KINDS, output)
     names = [trial.name for trial in trials]
     if person not in ("auto", "none", *names):
         raise ValueError(f"--person: expected auto, none or one of {', '.join(names)}, got {person!r}")
-    settings = Settings(config.load("markers"), model, **of_markers)
+    settings = FitOptions(config.load("markers"), model, **of_markers)
     body = ip.load_body(model)  # before anything is fitted
     if settings.markers is not None:
         own.read(settings.markers, body)
@@ -115,38 +115,45 @@ def plan(
 
 def run(plan: Plan, progress: Progress = silent) -> tuple[list[Record], list[str], list[FileError]]:
     """The figures of every recording that could be compared, what was assumed, and those that failed."""
-    told = Told([*plan.notes], [FileError(path, what) for path, what in plan.unreadable.items()])
-    ready = [one for trial in plan.trials for one in [_read(plan, trial, told)] if one is not None]
+    log = RunLog([*plan.notes], [FileError(path, what) for path, what in plan.unreadable.items()])
+    ready = [
+        measurement for trial in plan.trials for measurement in [_read(plan, trial, log)] if measurement is not None
+    ]
     records: list[Record] = []
-    for owner in dict.fromkeys(one.trial.owner for one in ready):
-        records += _person(plan, [one for one in ready if one.trial.owner == owner], told, progress)
-    return records, told.notes, told.failures
+    for owner in dict.fromkeys(measurement.trial.owner for measurement in ready):
+        records += _run_person(
+            plan, [measurement for measurement in ready if measurement.trial.owner == owner], log, progress
+        )
+    return records, log.notes, log.failures
 
 
-def _person(plan: Plan, recordings: list[Measured], told: Told, progress: Progress) -> list[Record]:
+def _run_person(plan: Plan, recordings: list[MeasuredTrial], log: RunLog, progress: Progress) -> list[Record]:
     """The figures of all recordings of one person, that of standing still first: its shape and weight are needed."""
-    chosen = _chosen(plan, recordings, told)
-    if all(one.plates is None and one.reference is None for one in recordings):
+    chosen = _trial_of_shape(plan, recordings, log)
+    if all(measurement.plates is None and measurement.reference is None for measurement in recordings):
         return []
-    recordings = [one for one in recordings if not one.idle or one.trial.name == chosen]
+    recordings = [measurement for measurement in recordings if not measurement.idle or measurement.trial.name == chosen]
     records: list[Record] = []
     shape, weight = None, np.nan
-    for one in sorted(recordings, key=lambda one: (one.trial.name != chosen, not (one.trial.still or one.still))):
-        name = one.trial.name
+    for measurement in sorted(
+        recordings,
+        key=lambda measurement: (measurement.trial.name != chosen, not (measurement.trial.still or measurement.still)),
+    ):
+        name = measurement.trial.name
         try:
-            fit = _fitted(plan, one, shape, progress)
+            fit = _fit(plan, measurement, shape, progress)
             if name == chosen:
                 shape = name
-            records.append(_compared(plan, one, fit, weight, told, progress))
+            records.append(_compare(plan, measurement, fit, weight, log, progress))
         except OSError:
             raise  # the output, which is that of all recordings, cannot be written
         except Exception as error:  # whatever it is, the other recordings were not the cause
-            told.failures.append(error if isinstance(error, FileError) else _failure(one.trial, error))
+            log.failures.append(error if isinstance(error, FileError) else _failure(measurement.trial, error))
             if name == chosen:
-                told.notes.append(f"{name} could not be compared: the others found their shapes themselves")
+                log.notes.append(f"{name} could not be compared: the others found their shapes themselves")
             continue
-        told.notes += [f"{name}: {note}" for note in fit["notes"] if note not in one.tracks.notes]
-        if np.isnan(weight) and _weighs(records[-1]):
+        log.notes += [f"{name}: {note}" for note in fit.record["notes"] if note not in measurement.tracks.notes]
+        if np.isnan(weight) and _gives_weight(records[-1]):
             weight = records[-1]["mass"]["plates"]
     return records
 
@@ -156,75 +163,79 @@ def _failure(trial: Trial, error: Exception) -> FileError:
     return FileError(trial.markers, f"cannot be compared: {type(error).__name__}{f': {error}' if str(error) else ''}")
 
 
-def _chosen(plan: Plan, recordings: list[Measured], told: Told) -> str | None:
+def _trial_of_shape(plan: Plan, recordings: list[MeasuredTrial], log: RunLog) -> str | None:
     """The recording whose shape is kept: by its name, or because its markers hardly move."""
-    names = [one.trial.name for one in recordings]
+    names = [measurement.trial.name for measurement in recordings]
     if plan.person != "auto":
         return plan.person if plan.person in names else None
-    called = [one.trial.name for one in recordings if one.trial.still]
-    still = [one.trial.name for one in recordings if one.still and one.trial.markers.stem in one.trial.name]
-    if called or not still or len(names) == 1:
+    called = [measurement.trial.name for measurement in recordings if measurement.trial.still]
+    still_names = [
+        measurement.trial.name
+        for measurement in recordings
+        if measurement.still and measurement.trial.markers.stem in measurement.trial.name
+    ]
+    if called or not still_names or len(names) == 1:
         return next(iter(called), None)
-    told.notes.append(
-        f"{still[0]}: its markers stand still, so its shape and places of markers are kept for the others"
+    log.notes.append(
+        f"{still_names[0]}: its markers stand still, so its shape and places of markers are kept for the others"
     )
-    return still[0]
+    return still_names[0]
 
 
-def _weighs(record: Record) -> bool:
+def _gives_weight(record: Record) -> bool:
     """Whether a recording says what the person weighs: all of it was on plates, and nothing moved."""
     mass = record["mass"]
     quiet = record["kind"] == "quiet standing" and mass["plates"] is not None
     return quiet and mass["plates_std"] < SPREAD * mass["plates"] and not record["frames_beside_plates"]
 
 
-def _read(plan: Plan, trial: Trial, told: Told) -> Measured | None:
+def _read(plan: Plan, trial: Trial, log: RunLog) -> MeasuredTrial | None:
     """A recording's files, judged before anything is fitted; None, and a failure, if its markers cannot be used."""
     try:
         tracks = _tracks(plan, trial)
-        flags = [*_admitted(trial.markers, _of_markers(plan, tracks), plan.settings.force)]
-        told.notes += [f"{trial.name}: {note}" for note in tracks.notes]
+        flags = [*_flags(trial.markers, _marker_findings(plan, tracks), plan.settings.force)]
+        log.notes += [f"{trial.name}: {note}" for note in tracks.notes]
     except FileError as error:
-        told.failures.append(error)
+        log.failures.append(error)
         if trial.name == plan.person or (plan.person == "auto" and trial.still):
-            told.notes.append(f"{trial.name} could not be compared: the others found their shapes themselves")
+            log.notes.append(f"{trial.name} could not be compared: the others found their shapes themselves")
         return None
     plates = reference = None
-    failed = len(told.failures)
+    failed = len(log.failures)
     try:
         if trial.forces is not None:
             plates = _plates(plan, trial, tracks)
             flags += plates.notes
     except FileError as error:
-        told.failures.append(error)
+        log.failures.append(error)
     try:
         if trial.com is not None:
             reference = _reference(plan, trial, tracks)
     except FileError as error:
-        told.failures.append(error)
-    idle = plates is None and reference is None and len(told.failures) > failed
-    return Measured(trial, tracks, plates, reference, flags, idle)
+        log.failures.append(error)
+    idle = plates is None and reference is None and len(log.failures) > failed
+    return MeasuredTrial(trial, tracks, plates, reference, flags, idle)
 
 
 def _tracks(plan: Plan, trial: Trial) -> Tracks:
-    said = plan.settings
+    settings = plan.settings
     try:
-        return markers.read(trial.markers, said.up, said.subject, said.units, said.rate)
+        return markers.read(trial.markers, settings.up, settings.subject, settings.units, settings.rate)
     except ValueError as error:
         raise FileError(trial.markers, str(error)) from error
 
 
-def _of_markers(plan: Plan, tracks: Tracks) -> list[check.Finding]:
+def _marker_findings(plan: Plan, tracks: Tracks) -> list[check.Finding]:
     """What the judge says of the markers before they are fitted; here --rate is another one."""
     import ipman_rs as ip
 
-    said = plan.settings
-    names = None if said.markers is None else own.read(said.markers, ip.load_body(said.model))
-    found = of_tracks(tracks, names, said.up is not None)
-    return [replace(each, option=each.option.replace("--rate", "--recorded-rate")) for each in found]
+    settings = plan.settings
+    names = None if settings.markers is None else own.read(settings.markers, ip.load_body(settings.model))
+    findings = check_tracks(tracks, names, settings.up is not None)
+    return [replace(each, option=each.option.replace("--rate", "--recorded-rate")) for each in findings]
 
 
-def _admitted(path: Path, findings: Iterable[check.Finding], force: bool) -> tuple[str, ...]:
+def _flags(path: Path, findings: Iterable[check.Finding], force: bool) -> tuple[str, ...]:
     """What is odd. Raises FileError for what cannot be."""
     try:
         return judge.admit(path, findings, force)
@@ -235,77 +246,82 @@ def _admitted(path: Path, findings: Iterable[check.Finding], force: bool) -> tup
 def _plates(plan: Plan, trial: Trial, tracks: Tracks) -> ForcePlates:
     """Raises FileError for plates that cannot be read, or tell nothing of this recording."""
     assert trial.forces is not None
-    said = plan.settings
+    settings = plan.settings
     try:
         apart = plan.force_up is not None and trial.forces != trial.markers
-        up = plan.force_up if apart else said.up
-        found = measured.plates(trial.forces, up, plan.force_unit, trial.loads, said.units)
+        up = plan.force_up if apart else settings.up
+        plates = measured.plates(trial.forces, up, plan.force_unit, trial.loads, settings.units)
     except (ValueError, ImportError) as error:
         raise FileError(trial.forces, str(error)) from error
-    centers = found.at(tracks.times).center()
-    for each in opensim.loaded(found, tracks.times) or opensim.among(centers, tracks, "centre of pressure"):
+    centers = plates.at(tracks.times).center()
+    for each in opensim.check_loads(plates, tracks.times) or opensim.check_near_markers(
+        centers, tracks, "centre of pressure"
+    ):
         raise FileError(trial.forces, f"{each.what}; {each.advice}")
-    return found
+    return plates
 
 
 def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
     assert trial.com is not None
-    said = plan.settings
+    settings = plan.settings
     try:
-        found = measured.center_of_mass(trial.com, tracks.times, said.up, said.subject, said.units)
+        centers = measured.center_of_mass(trial.com, tracks.times, settings.up, settings.subject, settings.units)
     except ValueError as error:
         raise FileError(trial.com, str(error)) from error
-    if not np.isfinite(found).any():
+    if not np.isfinite(centers).any():
         first, last = tracks.times[0], tracks.times[-1]
         what = f"no centre of mass while the markers were recorded, t {first:.2f} to {last:.2f} s"
         raise FileError(trial.com, f"{what}; are both of one recording, with one clock?")
-    for each in opensim.among(found, tracks, "centre of mass"):
+    for each in opensim.check_near_markers(centers, tracks, "centre of mass"):
         raise FileError(trial.com, f"{each.what}; {each.advice}")
-    return found
+    return centers
 
 
-def _fitted(plan: Plan, one: Measured, person: str | None, progress: Progress) -> Record:
-    every = max(1, round((one.tracks.rate or 1.0) / plan.pace))
-    recording = Recording(one.trial.name, str(one.trial.markers), [one.trial.markers])
-    return kept(recording, plan.settings, Pace(every), plan.output, plan.resume, person, progress)
+def _fit(plan: Plan, measurement: MeasuredTrial, person: str | None, progress: Progress) -> FittedRecording:
+    every = max(1, round((measurement.tracks.rate or 1.0) / plan.pace))
+    recording = Recording(measurement.trial.name, str(measurement.trial.markers), [measurement.trial.markers])
+    return fit_recording(recording, plan.settings, Pace(every), plan.output, plan.resume, person, progress)
 
 
-def _compared(plan: Plan, one: Measured, fit: Record, weight: float, told: Told, progress: Progress) -> Record:
+def _compare(
+    plan: Plan, measurement: MeasuredTrial, fit: FittedRecording, weight: float, log: RunLog, progress: Progress
+) -> Record:
     """The figures of a fitted recording, whose person weighs `weight` kg; its series and pictures are written."""
-    trial = one.trial
+    trial = measurement.trial
     folder = plan.output / trial.name
-    stored = read_npz(folder / f"{trial.name}.npz", plan.settings.model)
-    times = safe_npz.read(folder / f"{trial.name}.npz", "times")
+    stored = read_npz(fit.path, plan.settings.model, arrays=fit.arrays)
+    times = fit.arrays["times"]
     bodies, template = stored.vertices, stored.template
-    plates = None if one.plates is None else one.plates.at(times)
+    plates = None if measurement.plates is None else measurement.plates.at(times)
     with progress(f"measuring {trial.name}", len(times)) as step:
-        found = computed(bodies, template, plates, step.to)
-    rows = np.abs(one.tracks.times[:, None] - times).argmin(axis=0)
-    confidence = one.tracks.confidence[rows]
+        measures = computed(bodies, template, plates, step.to)
+    rows = np.abs(measurement.tracks.times[:, None] - times).argmin(axis=0)
+    confidence = measurement.tracks.confidence[rows]
     try:
-        compared = Comparison(
+        compared = MeasuredComparison(
             trial.name,
             times,
-            found,
+            measures,
             plates,
-            None if one.reference is None else one.reference[rows],
+            None if measurement.reference is None else measurement.reference[rows],
             confidence.sum(axis=1) >= FEWEST_POINTS,
             "reference" if trial.com is None else measured.judge(trial.com),
             weight,
         )
     except ValueError as error:
         raise FileError(trial.com or trial.forces or trial.markers, str(error)) from error
-    points = np.where(confidence[..., None] > 0, one.tracks.points[rows], np.nan)
-    files = _drawn(compared, stored, points, told, progress)
+    points = np.where(confidence[..., None] > 0, measurement.tracks.points[rows], np.nan)
+    files = _draw(compared, stored, points, log, progress)
     for name, content in files.items():
         write_whole(folder / name, content)
-    fitted = {"shape_from": fit["shape_from"], "markers": fit["mean_marker_error_m"], "converged": fit["converged"]}
+    how = fit.record
+    fitted = {"shape_from": how["shape_from"], "markers": how["mean_marker_error_m"], "converged": how["converged"]}
     record = {**figures(compared), "body": plan.settings.model, "fit": fitted, "files": sorted(files)}
-    return {**record, "flags": [*dict.fromkeys([*one.flags, *fit["flags"], *record["flags"]])]}
+    return {**record, "flags": [*dict.fromkeys([*measurement.flags, *how["flags"], *record["flags"]])]}
 
 
-def _drawn(
-    compared: Comparison, stored: Any, points: NDArray[np.float64], told: Told, progress: Progress
+def _draw(
+    compared: MeasuredComparison, stored: Any, points: NDArray[np.float64], log: RunLog, progress: Progress
 ) -> dict[str, bytes]:
     """The series and the pictures, by file name; of pictures of which there is nothing to draw, a note."""
     series = report.series(compared)
@@ -319,7 +335,7 @@ def _drawn(
             try:
                 files[name] = draw()
             except (ValueError, ArithmeticError) as error:
-                told.notes.append(f"{compared.name}: {name} left out, it has nothing to show ({error})")
+                log.notes.append(f"{compared.name}: {name} left out, it has nothing to show ({error})")
             step.one()
     return files
 
@@ -327,13 +343,13 @@ def _drawn(
 def write(plan: Plan, records: list[Record], notes: list[str], failures: list[FileError]) -> Path:
     """The page and the numbers of all recordings. Raises OSError."""
     plan.output.mkdir(parents=True, exist_ok=True)
-    drawn = [f"{one['name']}/{name}" for one in records for name in one["files"] if name.endswith(".png")]
-    told = [*notes, *(f"not compared: {failure}" for failure in failures)]
+    drawn = [f"{record['name']}/{name}" for record in records for name in record["files"] if name.endswith(".png")]
+    all_notes = [*notes, *(f"not compared: {failure}" for failure in failures)]
     page = plan.output / "validation.md"
-    write_whole(page, report.markdown(records, plan.folder.resolve().name, told, drawn).encode())
-    shapes = sorted({one["fit"]["shape_from"] for one in records} - {"itself"})
+    write_whole(page, report.markdown(records, plan.folder.resolve().name, all_notes, drawn).encode())
+    shapes = sorted({record["fit"]["shape_from"] for record in records} - {"itself"})
     person = ", ".join(shapes) or None
-    whole = {"folder": str(plan.folder), "body": plan.settings.model, "person": person, "notes": told}
+    whole = {"folder": str(plan.folder), "body": plan.settings.model, "person": person, "notes": all_notes}
     content = json.dumps({**whole, "recordings": records}, allow_nan=False, ensure_ascii=False, indent=1)
     write_whole(plan.output / "validation.json", f"{content}\n".encode())
     return page.resolve()

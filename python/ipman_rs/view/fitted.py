@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ipman_rs.files import being_written
+from ipman_rs.files import atomic_write
 from ipman_rs.study import Fitted
 
 from ..study.camera import Camera
@@ -113,5 +113,5 @@ def write_beside(before: Study, after: Path, camera: Camera, path: Path) -> None
     stream = BytesIO()
     draw_picture(before, 0, stream, camera)
     stream.seek(0)
-    with being_written(path) as file:
+    with atomic_write(path) as file:
         imsave(file, np.hstack([imread(stream), imread(after)]))

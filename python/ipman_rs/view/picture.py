@@ -9,7 +9,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from ipman_rs.files import being_written
+from ipman_rs.files import atomic_write
 
 from ..body.normals import vertex_normals
 from ..study.camera import Camera, look_at
@@ -75,7 +75,7 @@ def save(figure: Figure, path: Path | IO[bytes]) -> None:
         if not isinstance(path, Path):
             figure.savefig(path, dpi=100, format="png")
             return
-        with being_written(path) as file:
+        with atomic_write(path) as file:
             figure.savefig(file, dpi=100, format="png")
 
 

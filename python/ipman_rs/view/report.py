@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from ipman_rs.files import being_written, write_whole
+from ipman_rs.files import atomic_write, safe_names, write_whole
 
 from ..study.study import MAX_LISTED_FRAMES, Study
 from .fitted import draw_fitted
@@ -72,7 +71,7 @@ def _has_timeline(study: Study) -> bool:
 def _write_study(study: Study, folder: Path) -> Iterator[str]:
     # Packing millions of numbers would take longer than finding them.
     save = np.savez_compressed if study.num_frames <= MAX_LISTED_FRAMES else np.savez
-    with being_written(folder / "report.npz") as file:
+    with atomic_write(folder / "report.npz") as file:
         save(file, allow_pickle=False, **study_arrays(study))
     yield "report.npz"
     if study.fitted is not None:
@@ -96,17 +95,3 @@ def _write_fitted(study: Study, folder: Path) -> Iterator[str]:
     if study.fitted is not None and study.fitted.pictured:
         draw_floor_view(study, 0, folder / "floor.png")
         yield "floor.png"
-
-
-def safe_names(names: Sequence[str]) -> list[str]:
-    """File names from any text: letters, digits, dot, dash and underscore, never hidden, never a path, never twice."""
-    taken: set[str] = set()
-    result = []
-    for name in names:
-        base = re.sub(r"[^\w.-]+", "_", name, flags=re.ASCII).strip("._-")[:80] or "body"
-        candidate, number = base, 2
-        while candidate.lower() in taken:
-            candidate, number = f"{base}_{number}", number + 1
-        taken.add(candidate.lower())
-        result.append(candidate)
-    return result

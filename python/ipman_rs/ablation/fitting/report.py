@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.evaluation import Interval, paired
-from ipman_rs.files import being_written, read_json, write_whole
+from ipman_rs.files import atomic_write, read_json, write_whole
 from ipman_rs.files.page_templates import environment
 from ipman_rs.jsonable import jsonable
 
@@ -288,5 +288,5 @@ def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:
     for key, axis in zip(DIFFERENCES, axes[-1], strict=True):
         unit = "points" if "BoSE" in key else "mm"
         axis.set_xlabel(f"{key} against the baseline, {unit}", fontsize=9)
-    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}), being_written(path) as file:
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}), atomic_write(path) as file:
         figure.savefig(file, format="svg", metadata={"Date": None})

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from ipman_rs.files import being_written
+from ipman_rs.files import atomic_write
 
 from ...fitting.config import Config
 from ...fitting.fit import Fit, StageReport, fit
@@ -115,7 +115,7 @@ class Benchmark:
         seconds = (time.process_time() - begun) / task.problem.num_bodies
         reasons = np.array([stage.reasons for stage in found.stages])
         variables: dict[str, Any] = {name: value.numpy() for name, value in found.variables.items()}
-        with being_written(place) as file:
+        with atomic_write(place) as file:
             np.savez(file, seconds=seconds, reasons=reasons, **variables)
 
     def place(self, block: Block, preset: Config) -> Path:

@@ -16,7 +16,7 @@ from trimesh.triangles import closest_point, points_to_barycentric
 import ipman_rs as ip
 import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel, load_body
-from ipman_rs.files import being_written
+from ipman_rs.files import atomic_write
 
 from ...fitting.landmarks import Landmarks, known
 from ...synthetic.at_rest import Scene
@@ -53,7 +53,7 @@ class Truth:
         return cls(**{field.name: np.array([row[field.name] for row in rows]) for field in dataclasses.fields(cls)})
 
     def save(self, path: Path) -> None:
-        with being_written(path) as file:
+        with atomic_write(path) as file:
             np.savez_compressed(file, **vars(self))
 
     @classmethod

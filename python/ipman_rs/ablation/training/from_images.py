@@ -16,7 +16,7 @@ import ipman_rs.data
 import ipman_rs.torch as ipt
 from ipman_rs.body import load_body
 from ipman_rs.data.rendered import Rendered
-from ipman_rs.files import being_written
+from ipman_rs.files import atomic_write
 
 from ...training.augment import Augmenting, normalised
 from ...training.batch import Batch
@@ -184,5 +184,5 @@ def _cut(data: Rendered, cuts: int, progress: Progress | None) -> Batch:
 
 def _save(batch: Batch, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with being_written(path) as file:
+    with atomic_write(path) as file:
         torch.save(vars(batch), file)

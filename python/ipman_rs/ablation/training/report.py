@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files import being_written, write_whole
+from ipman_rs.files import atomic_write, write_whole
 from ipman_rs.files.page_templates import environment
 
 from ...training.metrics import COLUMNS, Figures, columns
@@ -167,7 +167,7 @@ def _plot(blocks: Sequence[dict[str, Any]], path: Path) -> None:
         axis.tick_params(labelsize=8)
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
     fonts = matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "training_benchmark"})
-    with fonts, being_written(path) as file:
+    with fonts, atomic_write(path) as file:
         figure.savefig(file, format="svg", metadata={"Date": None})
 
 

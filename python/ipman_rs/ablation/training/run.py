@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 
 import torch
 
-from ipman_rs.files import being_written
+from ipman_rs.files import atomic_write
 from ipman_rs.presets import get
 from ipman_rs.processes import end_with_parent
 from ipman_rs.torch.threads import one_thread
@@ -89,7 +89,7 @@ class Benchmark:
         place = self._place(job)
         if place.exists():
             return
-        with one_thread(), being_written(place) as file:
+        with one_thread(), atomic_write(place) as file:
             if job.tilt is None:
                 assert self.plan.first
                 self.task.see(job.seed, self.plan.first, file)

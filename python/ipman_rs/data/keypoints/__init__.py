@@ -1,4 +1,4 @@
-"""Files of 2D keypoints, one format a file. A new one is a file with NAMES, `matches` and `images`, and one line here.
+"""Files of 2D keypoints, one format a file. A new one is a file with a `KeypointFormat`, and one line here.
 
 detections = keypoints.read("person.json")       # what format it is, its content says
 """
@@ -8,30 +8,36 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from ipman_rs.files import read_json
-
-from ..judge import RELATIVE
-from . import coco, coco_wholebody, mediapipe, mmpose, openpose
+from .coco import COCO
+from .coco_wholebody import COCO_WHOLEBODY
 from .detections import Array, Detections
+from .keypoint_format import KeypointFormat
 from .layouts import Layout
+from .mediapipe import MEDIAPIPE
+from .mmpose import MMPOSE
+from .openpose import OPENPOSE
 from .people import Image, Person, choose, confidences, presence, width_height
 
-FORMATS: dict[str, ModuleType] = {
-    "openpose": openpose,
-    "mmpose": mmpose,
-    "coco-wholebody": coco_wholebody,
-    "coco": coco,
-    "mediapipe": mediapipe,
+FORMATS: dict[str, KeypointFormat] = {
+    "openpose": OPENPOSE,
+    "mmpose": MMPOSE,
+    "coco-wholebody": COCO_WHOLEBODY,
+    "coco": COCO,
+    "mediapipe": MEDIAPIPE,
 }
 
-__all__ = ["FORMATS", "read"]
+__all__ = ["FORMATS", "read", "suffixes"]
 
 Row = tuple[Image, Person]
+
+
+def suffixes() -> tuple[str, ...]:
+    """How the names of keypoint files end: `.json` and those of other formats."""
+    return tuple(dict.fromkeys(suffix for format in FORMATS.values() for suffix in format.suffixes))
 
 
 def read(
@@ -50,13 +56,12 @@ def read(
     """
     source = str(path)
     given = None if image_size is None else width_height(image_size, source)
-    content = _load(Path(path))
-    reader = _reader(content, format, source)
-    images: list[Image] = reader.images(content, source)
+    reader, content = _opened(Path(path), format)
+    images = reader.images(content, source)
     notes = confidences(images)
     rows, told = _rows(images, person, source)
     sizes, other = _sizes([image for image, _ in rows], given, source)
-    points, scaled = _pixels([one.points for _, one in rows], sizes, reader, source)
+    points, scaled = reader.pixels([one.points for _, one in rows], sizes, source)
     worlds = [one.world for _, one in rows if one.world is not None]
     if worlds and len(worlds) < len(rows):
         notes.append(f"not used: world landmarks, which {len(rows) - len(worlds)} of {len(rows)} images lack")
@@ -77,23 +82,25 @@ def read(
     )
 
 
-def _load(path: Path) -> Any:
-    return read_json(path)
-
-
-def _reader(content: Any, format: str | None, source: str) -> ModuleType:
-    """The format asked for, or the one that the content looks like."""
-    if format is not None:
-        if format not in FORMATS:
-            raise ValueError(f"format: expected one of {', '.join(FORMATS)}, got {format!r}")
-        if not FORMATS[format].matches(content):
-            raise ValueError(f"{source}: expected the format {format}, got something else")
-        return FORMATS[format]
-    for reader in FORMATS.values():
-        if reader.matches(content):
-            return reader
+def _opened(path: Path, name: str | None) -> tuple[KeypointFormat, Any]:
+    """The format asked for, or that which the file's ending and content look like; and the content."""
+    if name is not None:
+        if name not in FORMATS:
+            raise ValueError(f"format: expected one of {', '.join(FORMATS)}, got {name!r}")
+        content = FORMATS[name].load(path)
+        if not FORMATS[name].matches(content):
+            raise ValueError(f"{path}: expected the format {name}, got something else")
+        return FORMATS[name], content
+    suffix = path.suffix.lower() if path.suffix.lower() in suffixes() else ".json"
+    content, loaded_by = None, None
+    for format in FORMATS.values():
+        if suffix in format.suffixes:
+            if format.load is not loaded_by:
+                content, loaded_by = format.load(path), format.load
+            if format.matches(content):
+                return format, content
     got = f"an object with {', '.join(content)[:80] or 'nothing'}" if isinstance(content, dict) else "another content"
-    raise ValueError(f"{source}: expected keypoints in one of the formats {', '.join(FORMATS)}, got {got}")
+    raise ValueError(f"{path}: expected keypoints in one of the formats {', '.join(FORMATS)}, got {got}")
 
 
 def _rows(images: Sequence[Image], person: int | None, source: str) -> tuple[list[Row], list[str]]:
@@ -168,32 +175,6 @@ def _sizes(
     said = " and ".join(f"{width:g} × {height:g}" for width, height in sorted(known - {given})[:3])
     other = f"the file says that its image has {said} pixels; {given[0]:g} × {given[1]:g} were given"
     return [given] * len(images), [other] if said else []
-
-
-def _pixels(
-    people: Sequence[Array], sizes: Sequence[tuple[float, float] | None], reader: ModuleType, source: str
-) -> tuple[list[Array], list[str]]:
-    """Points (K, 3) in pixels, scaled where they are relative to the image. ValueError where its size is not known."""
-    everyone = np.concatenate(people)
-    if not _is_relative(everyone):
-        return list(people), []
-    seen = everyone[everyone[:, 2] > 0, :2]
-    look = f"points of {seen.min():.3g} to {seen.max():.3g} look relative to the image"
-    if None in sizes:
-        raise ValueError(f"{source}: image_size: {look} and need it, got none")
-    of, between = reader.shares(everyone) if reader is openpose else (everyone, "0 to 1")
-    each = np.split(of, np.cumsum([len(points) for points in people])[:-1])
-    scaled = [points * np.array([*(size or ()), 1.0]) for points, size in zip(each, sizes, strict=True)]
-    if reader is mediapipe:
-        return scaled, []
-    first = sizes[0] or (0, 0)
-    return scaled, [f"{look}: taken as {between} of its {first[0]:g} × {first[1]:g} pixels"]
-
-
-def _is_relative(points: Array) -> bool:
-    """Whether the x and y of points (K, 3) are shares of the image's width and height."""
-    seen = points[points[:, 2] > 0.5] if (points[:, 2] > 0.5).any() else points[points[:, 2] > 0]
-    return bool((abs(seen[:, :2]) <= RELATIVE).all() and np.ptp(seen[:, :2]) > 0)
 
 
 def _assumed(images: Sequence[Image]) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from . import coco
 from .coco import images
+from .keypoint_format import KeypointFormat
 from .layouts import COCO_WHOLEBODY_133
 
 NAMES = COCO_WHOLEBODY_133
@@ -27,3 +28,6 @@ def _count(keypoints: Any) -> int:
         return 0
     flat = not (keypoints and isinstance(keypoints[0], (list, dict)))
     return len(keypoints) // 3 if flat else len(keypoints)
+
+
+COCO_WHOLEBODY = KeypointFormat(NAMES, matches, images)

@@ -13,7 +13,7 @@ relative where no visible one is beyond ±3. Relative ones need an image size, i
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,9 @@ import numpy as np
 
 from ipman_rs.files import write_whole
 
+from .keypoint_format import KeypointFormat, Pixels, Sizes, relative_to_pixels
 from .layouts import MEDIAPIPE_33
-from .people import Array, Image, Person, numbers, plain, scored, size_of, width_height
+from .people import Array, Image, Person, check_scores, numbers, short_label, size_of, width_height
 
 NAMES = MEDIAPIPE_33
 
@@ -46,12 +47,12 @@ def images(content: Any, source: str) -> list[Image]:
     """A row for each image of the file."""
     frames = _frames(content)
     size = _size(content, source) if isinstance(content, dict) else None
-    found = []
+    pictures = []
     for index, frame in enumerate(frames):
         place = source if len(frames) == 1 else f"{source}: frame {index}"
-        given = {"landmarks": frame} if isinstance(frame, list) else frame or {}
-        found.append(Image(place, _people(given, place), _size(given, place) or size))
-    return found
+        entry = {"landmarks": frame} if isinstance(frame, list) else frame or {}
+        pictures.append(Image(place, _people(entry, place), _size(entry, place) or size))
+    return pictures
 
 
 def _frames(content: Any) -> list[Any]:
@@ -93,7 +94,7 @@ def _size(given: dict[str, Any], place: str) -> tuple[float, float] | None:
     if isinstance(size, (dict, list)):
         return size_of(size, place) if isinstance(size, dict) else width_height(size, place)
     if size is not None:
-        raise ValueError(f"{place}: image_size: expected width and height, got {plain(size)}")
+        raise ValueError(f"{place}: image_size: expected width and height, got {short_label(size)}")
     return size_of(given, place)
 
 
@@ -158,7 +159,7 @@ def _points(points: Any, place: str) -> tuple[Array, tuple[str, ...]]:
 
 def _visible(four: Array, place: str) -> Array:
     """Points (33, 4) whose visibility can be one. ValueError for others."""
-    scored(four[:, 1:], place)
+    check_scores(four[:, 1:], place)
     return four
 
 
@@ -197,3 +198,11 @@ def write(path: str | Path, image: str, size: tuple[int, int], landmarks: Array,
         "world_landmarks": world.round(6).tolist(),
     }
     write_whole(path, json.dumps(content, indent=1) + "\n")
+
+
+def _pixels(people: Sequence[Array], sizes: Sizes, source: str) -> Pixels:
+    """That landmarks are relative to the image is the format, and needs no note."""
+    return relative_to_pixels(people, sizes, source)[0], []
+
+
+MEDIAPIPE = KeypointFormat(NAMES, matches, images, pixels=_pixels)

@@ -11,7 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 from . import coco
-from .people import Image, each, plain
+from .keypoint_format import KeypointFormat
+from .people import Image, read_people, short_label
 
 NAMES = coco.NAMES
 AROUND = ("instance_info", "predictions", "frames")
@@ -24,13 +25,13 @@ def matches(content: Any) -> bool:
 def images(content: Any, source: str) -> list[Image]:
     if isinstance(content, dict):
         _check_names(content.get("meta_info"), source)
-    found = []
+    pictures = []
     for label, people in _frames(content) or []:
-        place = source if label is None else f"{source}: frame {plain(label)}"
+        place = source if label is None else f"{source}: frame {short_label(label)}"
         if people is not None and not isinstance(people, list):
             raise ValueError(f"{place}: instances: expected a list, got {type(people).__name__}")
-        found.append(Image(place, each(people or [], coco.person, f"{place}: instances")))
-    return found or [Image(source, [])]
+        pictures.append(Image(place, read_people(people or [], coco.person, f"{place}: instances")))
+    return pictures or [Image(source, [])]
 
 
 def _frames(content: Any) -> list[tuple[Any, Any]] | None:
@@ -58,4 +59,7 @@ def _check_names(meta: Any, source: str) -> None:
     """ValueError if the file says that its points are others than COCO's: 17 may be those of Human3.6M."""
     names = meta.get("keypoint_id2name") if isinstance(meta, dict) else None
     if isinstance(names, dict) and "0" in names:
-        coco.named(list(names.values()), f"{source}: meta_info")
+        coco.check_first_name(list(names.values()), f"{source}: meta_info")
+
+
+MMPOSE = KeypointFormat(NAMES, matches, images)

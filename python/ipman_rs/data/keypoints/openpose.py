@@ -9,6 +9,7 @@ be pixels, or relative to the image: 0 to 1 or -1 to 1 (OpenPose's --keypoint_sc
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from ..judge import RELATIVE
 from . import layouts
 from .hand import hand
+from .keypoint_format import KeypointFormat, relative_to_pixels
 from .layouts import BODY_25 as BODY_25
 from .layouts import Layout
 from .people import (
@@ -24,12 +26,12 @@ from .people import (
     Image,
     Person,
     array,
-    counts,
-    each,
-    finite,
-    not_found,
+    check_scores,
+    expected_counts,
+    finite_points,
+    mark_not_found,
     numbers,
-    scored,
+    read_people,
     size_of,
     track_of,
 )
@@ -60,8 +62,8 @@ def shares(points: Array) -> tuple[Array, str]:
 
     OpenPose finds nothing outside the image, so a number below 0 says that -1 is its left or upper end.
     """
-    seen = points[:, 2] > 0
-    if points[seen, :2].min(initial=0.0) < 0 or (points[~seen, :2] == -1).all(axis=1).any():
+    visible = points[:, 2] > 0
+    if points[visible, :2].min(initial=0.0) < 0 or (points[~visible, :2] == -1).all(axis=1).any():
         return np.column_stack([(points[:, :2] + 1) / 2, points[:, 2]]), "-1 to 1"
     return points, "0 to 1"
 
@@ -84,7 +86,7 @@ def _image(content: dict[str, Any], place: str) -> Image:
     people = content[key]
     if not isinstance(people, list):
         raise ValueError(f"{place}: {key}: expected a list, got {type(people).__name__}")
-    return Image(place, each(people, _person, f"{place}: {key}"), size_of(content, place))
+    return Image(place, read_people(people, _person, f"{place}: {key}"), size_of(content, place))
 
 
 def _person(person: Any, place: str) -> Person:
@@ -100,8 +102,8 @@ def _person(person: Any, place: str) -> Person:
     unused = tuple(name for name in person if "keypoints" in name and name not in read and person[name])
     whole = np.concatenate(parts)
     of_pixels = bool((abs(whole[:, :2]) > RELATIVE).any())  # 0, 0 is the middle of an image from -1 to 1
-    points, notes = not_found(whole, NOWHERE if of_pixels else NOWHERE[1:])
-    points = scored(points, place)
+    points, notes = mark_not_found(whole, NOWHERE if of_pixels else NOWHERE[1:])
+    points = check_scores(points, place)
     return Person((*names, *NAMES[25:]), points, track=track_of(person.get("person_id")), notes=notes, unused=unused)
 
 
@@ -111,5 +113,8 @@ def _body(given: Any, place: str) -> tuple[Layout, Array]:
     count = points.size // 3
     if count not in LAYOUTS or points.shape not in ((count * 3,), (count, 3)):
         got = "none" if points.size == 0 else f"{points.size / 3:g}"
-        raise ValueError(f"{place}: expected {counts(LAYOUTS)} points of 3 numbers, got {got}")
-    return LAYOUTS[count][1], finite(points.reshape(count, 3), place)
+        raise ValueError(f"{place}: expected {expected_counts(LAYOUTS)} points of 3 numbers, got {got}")
+    return LAYOUTS[count][1], finite_points(points.reshape(count, 3), place)
+
+
+OPENPOSE = KeypointFormat(NAMES, matches, images, pixels=partial(relative_to_pixels, shares=shares))

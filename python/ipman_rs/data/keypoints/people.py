@@ -1,4 +1,4 @@
-"""What the readers of keypoint files share: people in images, and numbers that are checked one by one."""
+"""What the readers of keypoint files share: people in images, and checks of their numbers."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Person:
     world: Array | None = None  # (K, 4): x, y, z in metres and confidence
     track: int | str | None = None  # which person over time, where the file says
     notes: tuple[str, ...] = ()  # what was assumed
-    unused: tuple[str, ...] = ()  # what the file has and nobody reads
+    unused: tuple[str, ...] = ()  # entries of the file that are not read
 
 
 @dataclass
 class Image:
-    """The people found in one image; in the place of a person that cannot be used, why not."""
+    """The people found in one image; in place of an unusable person, the reason."""
 
     source: str
     people: list[Person | str]
@@ -50,47 +50,47 @@ class Image:
         return {index: each for index, each in enumerate(self.people) if isinstance(each, Person)}
 
 
-def each(entries: Sequence[Any], person: Callable[[Any, str], Person], place: str) -> list[Person | str]:
+def read_people(entries: Sequence[Any], person: Callable[[Any, str], Person], place: str) -> list[Person | str]:
     """The people of these entries, each read on its own: what is wrong with one says nothing about the others."""
-    found: list[Person | str] = []
+    people: list[Person | str] = []
     for index, entry in enumerate(entries):
         try:
-            found.append(person(entry, f"{place}[{index}]"))
+            people.append(person(entry, f"{place}[{index}]"))
         except ValueError as error:
-            found.append(str(error))
-    return found
+            people.append(str(error))
+    return people
 
 
 def array(value: Any, place: str) -> Array:
     """`value` as numbers, without leading axes of length 1; null is NaN. ValueError, naming the place."""
     try:
-        found = np.array(value, dtype=np.float64)
+        values = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{place}: expected numbers, got something else among them") from None
-    while found.ndim > 2 and found.shape[0] == 1:
-        found = found[0]
-    return found
+    while values.ndim > 2 and values.shape[0] == 1:
+        values = values[0]
+    return values
 
 
 def numbers(value: Any, rows: int, columns: int, place: str) -> Array:
     """`value`, flat or nested, as an array (rows, columns). ValueError, naming the place, for anything else."""
-    found = array(value, place)
-    if found.shape not in ((rows * columns,), (rows, columns)):
-        raise ValueError(f"{place}: expected {rows} points of {columns} numbers, got {_shape(found)}")
-    return finite(found.reshape(rows, columns), place)
+    values = array(value, place)
+    if values.shape not in ((rows * columns,), (rows, columns)):
+        raise ValueError(f"{place}: expected {rows} points of {columns} numbers, got {_shape(values)}")
+    return finite_points(values.reshape(rows, columns), place)
 
 
-def _shape(found: Array) -> str:
-    return "none" if found.size == 0 else f"shape {found.shape}"
+def _shape(values: Array) -> str:
+    return "none" if values.size == 0 else f"shape {values.shape}"
 
 
-def counts(layouts: Mapping[int, tuple[str, Layout]]) -> str:
+def expected_counts(layouts: Mapping[int, tuple[str, Layout]]) -> str:
     """How many points a person may have, for errors."""
-    said = [f"{count} ({name})" for count, (name, _) in layouts.items()]
-    return f"{', '.join(said[:-1])} or {said[-1]}"
+    options = [f"{count} ({name})" for count, (name, _) in layouts.items()]
+    return f"{', '.join(options[:-1])} or {options[-1]}"
 
 
-def finite(points: Array, place: str) -> Array:
+def finite_points(points: Array, place: str) -> Array:
     """Points (K, C) of finite numbers, or of none at all: without x and y a point is NaN. ValueError for others."""
     missing = np.isnan(points[:, 0]) & np.isnan(points[:, 1])
     wrong = np.argwhere(~np.isfinite(points) & ~missing[:, None])
@@ -104,7 +104,7 @@ def finite(points: Array, place: str) -> Array:
     return points
 
 
-def not_found(points: Array, places: Sequence[float] = NOWHERE) -> tuple[Array, tuple[str, ...]]:
+def mark_not_found(points: Array, places: Sequence[float] = NOWHERE) -> tuple[Array, tuple[str, ...]]:
     """Points (K, 3), those with the score 0 that lie exactly where programs put what they did not find; and a note of
     each such place."""
     points, notes = points.copy(), []
@@ -116,7 +116,7 @@ def not_found(points: Array, places: Sequence[float] = NOWHERE) -> tuple[Array, 
     return points, tuple(notes)
 
 
-def scored(points: Array, place: str) -> Array:
+def check_scores(points: Array, place: str) -> Array:
     """Points (K, 3) whose third number can be a score. ValueError for others."""
     scores = points[~np.isnan(points[:, 2]), 2]
     if not len(scores):
@@ -142,11 +142,11 @@ def confidences(images: Sequence[Image]) -> list[str]:
     return [*notes, f"scores up to {most:.3g} cut off at 1"] if most > 1.005 else notes
 
 
-def size_of(given: Mapping[str, Any], place: str) -> tuple[float, float] | None:
+def size_of(record: Mapping[str, Any], place: str) -> tuple[float, float] | None:
     """Width and height of an image, where a file has them under one of their usual names. ValueError for no numbers."""
     for pair in SIZES:
-        if all(given.get(name) is not None for name in pair):
-            return width_height([given[name] for name in pair], place)
+        if all(record.get(name) is not None for name in pair):
+            return width_height([record[name] for name in pair], place)
     return None
 
 
@@ -158,7 +158,7 @@ def width_height(value: Any, place: str) -> tuple[float, float]:
     return width, height
 
 
-def plain(value: Any) -> str:
+def short_label(value: Any) -> str:
     """What a file says, for labels and errors: lists and objects, which may be deep, only by what they are."""
     return str(value)[:80] if isinstance(value, (str, int, float)) else type(value).__name__
 
@@ -184,15 +184,15 @@ def choose(image: Image, person: int | None) -> tuple[Person, str | None]:
     if person is not None and not 0 <= person < len(people):
         raise ValueError(f"person: expected 0 to {len(people) - 1} in {place}, got {person}")
     usable = image.usable if person is None else {person: people[person]}
-    seen = {index: one for index, one in usable.items() if isinstance(one, Person) and (one.points[:, 2] > 0).any()}
-    if not seen:
+    visible = {index: one for index, one in usable.items() if isinstance(one, Person) and (one.points[:, 2] > 0).any()}
+    if not visible:
         raise ValueError(_nobody(image, person))
-    index = max(seen, key=lambda number: presence(seen[number].points))
+    index = max(visible, key=lambda number: presence(visible[number].points))
     if person is not None or len(people) == 1:
-        return seen[index], None
+        return visible[index], None
     faults = [f"{number} ({_short(one, place)})" for number, one in enumerate(people) if isinstance(one, str)]
     note = f"{place}: {len(people)} people; took number {index}, the largest and most confident"
-    return seen[index], note + (f"; cannot be used: {', '.join(faults)}" if faults else "")
+    return visible[index], note + (f"; cannot be used: {', '.join(faults)}" if faults else "")
 
 
 def _nobody(image: Image, person: int | None) -> str:
@@ -210,7 +210,7 @@ def _short(fault: str, place: str) -> str:
 
 def presence(points: Array) -> float:
     """How large a person is in the image, times how surely they were seen."""
-    seen = points[points[:, 2] > 0]
-    if len(seen) == 0:
+    visible = points[points[:, 2] > 0]
+    if len(visible) == 0:
         return 0.0
-    return float(np.linalg.norm(np.ptp(seen[:, :2], axis=0)) * points[:, 2].mean())
+    return float(np.linalg.norm(np.ptp(visible[:, :2], axis=0)) * points[:, 2].mean())

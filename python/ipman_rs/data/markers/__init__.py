@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ipman_rs.body import BodyModel
 from ipman_rs.data import c3d, trc
-from ipman_rs.data.tracks import Tracks, turned
+from ipman_rs.data.tracks import Tracks, turn_up
 
 from ...body.landmarks import SIDES
 from ...body.sites import Inner, Point, Site
@@ -45,7 +45,7 @@ def read(
         raise ValueError(f"{path}: expected a file of markers ({', '.join(READERS)}), got {suffix or 'no ending'}")
     if up is None or isinstance(up, str):
         return READERS[suffix](Path(path), up, subject, unit, rate)
-    return turned(READERS[suffix](Path(path), "y", subject, unit, rate), up)
+    return turn_up(READERS[suffix](Path(path), "y", subject, unit, rate), up)
 
 
 def sites(

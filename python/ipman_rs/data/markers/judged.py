@@ -1,4 +1,4 @@
-"""What the judge of all doors (`ipman_rs.data.judge`) asks of a recording of markers."""
+"""Plausibility checks of recorded markers, with the limits of `ipman_rs.data.judge`."""
 
 from __future__ import annotations
 
@@ -71,70 +71,70 @@ def _without_side(name: str) -> str:
     return name.removeprefix("left_").removeprefix("right_")
 
 
-def of_tracks(
+def check_tracks(
     tracks: Tracks,
     own: Mapping[str, Meaning | None] | None = None,
     up_is_said: bool = False,
     ground: float | None = None,
 ) -> list[Finding]:
-    """What the judge of all doors says of a recording before its fit: names, coverage, size, place, stance, rate; and
-    where the floor is said to be at y = `ground` m, whether the markers are above it."""
-    seen, _ = seen_names(tracks)
-    meant = meanings_of(seen, own)
-    unknown = [name for name in seen if name not in meant]
-    found = judge.known_markers([*meant], unknown, FEWEST_POINTS) + of_rate(tracks)
+    """Findings about a recording before its fit: names, coverage, size, place, stance, rate; and, with a floor at y =
+    `ground` m, whether the markers are above it."""
+    names, _ = seen_names(tracks)
+    meant = meanings_of(names, own)
+    unknown = [name for name in names if name not in meant]
+    findings = judge.known_markers([*meant], unknown, FEWEST_POINTS) + check_rate(tracks)
     if not meant:
-        return found
-    placed = of_points(tracks, meant, up_is_said)
+        return findings
+    placed = check_points(tracks, meant, up_is_said)
     if ground is not None and not any(each.level == "wrong" for each in placed):
-        placed += of_floor(tracks, meant, ground)
-    return found + coverage([*meant], meant) + placed
+        placed += check_floor(tracks, meant, ground)
+    return findings + check_coverage([*meant], meant) + placed
 
 
 def seen_names(tracks: Tracks) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The markers that were ever seen, and those that are only in the file."""
-    seen = tracks.confidence.any(axis=0)
-    return tuple(np.array(tracks.names)[seen].tolist()), tuple(np.array(tracks.names)[~seen].tolist())
+    visible = tracks.confidence.any(axis=0)
+    return tuple(np.array(tracks.names)[visible].tolist()), tuple(np.array(tracks.names)[~visible].tolist())
 
 
-def of_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool = False) -> list[Finding]:
+def check_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool = False) -> list[Finding]:
     """Size, place and stance of the markers whose places are known; `up_is_said`: by the user, who knows.
 
     Axes are the file's own: option `--up` names them.
     """
     known = tracks.select([name for name in tracks.names if name in meanings])
-    rows = rows_to_judge(known)
+    rows = sampled_rows(known)
     points = np.where(known.confidence[rows, :, None] > 0, known.points[rows], np.nan)
     if not len(points):
         return []
-    found = of_size(points, known.unit)
-    if any(each.level == "wrong" for each in found):
-        return found
+    findings = check_size(points, known.unit)
+    if any(each.level == "wrong" for each in findings):
+        return findings
     with np.errstate(invalid="ignore"):
-        found += judge.far("markers", points[np.isfinite(points).all(axis=-1)])
+        findings += judge.far("markers", points[np.isfinite(points).all(axis=-1)])
     rotation = TO_Y_UP[tracks.up]
-    up = ways(points @ rotation, known, meanings)
-    found += sides(points, known, meanings)
-    return found + ([] if up_is_said else check.upright("markers", up, Ground(rotation[1])))
+    up = feet_to_head(points @ rotation, known, meanings)
+    findings += check_sides(points, known, meanings)
+    return findings + ([] if up_is_said else check.upright("markers", up, Ground(rotation[1])))
 
 
-def of_size(points: Array, unit: float) -> list[Finding]:
+def check_size(points: Array, unit: float) -> list[Finding]:
     """Whether points (T, M, 3) m of a person can be, that were given in units of so many metres."""
-    found = check.size_of_body("markers", points)
-    if not any(each.level == "wrong" for each in found):
-        return found
+    findings = check.size_of_body("markers", points)
+    if not any(each.level == "wrong" for each in findings):
+        return findings
     fits = [each for each in check.units_of(check.extent_of(points) / unit) if each[2] != unit]
     if not fits:
-        return [Finding("wrong", found[0].what, option="--units UNIT")]
-    said = found[0].what.rpartition(": ")[2]
+        return [Finding("wrong", findings[0].what, option="--units UNIT")]
+    message = findings[0].what.rpartition(": ")[2]
     option = " or ".join(f"--units {option}" for _, option, _ in fits)
-    return [Finding("wrong", f"markers: {said}, if the file's unit is right", option=option)]
+    return [Finding("wrong", f"markers: {message}, if the file's unit is right", option=option)]
 
 
-def of_floor(tracks: Tracks, meanings: Mapping[str, Meaning], ground: float = 0.0) -> list[Finding]:
+def check_floor(tracks: Tracks, meanings: Mapping[str, Meaning], ground: float = 0.0) -> list[Finding]:
     """Whether the lowest marker of each frame is not below a floor at y = `ground` m."""
     known = tracks.select([name for name in tracks.names if name in meanings])
-    rows = rows_to_judge(known)
+    rows = sampled_rows(known)
     if not len(rows):
         return []
     heights = np.where(known.confidence[rows] > 0, known.points[rows, :, 1], np.inf).min(axis=1) - ground
@@ -142,21 +142,21 @@ def of_floor(tracks: Tracks, meanings: Mapping[str, Meaning], ground: float = 0.
     middle = float(np.median(heights)) if len(heights) else 0.0
     if middle >= -BELOW:
         return []
-    said = f"the lowest markers are {-middle:.2f} m below the floor in the median"
-    return [Finding("odd", said, option="--ground HEIGHT")]
+    message = f"the lowest markers are {-middle:.2f} m below the floor in the median"
+    return [Finding("odd", message, option="--ground HEIGHT")]
 
 
-def of_rate(tracks: Tracks) -> list[Finding]:
+def check_rate(tracks: Tracks) -> list[Finding]:
     return judge.rate(tracks.rate) if len(tracks) > 1 else []
 
 
-def rows_to_judge(tracks: Tracks) -> NDArray[np.int64]:
+def sampled_rows(tracks: Tracks) -> NDArray[np.int64]:
     """Frames in which something was seen, a few hundred of them."""
-    seen = np.flatnonzero(tracks.confidence.any(axis=1))
-    return seen[check.evenly(len(seen))]
+    visible = np.flatnonzero(tracks.confidence.any(axis=1))
+    return visible[check.evenly(len(visible))]
 
 
-def ways(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> Array:
+def feet_to_head(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> Array:
     """From the feet, or the legs, to the head, the trunk or the pelvis: (T, 3), NaN where neither was seen."""
     places = [meanings[name] for name in tracks.names]
     regions = np.array([region(place) for place in places])
@@ -169,19 +169,19 @@ def ways(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> Arra
     return _mean(points[:, upper]) - _mean(points[:, lower])
 
 
-def sides(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> list[Finding]:
+def check_sides(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) -> list[Finding]:
     """Whether what is called left in points (T, M, 3) is on the left of those who face as their front and back say.
 
     In their own axes, so whichever way they stand or lie.
     """
     places = [place if isinstance(place, str) else "" for place in (meanings[name] for name in tracks.names)]
-    up = ways(points, tracks, meanings)
+    up = feet_to_head(points, tracks, meanings)
     turned = {part: _handedness(points, places, up, *words) for part, words in FACING.items()}
-    known = {part: sign for part, sign in turned.items() if sign}
-    swapped = [part for part, sign in known.items() if sign < 0]
+    signs = {part: sign for part, sign in turned.items() if sign}
+    swapped = [part for part, sign in signs.items() if sign < 0]
     if not swapped:
         return []
-    sure = len(swapped) == len(known) and (len(swapped) > 1 or "pelvis" in swapped)
+    sure = len(swapped) == len(signs) and (len(swapped) > 1 or "pelvis" in swapped)
     advice = "are names exchanged (--markers FILE gives others), or axes mirrored?"
     return [Finding("wrong" if sure else "odd", f"left and right look swapped of {' and '.join(swapped)}", advice)]
 
@@ -208,13 +208,13 @@ def _mean(points: Array) -> Array:
         return np.where(known, points, 0).sum(axis=1) / known.sum(axis=1)
 
 
-def coverage(known: Sequence[str], meanings: Mapping[str, Meaning]) -> list[Finding]:
-    """What the markers that were seen do not say of the body."""
-    seen = {region(meanings[name]) for name in known}
-    if not seen & {"head", "trunk", "arms"}:
-        said = "no marker above the pelvis was ever seen: trunk, arms, mass and centre of mass are the body's mean"
-        return [Finding("odd", said)]
-    lacking = [part for part in ("head", "trunk", "arms", "pelvis", "legs") if part not in seen]
+def check_coverage(known: Sequence[str], meanings: Mapping[str, Meaning]) -> list[Finding]:
+    """Findings about parts of the body without a marker that was seen."""
+    regions = {region(meanings[name]) for name in known}
+    if not regions & {"head", "trunk", "arms"}:
+        message = "no marker above the pelvis was ever seen: trunk, arms, mass and centre of mass are the body's mean"
+        return [Finding("odd", message)]
+    lacking = [part for part in ("head", "trunk", "arms", "pelvis", "legs") if part not in regions]
     if "head" in lacking and len(lacking) == 1:
         return []
     if not lacking:
@@ -223,12 +223,12 @@ def coverage(known: Sequence[str], meanings: Mapping[str, Meaning]) -> list[Find
     return [Finding("odd", f"no marker on {parts} was ever seen: there the body's mean is shown")]
 
 
-def of_skin(distances: Mapping[str, float]) -> list[Finding]:
+def check_skin(distances: Mapping[str, float]) -> list[Finding]:
     """Markers that are not on the skin of the fitted body: distances in metres, by name."""
     off = {name: away for name, away in distances.items() if not SKIN[0] <= away <= SKIN[1]}
     if not off:
         return []
     worst = sorted(off, key=lambda name: -abs(off[name] - 0.01))
-    said = ", ".join(f"{name} {1e3 * off[name]:+.0f} mm" for name in worst[:6]) + (", …" if len(off) > 6 else "")
-    what = f"{len(off)} of {len(distances)} markers are not on the skin of the fitted body ({said}; 7 to 15 is usual)"
+    listed = ", ".join(f"{name} {1e3 * off[name]:+.0f} mm" for name in worst[:6]) + (", …" if len(off) > 6 else "")
+    what = f"{len(off)} of {len(distances)} markers are not on the skin of the fitted body ({listed}; 7 to 15 is usual)"
     return [Finding("odd", what, "are they where their names say? (--markers)")]

@@ -11,7 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
-from ipman_rs.data.tracks import letters
+from ipman_rs.data.tracks import alphanumeric
 
 from ...body.sites import FEWEST_POINTS
 from .aliases import KEYPOINTS
@@ -32,7 +32,7 @@ TELLING = {
 }  # fmt: skip
 
 
-def plain(name: str) -> str:
+def comparable(name: str) -> str:
     """A marker's name for comparison: small letters and digits, without the subject, its side first, as `l` or `r`."""
     words = [word.lower() for word in re.split(r"[\W_]+", name.rpartition(":")[2]) if word]
     if len(words) > 1 and words[-1] in SIDES and words[0] not in SIDES:
@@ -46,8 +46,8 @@ def plain(name: str) -> str:
     return joined
 
 
-_KNOWN: dict[str, Meaning] = {plain(name): meaning for name, meaning in MARKERS.items()}
-_KEYPOINTS: dict[str, Meaning] = {plain(name): meaning for name, meaning in KEYPOINTS.items()}
+_KNOWN: dict[str, Meaning] = {comparable(name): meaning for name, meaning in MARKERS.items()}
+_KEYPOINTS: dict[str, Meaning] = {comparable(name): meaning for name, meaning in KEYPOINTS.items()}
 
 
 def meanings(names: Sequence[str], own: Mapping[str, Meaning | None] | None = None) -> dict[str, Meaning]:
@@ -57,40 +57,40 @@ def meanings(names: Sequence[str], own: Mapping[str, Meaning | None] | None = No
     the same one, the one that needed the least taken away counts. Files of keypoints, which name the hips, mean joints
     by "RKnee".
     """
-    given = {plain(name): meaning for name, meaning in (own or {}).items()}
+    own_meanings = {comparable(name): meaning for name, meaning in (own or {}).items()}
     ends = _shared_ends(names)
     ways = [_variants(name, ends) for name in names]
-    points = {"lhip", "rhip"} <= {plain(name) for name in names}
-    found = _found(names, ways, given, _KNOWN, skipped=_KEYPOINTS if points else {})
-    if points and len(found) < FEWEST_POINTS:  # with as many markers, keypoints in the file are not needed
-        return _found(names, ways, given, _KEYPOINTS, skipped={})
-    return found
+    points = {"lhip", "rhip"} <= {comparable(name) for name in names}
+    matches = _match(names, ways, own_meanings, _KNOWN, skipped=_KEYPOINTS if points else {})
+    if points and len(matches) < FEWEST_POINTS:  # with as many markers, keypoints in the file are not needed
+        return _match(names, ways, own_meanings, _KEYPOINTS, skipped={})
+    return matches
 
 
-def _found(
+def _match(
     names: Sequence[str],
     ways: Sequence[Sequence[str]],
-    given: Mapping[str, Meaning | None],
+    own: Mapping[str, Meaning | None],
     known: Mapping[str, Meaning],
     skipped: Mapping[str, Meaning],
 ) -> dict[str, Meaning]:
     taken: dict[str, tuple[int, str]] = {}  # by comparable name: how much was taken away, and from which marker
     for name, variants in zip(names, ways, strict=True):
         for steps, variant in enumerate(variants):
-            key = plain(variant)
-            if (key in given or key in known) and not (steps == 0 and key in skipped and key not in given):
+            key = comparable(variant)
+            if (key in own or key in known) and not (steps == 0 and key in skipped and key not in own):
                 if key not in taken or steps < taken[key][0]:
                     taken[key] = steps, name
                 break
-    meant = {name: given.get(key, known.get(key)) for key, (_, name) in taken.items()}
+    meant = {name: own.get(key, known.get(key)) for key, (_, name) in taken.items()}
     return {name: meaning for name in names if (meaning := meant.get(name)) is not None}
 
 
 def unmatched(names: Sequence[str], own: Iterable[str]) -> list[str]:
     """Which of a user's `own` names are those of no marker of a file, as `meanings` compares them."""
     ends = _shared_ends(names)
-    known = {plain(variant) for name in names for variant in _variants(name, ends)}
-    return [name for name in own if plain(name) not in known]
+    known = {comparable(variant) for name in names for variant in _variants(name, ends)}
+    return [name for name in own if comparable(name) not in known]
 
 
 def _variants(name: str, ends: tuple[Sequence[str], Sequence[str]]) -> list[str]:
@@ -113,12 +113,14 @@ def _shared_ends(names: Sequence[str]) -> tuple[list[str], list[str]]:
     first = Counter(match[0] for n in (3, 2, 1) for name in names if (match := re.match(words % n, name)))
     first += Counter(match[0] for name in names if (match := re.match(r"[A-Za-z]+\d+(?=[A-Za-z])", name)))  # S01LASI
     last = Counter(match[0] for name in names if (match := re.search(r"(?<=\w)[\W_]+[^\W_]+$", name)))
-    beginnings = [text for text, count in first.items() if count >= enough and not _telling(text)]
+    beginnings = [text for text, count in first.items() if count >= enough and not _is_informative(text)]
     endings = [
-        text for text, count in last.items() if not _telling(text) and (count >= enough or letters(text) in SUFFIXES)
+        text
+        for text, count in last.items()
+        if not _is_informative(text) and (count >= enough or alphanumeric(text) in SUFFIXES)
     ]
     return beginnings, endings
 
 
-def _telling(text: str) -> bool:
-    return letters(text) in TELLING
+def _is_informative(text: str) -> bool:
+    return alphanumeric(text) in TELLING

@@ -10,7 +10,7 @@ from typing import Any
 from ipman_rs.body import BodyModel
 from ipman_rs.files import read_bytes, read_json, read_yaml
 
-from .names import meanings, plain
+from .names import comparable, meanings
 from .sets import Meaning
 
 LARGEST = 1_000_000  # bytes
@@ -33,10 +33,10 @@ def _meaning(what: str, place: Any, body: BodyModel) -> Meaning | None:
 
     if place is None or place == "":
         return None
-    known = places(body)
+    place_names = places(body)
     if isinstance(place, str):
         word = place.strip().lower().replace(" ", "_").replace("-", "_")
-        if word in known:
+        if word in place_names:
             return word
         other = meanings([place.strip()])
         if other:
@@ -56,7 +56,7 @@ def _pairs(path: Path) -> dict[str, Any]:
         raise ValueError(f"{path}: expected names of markers and their places, got none")
     earlier: dict[str, tuple[str, Any]] = {}
     for name, place in pairs:
-        other, meant = earlier.setdefault(plain(name), (name, place))
+        other, meant = earlier.setdefault(comparable(name), (name, place))
         if meant != place:
             raise ValueError(f"{path}: {name!r}: expected one place, got {meant!r} for {other!r} and {place!r}")
     return dict(pairs)

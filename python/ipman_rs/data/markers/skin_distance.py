@@ -12,13 +12,13 @@ Array = NDArray[np.float64]
 FRAMES = 8  # of those in which a marker was seen, spread over them
 
 
-def mean_distances(vertices: NDArray[np.floating], faces: NDArray[np.integer], points: Array, seen: Array) -> Array:
+def mean_distances(vertices: NDArray[np.floating], faces: NDArray[np.integer], points: Array, visible: Array) -> Array:
     """The mean signed distance (M,), m, of markers (T, M, 3) from bodies (T, V, 3), over some of the frames in which
     they were seen (T, M); NaN for one that never was."""
-    away = np.full(seen.shape, np.nan)
-    chosen = np.zeros(seen.shape, bool)
-    for marker in range(seen.shape[1]):
-        frames = np.flatnonzero(seen[:, marker])
+    away = np.full(visible.shape, np.nan)
+    chosen = np.zeros(visible.shape, bool)
+    for marker in range(visible.shape[1]):
+        frames = np.flatnonzero(visible[:, marker])
         chosen[frames[evenly(len(frames), FRAMES)], marker] = True
     for frame in np.flatnonzero(chosen.any(axis=1)):
         corners = np.asarray(vertices[frame], np.float64)[faces]

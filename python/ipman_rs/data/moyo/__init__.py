@@ -39,10 +39,10 @@ from ipman_rs.body import mesh_file
 from .. import moyo_stills, sequences
 from ..check import Finding
 from ..frames import DataSet, Frames
-from .bodies import body_of, frames_of
-from .cameras import pictured, with_camera
-from .files import SPLITS, Recorded, recorded_sequences
-from .mat import corners, loads_agree, read_maps, read_trace
+from .bodies import read_body, read_frames
+from .cameras import frames_with_images, with_camera
+from .files import SPLITS, SequenceFiles, find_sequences
+from .mat import check_loads, corners, read_maps, read_trace
 
 __all__ = ["NAME", "check", "corners", "open", "read_maps", "read_trace"]
 
@@ -71,47 +71,49 @@ def open(
         raise ValueError(f"camera: expected 1 to 8, got {camera!r}")
     if frames not in ("all", "selected") and Path(frames).suffix not in (".py", ".json"):
         raise ValueError(f"frames: expected all, selected, or a list in a .py or .json file, got {frames!r}")
-    chosen = None if frames in ("all", "selected") else moyo_stills.Chosen(frames)
+    chosen = None if frames in ("all", "selected") else moyo_stills.FrameList(frames)
     if v_template is not None:
         mesh_file.vertices(v_template)  # is there, and a body
-    found = recorded_sequences(root, split)
-    parts = (any(each.mat[0].is_file() for each in found), any(each.com.is_file() for each in found))
+    recordings = find_sequences(root, split)
+    parts = (any(each.mat[0].is_file() for each in recordings), any(each.com.is_file() for each in recordings))
     rows = []
-    for each in found:
-        body = body_of(each)
-        wanted = moyo_stills.selected(frames, body, chosen)
-        rows.append(wanted if camera is None else np.intersect1d(wanted, pictured(each, camera, len(body))))
+    for each in recordings:
+        body = read_body(each)
+        wanted = moyo_stills.select_frames(frames, body, chosen)
+        rows.append(wanted if camera is None else np.intersect1d(wanted, frames_with_images(each, camera, len(body))))
 
     if chosen is not None and not any(map(len, rows)):
-        raise ValueError(f"{frames}: has none of the poses in {root}, such as {found[0].name}")
+        raise ValueError(f"{frames}: has none of the poses in {root}, such as {recordings[0].name}")
 
     def sequence(index: int) -> Frames:
-        whole = replace(frames_of(found[index], *parts), rest_shape=None if v_template is None else str(v_template))
-        some = whole if frames == "all" and camera is None else whole[rows[index]]
+        whole = replace(
+            read_frames(recordings[index], *parts), rest_shape=None if v_template is None else str(v_template)
+        )
+        chosen_frames = whole if frames == "all" and camera is None else whole[rows[index]]
         if frames != "all":
-            some = replace(some, frame_rate=None)
-        return some if camera is None else with_camera(found[index], some, camera, rows[index])
+            chosen_frames = replace(chosen_frames, frame_rate=None)
+        return chosen_frames if camera is None else with_camera(recordings[index], chosen_frames, camera, rows[index])
 
-    return sequences.demanded(root, sequences.sequences([len(part) for part in rows], sequence, path))
+    return sequences.require_plausible(root, sequences.sequences([len(part) for part in rows], sequence, path))
 
 
 def check(path: str | os.PathLike[str]) -> list[Finding]:
     """What each session has and lacks, which files cannot be read, and whether units, axes, loads and lengths fit."""
     root = Path(path)
     try:
-        found_sequences = recorded_sequences(root, None)
+        found_sequences = find_sequences(root, None)
     except ValueError as error:
         return [Finding("missing", str(error), "fetch mosh.zip of a session and unpack it")]
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for session in dict.fromkeys(each.session for each in found_sequences):
-        found += _session([each for each in found_sequences if each.session == session], session)
-    return found
+        findings += _session([each for each in found_sequences if each.session == session], session)
+    return findings
 
 
-def _session(found_sequences: list[Recorded], session: Path) -> list[Finding]:
+def _session(found_sequences: list[SequenceFiles], session: Path) -> list[Finding]:
     counts = {split: sum(each.split == split for each in found_sequences) for split in SPLITS}
-    said = ", ".join(f"{count} in {split}" for split, count in counts.items())
-    found = [Finding("ok", f"{session.name}: {len(found_sequences)} sequences ({said})")]
+    listed = ", ".join(f"{count} in {split}" for split, count in counts.items())
+    findings = [Finding("ok", f"{session.name}: {len(found_sequences)} sequences ({listed})")]
     for what, folder in (
         ("pressure", "pressure"),
         ("centres of mass", "com"),
@@ -119,12 +121,12 @@ def _session(found_sequences: list[Recorded], session: Path) -> list[Finding]:
         ("images", "images"),
     ):
         if not (session / folder).is_dir():
-            found.append(Finding("missing", f"{session.name}: no {what} ({folder}/)"))
+            findings.append(Finding("missing", f"{session.name}: no {what} ({folder}/)"))
     parts = [(session / "pressure").is_dir(), (session / "com").is_dir()]
     for each in found_sequences:
         needed = ([*each.mat] if parts[0] else []) + ([each.com] if parts[1] else [])
-        found += [Finding("missing", f"{file}: no such file") for file in needed if not file.is_file()]
+        findings += [Finding("missing", f"{file}: no such file") for file in needed if not file.is_file()]
         if parts[0] and all(file.is_file() for file in each.mat):
-            found += loads_agree(each)
-    read = [(each.name, lambda each=each: frames_of(each, parts[0], parts[1])) for each in found_sequences]
-    return found + sequences.judged(read)
+            findings += check_loads(each)
+    read = [(each.name, lambda each=each: read_frames(each, parts[0], parts[1])) for each in found_sequences]
+    return findings + sequences.check_sequences(read)

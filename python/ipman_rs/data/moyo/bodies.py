@@ -14,8 +14,8 @@ from ipman_rs.ground import Ground
 
 from .. import c3d, sequences
 from ..frames import Frames, PressureMaps
-from .files import Recorded
-from .mat import RATE, corners, in_the_world, read_maps, read_trace
+from .files import SequenceFiles
+from .mat import RATE, corners, place_maps, read_maps, read_trace
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ BROKEN_MAT = "_body_hands_03596_Cow_Face_Pose_or_Gomukhasana_-c"  # left out by 
 COM, COM_FLOOR = "CentreOfMass", "CentreOfMassFloor"
 
 
-def body_of(files: Recorded) -> Frames:
+def read_body(files: SequenceFiles) -> Frames:
     """The body alone."""
     path = files.mosh
     content = safe_pickle.read(path, "body of MoYo", "an unmodified file of its mosh folder", tolerant=True)
@@ -49,7 +49,7 @@ def body_of(files: Recorded) -> Frames:
         raise ValueError(f"{path}: expected frames, the sequence is empty")
     transl, betas = array("trans", (count, 3)), array("betas", (-1,))
     frames = Frames(
-        names=sequences.numbered(files.name, count),
+        names=sequences.frame_names(files.name, count),
         sequences=np.full(count, files.name),
         ground=Ground.z_up(),
         frame_rate=RATE,
@@ -59,11 +59,11 @@ def body_of(files: Recorded) -> Frames:
         betas=np.broadcast_to(betas, (count, len(betas))),
         transl=transl,
     )
-    return sequences.plausible(path, frames)
+    return sequences.require_plausible_units(path, frames)
 
 
-def frames_of(files: Recorded, with_pressure: bool, with_com: bool) -> Frames:
-    frames = body_of(files)
+def read_frames(files: SequenceFiles, with_pressure: bool, with_com: bool) -> Frames:
+    frames = read_body(files)
     count = len(frames)
     if with_com:
         com = _center_of_mass(files.com, count) if files.com.is_file() else np.full((count, 3), np.nan)
@@ -77,21 +77,21 @@ def _center_of_mass(path: Path, count: int) -> Array:
     """(count, 3) m, NaN where Vicon has none."""
     points = c3d.read(path).positions([COM, COM_FLOOR])
     points[(points == 0).all(axis=-1)] = np.nan
-    found, floor = _fitted(path, "frames", points, count).swapaxes(0, 1)
-    both = np.isfinite(floor).all(axis=1) & np.isfinite(found).all(axis=1)
+    centers, floor = _pad_rows(path, "frames", points, count).swapaxes(0, 1)
+    both = np.isfinite(floor).all(axis=1) & np.isfinite(centers).all(axis=1)
     if not both.any():
-        return found
-    off = np.median(np.abs(floor - found)[both], axis=0)
+        return centers
+    off = np.median(np.abs(floor - centers)[both], axis=0)
     if off[:2].max() > 0.02 or abs(np.median(floor[both, 2])) > 0.05:
         axis = "xyz"[int(off.argmax())]
         raise ValueError(
             f"{path}: looks like {axis} up: {COM_FLOOR} is expected under {COM}, on z = 0, but lies "
             f"({', '.join(f'{number:.2f}' for number in off)}) m from it"
         )
-    return found
+    return centers
 
 
-def _fitted(path: Path, what: str, values: NDArray[Any], count: int) -> NDArray[Any]:
+def _pad_rows(path: Path, what: str, values: NDArray[Any], count: int) -> NDArray[Any]:
     """`values` with `count` rows: one or two may be missing at the end, or be too many."""
     if abs(len(values) - count) > APART:
         raise ValueError(
@@ -102,7 +102,7 @@ def _fitted(path: Path, what: str, values: NDArray[Any], count: int) -> NDArray[
     return np.concatenate([values[:count], more])
 
 
-def _with_mat(files: Recorded, frames: Frames) -> Frames:
+def _with_mat(files: SequenceFiles, frames: Frames) -> Frames:
     """The frames with the mat's maps, centre of pressure and force; NaN if the sequence has no files of the mat."""
     maps_file, trace_file, corners_file = files.mat
     count = len(frames)
@@ -116,13 +116,13 @@ def _with_mat(files: Recorded, frames: Frames) -> Frames:
             f"{trace_file}: expected times of the {len(mat.maps)} maps of {maps_file.name} at {mat.rate:g} Hz, got "
             f"maps {trace.maps[0]} to {trace.maps[-1]} at {trace.rate:g} Hz"
         )
-    placed = in_the_world(mat, corners(corners_file), corners_file)
+    placed = place_maps(mat, corners(corners_file), corners_file)
     center = placed.origin + trace.center[:, 1:] * placed.e1 + trace.center[:, :1] * placed.e2
     force = np.stack([np.zeros_like(trace.force), np.zeros_like(trace.force), trace.force], axis=1)
-    maps = _fitted(trace_file, "rows", placed.values[trace.maps], count)
+    maps = _pad_rows(trace_file, "rows", placed.values[trace.maps], count)
     return replace(
         frames,
-        center_of_pressure=_fitted(trace_file, "rows", center, count),
-        forces=_fitted(trace_file, "rows", force, count)[:, None],
+        center_of_pressure=_pad_rows(trace_file, "rows", center, count),
+        forces=_pad_rows(trace_file, "rows", force, count)[:, None],
         pressure=replace(placed, values=maps),
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ipman_rs.files import read_json
 
 from ..frames import Cameras, Frames
-from .files import Recorded
+from .files import SequenceFiles
 
 Array = NDArray[np.float64]
 
@@ -18,14 +18,14 @@ IMAGE_RATE = 30.0  # Hz
 IMAGE_SCALE = 0.5  # of released images to those that were calibrated
 
 
-def pictured(files: Recorded, camera: int, count: int) -> NDArray[np.int64]:
+def frames_with_images(files: SequenceFiles, camera: int, count: int) -> NDArray[np.int64]:
     """The frames that the camera has images of."""
     numbers = (path.stem.rpartition("_")[2] for path in files.images(camera).glob("*.*"))
     rows = sorted({2 * int(number) for number in numbers if number.isdigit()})
     return np.array([row for row in rows if row < count], np.int64)
 
 
-def with_camera(files: Recorded, frames: Frames, camera: int, rows: NDArray[np.int64]) -> Frames:
+def with_camera(files: SequenceFiles, frames: Frames, camera: int, rows: NDArray[np.int64]) -> Frames:
     count = len(frames)
     by_number = {int(path.stem.rpartition("_")[2]): path for path in files.images(camera).glob("*.*")}
     view = _camera(files, camera)
@@ -35,7 +35,7 @@ def with_camera(files: Recorded, frames: Frames, camera: int, rows: NDArray[np.i
     return replace(frames, frame_rate=rate, images=images, cameras=Cameras(*spread))
 
 
-def _camera(files: Recorded, camera: int) -> tuple[Array, Array, Array]:
+def _camera(files: SequenceFiles, camera: int) -> tuple[Array, Array, Array]:
     """Rotation, translation and intrinsics of a camera on the sequence's day."""
     day = files.name.split("_")[0]
     paths = sorted(files.session.glob("cameras/**/cameras_param.json"))

@@ -1,4 +1,4 @@
-"""Where the files of MoYo's sequences lie."""
+"""The paths of the files of MoYo's sequences."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ SUFFIX = "_stageii.pkl"
 
 
 @dataclass(frozen=True)
-class Recorded:
-    """The files of a sequence, of which only the body's must be there."""
+class SequenceFiles:
+    """The files of a sequence; only that of the body must exist."""
 
     session: Path
     split: str
@@ -37,21 +37,21 @@ class Recorded:
         return self.session / "images" / self.split / self.name / f"YOGI_Cam_{camera:02d}"
 
 
-def recorded_sequences(root: Path, split: str | None) -> list[Recorded]:
+def find_sequences(root: Path, split: str | None) -> list[SequenceFiles]:
     if split is not None and split not in SPLITS:
         raise ValueError(f"split: expected one of {', '.join(SPLITS)}, got {split!r}")
     if not root.is_dir():
         raise ValueError(f"{root}: expected a folder with mosh/train/*{SUFFIX} in it, {_what(root)}")
     sessions = [root] if (root / "mosh").is_dir() else sorted(each.parent for each in root.glob("*/mosh"))
-    found = [
-        Recorded(session, part, file.name.removesuffix(SUFFIX))
+    recordings = [
+        SequenceFiles(session, part, file.name.removesuffix(SUFFIX))
         for session in sessions
         for part in (SPLITS if split is None else (split,))
         for file in sorted((session / "mosh" / part).glob(f"*{SUFFIX}"))
     ]
-    if not found:
+    if not recordings:
         raise ValueError(f"{root}: expected sequences (mosh/{split or 'train'}/*{SUFFIX}), found none")
-    return found
+    return recordings
 
 
 def _what(path: Path) -> str:

@@ -12,13 +12,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files import regular, safe_pickle
+from ipman_rs.files import regular_file, safe_pickle
 
 from ...files import safe_xml
 from .. import c3d
 from ..check import Finding
 from ..frames import PressureMaps
-from .files import Recorded
+from .files import SequenceFiles
 
 Array = NDArray[np.float64]
 
@@ -57,9 +57,9 @@ def read_maps(path: str | os.PathLike[str]) -> Mat:
         raise ValueError(f"{path}: cell_count: expected a mat of some thousand cells, got {width} × {height}")
     data = _anywhere(clip, "data", path)
     crops = [element for element in data.iter() if element.find("cells") is not None]
-    said = safe_xml.number(clip, ".//count", path)
-    if said != len(crops):
-        raise ValueError(f"{path}: expected {said:g} maps by its count, got {len(crops)}: is the file complete?")
+    count = safe_xml.number(clip, ".//count", path)
+    if count != len(crops):
+        raise ValueError(f"{path}: expected {count:g} maps by its count, got {len(crops)}: is the file complete?")
     if len(crops) * width * height * 4 > safe_pickle.MAX_BYTES:
         raise ValueError(f"{path}: {len(crops)} maps of {width} × {height} cells are more than any recording has")
     maps = np.zeros((len(crops), height, width), np.float32)
@@ -69,10 +69,10 @@ def read_maps(path: str | os.PathLike[str]) -> Mat:
 
 
 def _anywhere(element: Element, tag: str, path: str | os.PathLike[str]) -> Element:
-    found = element if element.tag == tag else element.find(f".//{tag}")
-    if found is None:
+    match = element if element.tag == tag else element.find(f".//{tag}")
+    if match is None:
         raise ValueError(f"{path}: expected a recording of the pressure mat, with <{tag}>, got <{element.tag}>")
-    return found
+    return match
 
 
 def _pair(element: Element, tag: str, path: str | os.PathLike[str]) -> tuple[int, int]:
@@ -117,7 +117,7 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
 
     ValueError, naming the file, for what is missing, damaged, with gaps, or at another rate than 60 Hz.
     """
-    regular(path)
+    regular_file(path)
     try:
         with Path(path).open(encoding="utf-8-sig", errors="replace", newline="") as stream:
             lines = [row for row in csv.reader(stream) if any(field.strip() for field in row)]
@@ -153,15 +153,15 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
 
 
 def _cell(row: Sequence[str], column: int, place: str) -> float:
-    said = row[column].strip() if column < len(row) else ""
-    return np.nan if said == "" else _float(said, place)
+    text = row[column].strip() if column < len(row) else ""
+    return np.nan if text == "" else _float(text, place)
 
 
-def _float(said: str, place: str) -> float:
+def _float(text: str, place: str) -> float:
     try:
-        return float(said)
+        return float(text)
     except ValueError:
-        raise ValueError(f"{place}: expected a number, got {said[:40]!r}") from None
+        raise ValueError(f"{place}: expected a number, got {text[:40]!r}") from None
 
 
 def corners(path: str | os.PathLike[str]) -> Array:
@@ -173,23 +173,23 @@ def corners(path: str | os.PathLike[str]) -> Array:
     points[(points == 0).all(axis=-1)] = np.nan
     if not np.isfinite(points).all(axis=-1).any(axis=0).all():
         raise ValueError(f"{path}: expected the mat's corners {', '.join(CORNERS)}, one was never seen")
-    found = np.nanmedian(points, axis=0)
-    if np.abs(found[:, 2]).max() > 0.1:
-        flat = "xyz"[int(np.ptp(found, axis=0).argmin())]
+    positions = np.nanmedian(points, axis=0)
+    if np.abs(positions[:, 2]).max() > 0.1:
+        flat = "xyz"[int(np.ptp(positions, axis=0).argmin())]
         hint = f"; looks like {flat} up" if flat != "z" else ""
         raise ValueError(
-            f"{path}: expected the mat's corners on the floor z = 0, got z = {found[:, 2].round(2)} m{hint}"
+            f"{path}: expected the mat's corners on the floor z = 0, got z = {positions[:, 2].round(2)} m{hint}"
         )
-    side = found[:, :2] > found[:, :2].mean(axis=0)
+    side = positions[:, :2] > positions[:, :2].mean(axis=0)
     order = [np.flatnonzero((side == sides).all(axis=1)) for sides in ((1, 1), (1, 0), (0, 0), (0, 1))]
     if any(len(each) != 1 for each in order):
         raise ValueError(
-            f"{path}: expected the mat's corners at four corners along x and y, got {found[:, :2].tolist()}"
+            f"{path}: expected the mat's corners at four corners along x and y, got {positions[:, :2].tolist()}"
         )
-    return found[[int(each[0]) for each in order]]
+    return positions[[int(each[0]) for each in order]]
 
 
-def in_the_world(mat: Mat, outline: Array, path: Path) -> PressureMaps:
+def place_maps(mat: Mat, outline: Array, path: Path) -> PressureMaps:
     """The maps in the world: the cells are centred in the rectangle of the corner markers, which lie on the rim."""
     first, second, third, fourth = outline
     rows, columns = (second + third - first - fourth) / 2, (third + fourth - first - second) / 2
@@ -205,7 +205,7 @@ def in_the_world(mat: Mat, outline: Array, path: Path) -> PressureMaps:
     return PressureMaps(mat.maps, origin, e1, e2, mat.cell)
 
 
-def loads_agree(files: Recorded) -> list[Finding]:
+def check_loads(files: SequenceFiles) -> list[Finding]:
     """Whether maps and centres of pressure agree on force and place."""
     try:
         mat, trace = read_maps(files.mat[0]), read_trace(files.mat[1])
@@ -224,6 +224,6 @@ def loads_agree(files: Recorded) -> list[Finding]:
     center = np.stack([maps[loaded].sum(axis=1) @ columns, maps[loaded].sum(axis=2) @ rows], axis=1) / total[:, None]
     off = float(np.median(np.linalg.norm(center * mat.cell - trace.center[loaded], axis=1)))
     if off > 0.005:
-        said = f"{files.name}: the maps' centre is {1e3 * off:.0f} mm from the centre of pressure in the median"
-        return [Finding("wrong", said, "are the maps turned or upside down?")]
+        message = f"{files.name}: the maps' centre is {1e3 * off:.0f} mm from the centre of pressure in the median"
+        return [Finding("wrong", message, "are the maps turned or upside down?")]
     return []

@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..check import SAMPLE, Finding, of_frames
+from ..check import SAMPLE, Finding, check_frames
 from .layout import SPLITS
 from .reader import BadSample, Labels, Rendered
 
@@ -51,11 +51,11 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
         except BadSample:
             continue
     counts = ", ".join(f"{data.index['counts'][split]} {split}" for split in SPLITS)
-    found = [Finding("ok", f"{counts} images of {data.index['settings']['body']} in {len(data.shards)} shards")]
-    found += [
+    findings = [Finding("ok", f"{counts} images of {data.index['settings']['body']} in {len(data.shards)} shards")]
+    findings += [
         Finding("wrong", f"{name}: {why}", "render the folder again") for name, why in list(data.bad.items())[:10]
     ]
     if len(data.bad) > 10:
-        found.append(Finding("wrong", f"{len(data.bad)} bad samples in all"))
+        findings.append(Finding("wrong", f"{len(data.bad)} bad samples in all"))
     good = np.flatnonzero(~np.isin(data.names, list(data.bad)))
-    return found + (of_frames(data[good[:: -(-len(good) // SAMPLE)]]) if len(good) else [])
+    return findings + (check_frames(data[good[:: -(-len(good) // SAMPLE)]]) if len(good) else [])

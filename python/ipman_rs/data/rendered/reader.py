@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.body.joints import SMPL
-from ipman_rs.files import parse_json, regular
+from ipman_rs.files import parse_json, regular_file
 from ipman_rs.ground import Ground
 
 from ..frames import Cameras, Frames, Rows
 from .layout import INDEX, SPLITS, read_index, shards_of
 
 Array = NDArray[np.floating]
-Place = tuple[int, int]  # where a file starts in its shard, and how many bytes it has
+ByteRange = tuple[int, int]  # where a file starts in its shard, and how many bytes it has
 
 SHAPES = {
     "pose": (24, 3), "betas": (10,), "transl": (3,), "joints": (24, 3), "camera_rotation": (3, 3),
@@ -72,7 +72,7 @@ class Rendered:
         self.names = np.array([key for shard in self.shards for key in shard.keys])
         self.bad: dict[str, str] = {}
         self._ends = np.cumsum([shard.count for shard in self.shards])
-        self._members: dict[Path, dict[str, Place]] = {}  # read when they are first asked for
+        self._members: dict[Path, dict[str, ByteRange]] = {}  # read when they are first asked for
 
     def __len__(self) -> int:
         return len(self.names)
@@ -96,8 +96,8 @@ class Rendered:
         count = len(self.keypoint_names)
         for key, shape in {**SHAPES, "keypoints": (count, 3), "visible": (count,)}.items():
             if arrays[key].shape != shape or arrays[key].dtype.kind not in "fb":
-                found = f"{arrays[key].shape} of {arrays[key].dtype}"
-                raise self._bad(name, f"{key}: expected numbers of shape {shape}, got {found}")
+                actual = f"{arrays[key].shape} of {arrays[key].dtype}"
+                raise self._bad(name, f"{key}: expected numbers of shape {shape}, got {actual}")
             if not np.isfinite(arrays[key]).all():
                 raise self._bad(name, f"{key}: not finite")
         return Labels(arrays, record)
@@ -175,13 +175,13 @@ class Rendered:
         return BadSample(f"{name}: {why}")
 
 
-def members(path: Path) -> dict[str, Place]:
+def members(path: Path) -> dict[str, ByteRange]:
     """The files of a shard, as far as it can be read."""
-    found: dict[str, Place] = {}
+    places: dict[str, ByteRange] = {}
     try:
-        with tarfile.open(regular(path), "r:") as archive:
+        with tarfile.open(regular_file(path), "r:") as archive:
             for member in archive:
-                found[member.name] = member.offset_data, member.size
+                places[member.name] = member.offset_data, member.size
     except Exception as error:  # damaged bytes can fail in any way
-        warnings.warn(f"{path}: damaged after {len(found)} files: {error}", stacklevel=2)
-    return found
+        warnings.warn(f"{path}: damaged after {len(places)} files: {error}", stacklevel=2)
+    return places

@@ -1,8 +1,8 @@
-"""Bootstrap intervals of a mean: what it would be on other bodies, or on other sequences of bodies.
+"""Bootstrap intervals of a mean over bodies, or over sequences of bodies.
 
-Frames of one sequence are alike, so it is sequences that are drawn with replacement, each with all its frames. Images
-are sequences of one frame. More than 4096 are pooled by chance into 4096 clusters first: that keeps memory and time
-flat, and makes a difference of about a hundredth to an interval's width.
+Frames of a sequence are correlated, so whole sequences are drawn with replacement (cluster bootstrap). An image is a
+sequence of one frame. More than 4096 sequences are first pooled at random into 4096 clusters, which bounds memory and
+time and changes an interval's width by about a hundredth.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .clusters import differences
 
-DRAWS = 1 << 20  # at a time
+DRAWS = 1 << 20  # drawn clusters that are in memory together
 
 
 class Interval(NamedTuple):
@@ -39,13 +39,13 @@ def paired(
 ) -> Interval:
     """Percentile interval of the mean of values (n,) − baseline (n,) over bodies drawn with replacement.
 
-    Bodies where one of the two is no finite number are left out.
+    Bodies where either value is not finite are left out.
 
     Args:
-        sequences: (n,) names; given, it is whole sequences that are drawn.
+        sequences: (n,) names of the bodies' sequences; then whole sequences are drawn.
 
     Raises:
-        ValueError: arrays of different lengths, or without a body where both are finite.
+        ValueError: the arrays differ in length, or no body has two finite values.
     """
     difference, sums, counts = differences(values, baseline, sequences)
     return bootstrap(sums, counts, float(difference.mean()), level, resamples, seed)
@@ -54,8 +54,13 @@ def paired(
 def bootstrap(
     sums: NDArray[Any], counts: NDArray[Any], mean: float, level: float = 0.95, resamples: int = 10_000, seed: int = 0
 ) -> Interval:
-    """Percentile interval of the mean from the sum (G,) and the number (G,) of each cluster's values. The ends are NaN
-    for fewer than two clusters, which say nothing about others. ValueError for a level that is no share."""
+    """Percentile interval of a mean from the sum (G,) and the number (G,) of each cluster's values.
+
+    The ends are NaN for fewer than two clusters.
+
+    Raises:
+        ValueError: the level is not between 0 and 1.
+    """
     if not 0 < level < 1:
         raise ValueError(f"level: expected a share between 0 and 1, got {level!r}")
     if len(sums) < 2:

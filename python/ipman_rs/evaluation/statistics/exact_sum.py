@@ -1,8 +1,8 @@
-"""Sums that are exact, so that they do not depend on the order and grouping of what is added.
+"""Exact sums, which do not depend on the order or the grouping of the summands.
 
-A number is cut into four whole numbers, digits to the base 2³² from 2³² down to 2⁻⁶⁴, and each digit is summed by
-itself in int64. Numbers under 2³¹ keep all bits above 2⁻⁶⁵ (of 0.001 that is every bit of a float64); 2³¹ numbers fit
-into a sum.
+A number is split into four integers, its digits in base 2³² with weights from 2³² down to 2⁻⁶⁴, and each digit is
+summed separately in int64. Numbers under 2³¹ keep all bits above 2⁻⁶⁵ (for 0.001 that is every bit of a float64); up to
+2³¹ numbers can be summed.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ Limbs = NDArray[np.int64]
 
 def limbs(values: NDArray[np.float64]) -> Limbs:
     """(n,) finite numbers under 2⁶² as digits (n, 4)."""
-    found = np.empty((len(values), LIMBS), np.int64)
+    digits = np.empty((len(values), LIMBS), np.int64)
     rest = values * 2.0**-32
     for place in range(LIMBS):
         digit = np.trunc(rest) if place < LIMBS - 1 else np.rint(rest)
-        found[:, place] = digit
+        digits[:, place] = digit
         rest = (rest - digit) * 2.0**32  # both exact
-    return found
+    return digits
 
 
 def exact(total: Limbs) -> Fraction:

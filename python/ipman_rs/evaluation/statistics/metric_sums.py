@@ -1,4 +1,4 @@
-"""One metric of an accumulator: exact sums by cluster."""
+"""The sums of one metric of an accumulator, exact, one row per cluster."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class Summary(NamedTuple):
     std: float  # of the frames, with n − 1
     least: float
     largest: float
-    frames: int  # with a figure
-    clusters: int  # sequences with a figure; at most 4096, see `Accumulator`
-    missing: dict[str, int]  # frames without, by reason
+    frames: int  # with a value
+    clusters: int  # sequences with a value; at most 4096, see `Accumulator`
+    missing: dict[str, int]  # number of frames without a value, by reason
 
 
-class Column:
-    """Rows are clusters; all that is here adds up in any order."""
+class MetricSums:
+    """Exact sums of a metric by cluster (rows), with counts, extremes and reasons for missing values."""
 
     def __init__(self) -> None:
         self.sums = np.zeros((CLUSTERS, LIMBS), np.int64)
@@ -40,22 +40,22 @@ class Column:
     def add(
         self, values: NDArray[np.float64], rows: NDArray[np.int64], prints: NDArray[np.uint64], why: NDArray[np.str_]
     ) -> None:
-        """Values (n,) of the clusters `rows` (n,), the frames' fingerprints, and why a value is NaN."""
-        known = np.abs(values) < LARGEST  # false for NaN
+        """Adds values (n,) of the clusters `rows` (n,), with their frames' fingerprints and reasons for NaN."""
+        valid = np.abs(values) < LARGEST  # false for NaN
         why = np.where(np.isnan(values), why, "infinite or over 2^31")
-        self.missing.update(why[~known].tolist())
-        values, rows = values[known], rows[known]
+        self.missing.update(why[~valid].tolist())
+        values, rows = values[valid], rows[valid]
         if not len(values):
             return
         for limb, total in zip(limbs(values).T, self.sums.T, strict=True):
             np.add.at(total, rows, limb)
         np.add.at(self.counts, rows, 1)
-        np.add.at(self.prints, rows, prints[known])
+        np.add.at(self.prints, rows, prints[valid])
         self.squares += limbs(values**2).sum(axis=0)
         self.least, self.largest = min(self.least, float(values.min())), max(self.largest, float(values.max()))
 
-    def merge(self, other: Column, rows: NDArray[np.int64]) -> None:
-        """Another column whose row i is our row rows[i]."""
+    def merge(self, other: MetricSums, rows: NDArray[np.int64]) -> None:
+        """Adds the sums of another object, whose row i is row rows[i] here."""
         number = len(rows)
         np.add.at(self.sums, rows, other.sums[:number])
         np.add.at(self.counts, rows, other.counts[:number])
@@ -65,7 +65,7 @@ class Column:
         self.missing.update(other.missing)
 
     def arrays(self, rows: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
-        """All but the reasons, these rows of it, for a file."""
+        """These rows as arrays for a file; the reasons for missing values are not included."""
         return {
             "sums": self.sums[rows],
             "counts": self.counts[rows],
@@ -75,24 +75,25 @@ class Column:
         }
 
     @classmethod
-    def of(cls, arrays: Mapping[str, NDArray[Any]], size: int, missing: Mapping[str, int]) -> Column:
-        """From `arrays` of `size` rows. ValueError where they are not what that gives."""
-        found = cls()
-        for name, expected in found.arrays(np.arange(size)).items():
-            given = arrays[name]
-            if given.shape != expected.shape or given.dtype != expected.dtype:
-                raise ValueError(f"{name}: expected {expected.shape} {expected.dtype}, got {given.shape} {given.dtype}")
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], size: int, missing: Mapping[str, int]) -> MetricSums:
+        """The inverse of `arrays`, from `size` rows. ValueError for other names, shapes, types or negative counts."""
+        sums = cls()
+        for name, expected in sums.arrays(np.arange(size)).items():
+            array = arrays[name]
+            if array.shape != expected.shape or array.dtype != expected.dtype:
+                raise ValueError(f"{name}: expected {expected.shape} {expected.dtype}, got {array.shape} {array.dtype}")
         if (arrays["counts"] < 0).any() or not all(isinstance(n, int) and n > 0 for n in missing.values()):
             raise ValueError("counts: expected none below zero")
-        found.sums[:size], found.counts[:size], found.prints[:size] = (
+        sums.sums[:size], sums.counts[:size], sums.prints[:size] = (
             arrays[name] for name in ("sums", "counts", "prints")
         )
-        found.squares[:] = arrays["squares"]
-        found.least, found.largest = arrays["edges"].tolist()
-        found.missing.update(missing)
-        return found
+        sums.squares[:] = arrays["squares"]
+        sums.least, sums.largest = arrays["edges"].tolist()
+        sums.missing.update(missing)
+        return sums
 
     def summary(self) -> Summary:
+        """Mean, standard deviation and extremes over all frames."""
         frames, total = int(self.counts.sum()), exact(self.sums.sum(axis=0))
         mean, std = math.nan, math.nan
         if frames:

@@ -1,7 +1,7 @@
-"""The paired test between two methods: could their difference be chance?
+"""Paired permutation test between two methods (Fisher's randomisation test, two-sided).
 
-If two methods were equally good, each sequence's difference could as well have the other sign. p is the share of all
-ways to choose signs that move the mean at least as far from zero as it is (Fisher's randomisation test, two-sided).
+If two methods are equally good, the difference of each sequence could as well have the opposite sign. p is the share of
+all choices of signs whose mean is at least as far from zero as the observed one.
 """
 
 from __future__ import annotations
@@ -16,15 +16,18 @@ from .clusters import differences
 def paired_test(
     values: ArrayLike, baseline: ArrayLike, resamples: int = 10_000, seed: int = 0, sequences: ArrayLike | None = None
 ) -> float:
-    """p of the mean of values (n,) − baseline (n,), for bodies, or for whole sequences (n,) where their names are
-    given. ValueError as `paired`."""
+    """p of the mean of values (n,) − baseline (n,), by bodies, or by sequences if their names (n,) are given.
+
+    Raises:
+        ValueError: as `paired`.
+    """
     _, sums, _ = differences(values, baseline, sequences)
     return sign_flip(sums, resamples, seed)
 
 
 def sign_flip(sums: NDArray[np.float64], resamples: int = 10_000, seed: int = 0) -> float:
-    """p of the clusters' sums of differences (G,): from all 2^G choices of signs where these are no more than
-    `resamples`, else from that many drawn ones, the real one counted among them."""
+    """p from the clusters' sums of differences (G,): over all 2^G choices of signs if there are at most `resamples`,
+    else over that many drawn ones and the observed one."""
     clusters = len(sums)
     least = abs(sums.sum()) - 1e-12 * np.abs(sums).sum()  # equal but for rounding counts as equal
     every = clusters < 60 and 2**clusters <= resamples
@@ -38,4 +41,5 @@ def sign_flip(sums: NDArray[np.float64], resamples: int = 10_000, seed: int = 0)
 
 
 def _bits(numbers: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
+    """The lowest `count` bits of each number, (n, count)."""
     return (numbers[:, None] >> np.arange(count)) & 1 == 1

@@ -1,8 +1,8 @@
-"""One evaluation: predictions against a data set, in pieces that are done once and kept.
+"""One evaluation: predictions against a data set, computed in pieces that are kept on disk.
 
-A piece holds the figures of some thousand frames (see `resumable`). So an evaluation that is killed goes on where it
-was, any part of the pieces can be done elsewhere, and what comes out is the same: the final figures are made of all
-pieces, however they came about.
+A piece holds the metrics of some thousand frames (see `resumable`). A killed evaluation therefore continues where it
+stopped, and pieces can be computed elsewhere. The final results come from all pieces and do not depend on how these
+were computed.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from ipman_rs.volume import mass_properties
 
 from ..procrustes import similarity
 from . import predictions as predicted
-from .frame_metrics import Columns, columns
-from .joints import Definition, Regressors, compared, define
+from .frame_metrics import Columns, Setup, piece_metrics
+from .joints import Definition, Regressors, define, paired_joints
 from .models import Models
 from .resumable import Resumable
 
-PIECE = 4096  # frames: some seconds of work, and small in memory
-WEIGHED = 16  # bodies
-TURNED = 60.0  # degrees: a smaller turn is an error of the estimate
-ALIKE = 30.0  # degrees of single people's turns about their mean
-OWN = "own"  # the data set of the user's own files, in the form of predictions
-TRUTH = "truth"  # instead of a file of predictions: the data set's own bodies
+PIECE = 4096  # frames: some seconds of work, little memory
+SAMPLED_BODIES = 16  # bodies
+LARGE_TURN = 60.0  # degrees: a smaller rotation counts as an error of the estimate
+COMMON_TURN = 30.0  # degrees from the mean rotation: below, all people are turned in the same way
+OWN = "own"  # name of the data set of a user's own file, which has the form of predictions
+TRUTH = "truth"  # in place of a file of predictions: the data set's own bodies
 
 
 @dataclass(frozen=True)
 class Source:
-    """Which data set: plain words, so that another process, or another machine, can open the same."""
+    """A data set by name, path, split and options: plain values, so that another process or machine can open it."""
 
     name: str
     path: str
@@ -49,31 +49,31 @@ class Source:
     options: tuple[tuple[str, str | int | float], ...] = ()
 
     def open(self, unpacked: Path, models: Models) -> DataSet:
-        """ValueError naming the file where there is none or something is wrong."""
+        """The data set. ValueError, naming the file, if it is missing or something is wrong with it."""
         if self.name == OWN:
             return predicted.read(self.path, unpacked)
         if self.name not in data.DATASETS:
             raise ValueError(f"data: expected {OWN}, or one of {', '.join(data.DATASETS)}, got {self.name!r}")
         options: dict[str, Any] = {**({} if self.split is None else {"split": self.split}), **dict(self.options)}
-        known = [*inspect.signature(data.module(self.name).open).parameters][1:]
+        allowed = [*inspect.signature(data.module(self.name).open).parameters][1:]
         for name in options:
-            if name not in known or name == "hands":
-                raise ValueError(f"{self.name}: has no option {name!r}; it has {', '.join(known)}")
+            if name not in allowed or name == "hands":
+                raise ValueError(f"{self.name}: has no option {name!r}; it has {', '.join(allowed)}")
         if not Path(self.path).exists():
             raise ValueError(f"{self.path}: there is no such file or folder; it should hold the data set {self.name}")
-        if "hands" in known:  # without them fingers would be straight
+        if "hands" in allowed:  # without them the fingers are straight
             options["hands"] = models.hands()
         return data.open(self.name, self.path, **options)
 
     @property
-    def made_of(self) -> list[list[Any]]:
-        """The options; of those that are files what is in them, for other machines have other paths."""
+    def manifest(self) -> list[list[Any]]:
+        """The options; for files, a hash of their content, because paths differ between machines."""
         return [[name, predicted.fingerprint(Path(value)) if is_file(value) else value] for name, value in self.options]
 
 
 @dataclass(frozen=True)
 class Shard:
-    """Number `index` of `count`, from 1: every count-th piece."""
+    """Shard `index` (from 1) of `count`: every count-th piece."""
 
     index: int = 1
     count: int = 1
@@ -84,13 +84,13 @@ class Shard:
 
 @dataclass(frozen=True)
 class Job(Resumable):
-    """The figures of one file of predictions, or of the data set's own bodies (`TRUTH`).
+    """The evaluation of one file of predictions, or of the data set's own bodies (`TRUTH`).
 
-    All words are plain: it travels to other processes.
+    All fields are plain values, so that it can be sent to other processes.
 
-    folder: of the pieces. models: folder of model files. partial: frames without prediction are left out instead of
-    being an error. unit: metres in one of the predictions' lengths. degrees: of their rotations. force: what cannot be
-    people is measured, too.
+    folder: of the results. models: folder of model files. partial: frames without a prediction are left out instead of
+    raising an error. unit: metres per unit of length of the predictions. degrees: their rotations are in degrees.
+    force: implausible people are evaluated, too.
     """
 
     name: str
@@ -107,12 +107,8 @@ class Job(Resumable):
     piece: int = PIECE
 
     @cached_property
-    def place(self) -> Path:
-        return Path(self.folder) / "methods" / self.name
-
-    @property
     def pieces_folder(self) -> Path:
-        return self.place
+        return Path(self.folder) / "methods" / self.name
 
     @cached_property
     def unpacked(self) -> Path:
@@ -120,14 +116,16 @@ class Job(Resumable):
 
     @cached_property
     def data(self) -> DataSet:
-        return self.source.open(self.unpacked, self.bodies)
+        return self.source.open(self.unpacked, self.body_models)
 
     @cached_property
     def estimates(self) -> predicted.Predictions:
-        return predicted.read(self.predictions, self.unpacked, predicted.Reading(self.unit, self.degrees, self.force))
+        return predicted.read(
+            self.predictions, self.unpacked, predicted.ReadOptions(self.unit, self.degrees, self.force)
+        )
 
     @cached_property
-    def bodies(self) -> Models:
+    def body_models(self) -> Models:
         return Models(None if self.models is None else Path(self.models))
 
     @cached_property
@@ -136,41 +134,46 @@ class Job(Resumable):
 
     @cached_property
     def sample(self) -> Frames:
-        """Some frames of the data set: one where all have the same things, more where joints may be missing."""
+        """Some frames of the data set: one if it has no joints; more if it has, because some joints may be missing."""
         first = self.data[slice(0, 1)]
         return first if first.joints is None else check.sample(self.data)
 
     @cached_property
     def without_bodies(self) -> bool:
-        """Whether the data set has joints, and poses that are known in none of a sample's frames."""
+        """Whether the data set has joints, and an array of poses that is NaN in all frames of the sample."""
         pose = self.sample.pose
         return self.sample.joints is not None and pose is not None and not np.isfinite(pose).all(axis=(1, 2)).any()
 
     @cached_property
     def definition(self) -> Definition | None:
-        """Which joints are compared, told by a few frames. ValueError where they would be of unlike definitions."""
+        """Which joints are compared, derived from a few frames. ValueError where their definitions would differ."""
         measured: frozenset[str] = frozenset()
         if self.sample.joints is not None:
-            known = np.asarray(np.isfinite(self.sample.joints).all(axis=2))
-            named = enumerate(self.sample.joint_names or ())
-            measured = frozenset(name for k, name in named if known[:, k].any())
-        truth = self.bodies.posed(self._truth(slice(0, 1)))
-        guess = truth if self.predictions == TRUTH else self.bodies.posed(self.estimates[slice(0, 1)])
+            finite = np.asarray(np.isfinite(self.sample.joints).all(axis=2))
+            names = enumerate(self.sample.joint_names or ())
+            measured = frozenset(name for k, name in names if finite[:, k].any())
+        truth = self.body_models.posed(self._truth(slice(0, 1)))
+        guess = truth if self.predictions == TRUTH else self.body_models.posed(self.estimates[slice(0, 1)])
         return define(truth, guess, measured, self.joint_regressors, self.source.name)
+
+    @cached_property
+    def setup(self) -> Setup:
+        """What the metrics of frames need besides the frames."""
+        return Setup(self.body_models, self.definition, self.joint_regressors, self.preset)
 
     @property
     def pieces(self) -> int:
         return -(-len(self.data) // self.piece)
 
     def frames(self, number: int) -> int:
-        """How many frames a piece has."""
+        """The number of frames of a piece."""
         return min(self.piece, len(self.data) - number * self.piece)
 
     def begin(self) -> None:
-        """Makes the folder; ValueError where it holds the figures of something else, or lengths cannot fit."""
+        """Creates the folder. ValueError if it holds results of another evaluation, or if frames lack predictions."""
         _ = self.joint_regressors  # fails early
-        self.place.mkdir(parents=True, exist_ok=True)
-        self.check_folder(self.place, "figures of another evaluation")
+        self.pieces_folder.mkdir(parents=True, exist_ok=True)
+        self.check_folder(self.pieces_folder, "figures of another evaluation")
         if self.predictions != TRUTH and len(self.estimates) < len(self.data) and not self.partial:
             raise ValueError(
                 f"{self.predictions}: has {len(self.estimates):,} frames, but the data set {self.source.name} has "
@@ -178,100 +181,105 @@ class Job(Resumable):
             )
         _ = self.flags
         _ = self.definition
-        self.mark_folder(self.place)
+        self.mark_folder(self.pieces_folder)
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
-        """What is odd about the estimated people, in words. ValueError for what cannot be people, or stands along
-        another axis than the data set's up."""
+        """What is unusual about the estimated people, in words. ValueError for people who are implausible, or whose up
+        is not the data set's."""
         if self.predictions == TRUTH:
             return ()
-        found = [*(self._axes() or self._turned()), *self._masses(), *self._betas(), *self._of_truth()]
-        return (*self.estimates.flags, *judge.admit(self.predictions, found, self.force))
+        findings = [*(self._axes() or self._turned()), *self._masses(), *self._betas(), *self._of_truth()]
+        return (*self.estimates.flags, *judge.admit(self.predictions, findings, self.force))
 
     def _of_truth(self) -> list[check.Finding]:
-        """What the user's own truth has that no figure is made of."""
+        """Findings about arrays of the user's own truth that no metric uses."""
         unused = self.data.unused() if isinstance(self.data, predicted.Predictions) else []
         return [replace(each, what=f"the truth, {self.source.path}: {each.what}") for each in unused]
 
     def _masses(self) -> list[check.Finding]:
-        """Of a few estimated bodies."""
-        bodies = self.bodies.posed(self.estimates[check.evenly(len(self.estimates), WEIGHED)])
+        """Findings about the masses of a few estimated bodies."""
+        bodies = self.body_models.posed(self.estimates[check.evenly(len(self.estimates), SAMPLED_BODIES)])
         if bodies.vertices is None or bodies.model is None:
             return []
         masses = mass_properties(bodies.vertices, bodies.model.template).mass
-        known = masses[np.isfinite(masses)]
-        return judge.mass(float(np.median(known))) if len(known) else []
+        finite = masses[np.isfinite(masses)]
+        return judge.mass(float(np.median(finite))) if len(finite) else []
 
     def _betas(self) -> list[check.Finding]:
-        """Whether the model has as many components of shape as the predictions."""
-        some = self.estimates[slice(0, 1)]
-        if some.betas is None or some.body is None or some.vertices is not None or not self.bodies.has(some.body):
+        """Findings if the predictions have more shape components than the body model."""
+        first = self.estimates[slice(0, 1)]
+        if (
+            first.betas is None
+            or first.body is None
+            or first.vertices is not None
+            or not self.body_models.has(first.body)
+        ):
             return []
-        gender = "neutral" if some.genders is None else str(some.genders[0])
-        width, model = some.betas.shape[1], self.bodies.get(some.body, gender, some.betas.shape[1])
+        gender = "neutral" if first.genders is None else str(first.genders[0])
+        width, model = first.betas.shape[1], self.body_models.get(first.body, gender, first.betas.shape[1])
         if width <= model.num_betas:
             return []
         return [check.Finding("odd", f"betas: the first {model.num_betas} of {width}, as many as {model.name} has")]
 
     def _axes(self) -> list[check.Finding]:
-        """Whether the estimated people lie or hang along another axis than the data set's up."""
-        some = check.sample(self.estimates)
-        ground = some.ground or self.data[slice(0, 1)].ground
-        bodies = self.bodies.posed(some)
+        """Findings if the estimated people stand along another axis than the data set's up."""
+        frames = check.sample(self.estimates)
+        ground = frames.ground or self.data[slice(0, 1)].ground
+        bodies = self.body_models.posed(frames)
         if ground is None or bodies.joints is None:
             return []
         normal = ground.normal if ground.normal.ndim == 1 else ground.normal[0]
-        standing = replace(some, joints=bodies.joints, joint_names=bodies.joint_names, ground=Ground(normal))
-        found = [each for each in check.of_frames(standing) if each.what.startswith("joints: looks like")]
-        return [replace(each, advice=self._other_axes, option="") for each in found]
+        standing = replace(frames, joints=bodies.joints, joint_names=bodies.joint_names, ground=Ground(normal))
+        findings = [each for each in check.check_frames(standing) if each.what.startswith("joints: looks like")]
+        return [replace(each, advice=self._other_axes, option="") for each in findings]
 
     def _turned(self) -> list[check.Finding]:
-        """Whether the estimated people fit the true ones only when they are turned, as from a camera's axes."""
+        """Findings if the estimated people match the true ones only after a rotation, such as from a camera's axes."""
         from scipy.spatial.transform import Rotation
 
-        true = self._truth(check.evenly(len(self.data), WEIGHED))
-        where = self.estimates.index.find(true.names)
-        there = np.flatnonzero(where >= 0)
-        if self.definition is None or not len(there):
+        true = self._truth(check.evenly(len(self.data), SAMPLED_BODIES))
+        rows = self.estimates.index.find(true.names)
+        paired = np.flatnonzero(rows >= 0)
+        if self.definition is None or not len(paired):
             return []
-        truth, guess = self.bodies.posed(true[there]), self.bodies.posed(self.estimates[where[there]])
-        joints = compared(truth, guess, self.definition, self.joint_regressors)
+        truth, guess = self.body_models.posed(true[paired]), self.body_models.posed(self.estimates[rows[paired]])
+        joints = paired_joints(truth, guess, self.definition, self.joint_regressors)
         _, matrices, _ = similarity(joints.true, joints.estimated)
         matrices = matrices[np.isfinite(matrices).all(axis=(1, 2))]
         if not len(matrices):
             return []
         turns = Rotation.from_matrix(matrices)
         angle = float(np.degrees(np.median(turns.magnitude())))
-        if angle <= TURNED:
+        if angle <= LARGE_TURN:
             return []
-        said = f"predicted people are the true ones turned by {angle:.0f} degrees in the median"
+        message = f"predicted people are the true ones turned by {angle:.0f} degrees in the median"
         mean = turns.mean()
-        if np.degrees(np.median((mean.inv() * turns).magnitude())) < ALIKE:
+        if np.degrees(np.median((mean.inv() * turns).magnitude())) < COMMON_TURN:
             axis = mean.as_rotvec() / mean.magnitude()
             axis *= np.sign(axis[np.abs(axis).argmax()]) if angle > 179 else 1.0  # either way about it is the same
-            said += f", about ({', '.join(f'{number + 0.0:.2g}' for number in axis.round(2))})"
+            message += f", about ({', '.join(f'{number + 0.0:.2g}' for number in axis.round(2))})"
         advice = f"turn them back if their axes are other ones than the data set's{self._other_frame}"
-        return [check.Finding("odd", said, advice)]
+        return [check.Finding("odd", message, advice)]
 
     @property
     def _other_axes(self) -> str:
-        """What mends predictions in other axes than the data set's."""
+        """Advice for predictions in other axes than the data set's."""
         return f"turn them, or give the file a ground (4,) of its own: normal and height{self._other_frame}"
 
     @property
     def _other_frame(self) -> str:
         """The option of the data set's reader that gives its people in other axes, where it has one."""
-        known = () if self.source.name == OWN else inspect.signature(data.module(self.source.name).open).parameters
-        return ", or --option frame=camera or frame=world" if "frame" in known else ""
+        options = () if self.source.name == OWN else inspect.signature(data.module(self.source.name).open).parameters
+        return ", or --option frame=camera or frame=world" if "frame" in options else ""
 
     @cached_property
-    def made_of(self) -> dict[str, Any]:
-        """All that decides the figures; no paths, for other machines have other ones."""
+    def manifest(self) -> dict[str, Any]:
+        """Everything that determines the results; no paths, because these differ between machines."""
         kinds = {self.data[slice(0, 1)].body}
         if self.predictions != TRUTH:
             kinds.add(self.estimates[slice(0, 1)].body)
-        files = [path for kind in kinds - {None} for path in self.bodies.files(str(kind))]
+        files = [path for kind in kinds - {None} for path in self.body_models.files(str(kind))]
         true = self.data
         return {
             "predictions": TRUTH if self.predictions == TRUTH else self.estimates.fingerprint,
@@ -280,7 +288,7 @@ class Job(Resumable):
             if isinstance(true, predicted.Predictions)
             else _content(check.sample(true, 16)),
             "split": self.source.split,
-            "options": self.source.made_of,
+            "options": self.source.manifest,
             "frames": len(self.data),
             "models": {path.name: predicted.fingerprint(path) for path in sorted(files)},
             "regressors": sorted(predicted.fingerprint(Path(path)) for path in self.regressors),
@@ -293,44 +301,45 @@ class Job(Resumable):
         }
 
     def run(self, shard: Shard, progress: Callable[[int], None] = lambda frames: None) -> None:
-        """Does the pieces of a shard that are not there yet; `progress` is told how many frames were done more."""
+        """Computes the missing pieces of a shard; `progress(frames)` is called after each with its number of frames."""
         for number in shard.of(self.pieces):
             if not self.done(number):
                 self.measure(number)
                 progress(self.frames(number))
 
     def measure(self, number: int) -> None:
-        """Does a piece. ValueError where frames have no prediction or something does not fit."""
+        """Computes and saves a piece. ValueError where frames have no prediction, or shapes do not match."""
         start = number * self.piece
-        self.save(number, columns(self, start, start + self.frames(number)))
+        self.save(number, piece_metrics(self.pair, self.setup, start, start + self.frames(number)))
 
     def damaged(self) -> list[int]:
-        """Pieces that are there, but not whole or not of this evaluation: `run` does them again."""
+        """Pieces that exist but are incomplete or of another evaluation: `run` computes them again."""
         return [number for number in range(self.pieces) if self.file(number).exists() and not self.done(number)]
 
     def missing(self) -> list[int]:
+        """Pieces that are not there, or damaged."""
         return [number for number in range(self.pieces) if not self.done(number)]
 
     def results(self) -> Iterator[Columns]:
-        """The figures of all pieces, in the order of the frames. ValueError where one is missing."""
+        """The metrics of all pieces, in the order of the frames. ValueError if a piece is missing."""
         for number in range(self.pieces):
             yield self.result(number)
 
     def pair(self, rows: slice) -> tuple[Frames, Frames, NDArray[np.int64]]:
-        """True and estimated frames of the same names, and their numbers. ValueError where some have no estimate."""
+        """True and estimated frames of the same names, and their numbers. ValueError if a frame has no estimate."""
         true = self._truth(rows)
         if self.predictions == TRUTH:
             return true, true, rows.start + np.arange(len(true))
-        where = self.estimates.index.find(true.names)
-        if (where < 0).any() and not self.partial:
-            lacking = true.names[where < 0]
+        matches = self.estimates.index.find(true.names)
+        if (matches < 0).any() and not self.partial:
+            lacking = true.names[matches < 0]
             raise ValueError(
                 f"{self.predictions}: no prediction for {len(lacking)} of the frames {true.names[0]} to "
                 f"{true.names[-1]} of {self.source.name}, such as {str(lacking[0])!r}; the file's names are like "
                 f"{str(self.estimates.columns['names'][:1][0])!r}; --partial leaves them out"
             )
-        there = np.flatnonzero(where >= 0)
-        return true[there], self.estimates[where[there]], rows.start + there
+        paired = np.flatnonzero(matches >= 0)
+        return true[paired], self.estimates[matches[paired]], rows.start + paired
 
     def _truth(self, rows: Rows) -> Frames:
         true = self.data[rows]
@@ -342,7 +351,7 @@ def is_file(value: str | int | float) -> TypeGuard[str]:
 
 
 def _content(frames: Frames) -> str:
-    """Of the numbers of some frames: whether a data set is the same as before."""
+    """A hash of the numbers of some frames, which identifies a data set."""
     digest = hashlib.sha256()
     for field in fields(frames):
         value = getattr(frames, field.name)
@@ -352,12 +361,12 @@ def _content(frames: Frames) -> str:
     return digest.hexdigest()
 
 
-def methods(files: Sequence[Path]) -> list[str]:
-    """A name for each file of predictions, its own where no other has it."""
-    found: list[str] = []
+def method_names(files: Sequence[Path]) -> list[str]:
+    """A unique name for each file of predictions: the file's name, with a number if it occurs again."""
+    names: list[str] = []
     for path in files:
         name, number = path.stem, 2
-        while name in found:
+        while name in names:
             name, number = f"{path.stem}-{number}", number + 1
-        found.append(name)
-    return found
+        names.append(name)
+    return names

@@ -1,4 +1,4 @@
-"""The arrays of predictions, in .npz files and in the columns of Parquet: which are text, lengths, labels, points."""
+"""The arrays of predictions (of .npz files, or columns of Parquet), by type: text, lengths, labels, numbers, points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figures of an evaluation: how each is called and shown."""
+"""The metrics of an evaluation: titles, units, explanations, and what each needs."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ _MAT = "a measured pressure map, and what BoSE needs"
 
 
 @dataclass(frozen=True)
-class Figure:
-    """A number a frame, in the files in metres, radians or shares; shown times `factor` in `unit`.
+class Metric:
+    """One number per frame, stored in metres, radians or shares, and shown times `factor` in `unit`.
 
-    better: −1 where less is better, 1 where more is. needs: without it no frame has the figure. undefined: why a frame
-    with a finite body may have none nevertheless.
+    better: −1 if less is better, 1 if more is. needs: what data set and predictions must have for it. undefined: why a
+    frame with a finite body may lack it.
     """
 
     title: str
@@ -31,19 +31,19 @@ class Figure:
     undefined: str = "not measured"
 
 
-def _mm(title: str, what: str, needs: str, undefined: str = "not measured") -> Figure:
-    return Figure(title, "mm", 1e3, 1, -1, what, needs, undefined)
+def _mm(title: str, what: str, needs: str, undefined: str = "not measured") -> Metric:
+    return Metric(title, "mm", 1e3, 1, -1, what, needs, undefined)
 
 
-def _percent(title: str, what: str, needs: str = _FLOOR) -> Figure:
-    return Figure(title, "%", 100.0, 1, 1, what, needs, "not labelled")
+def _percent(title: str, what: str, needs: str = _FLOOR) -> Metric:
+    return Metric(title, "%", 100.0, 1, 1, what, needs, "not labelled")
 
 
-def _share(title: str, what: str) -> Figure:
-    return Figure(title, "", 1.0, 3, 1, what, _MAT)
+def _share(title: str, what: str) -> Metric:
+    return Metric(title, "", 1.0, 3, 1, what, _MAT)
 
 
-FIGURES = {
+METRICS = {
     "mpjpe": _mm("MPJPE", "mean distance of the joints, aligned at the pelvis", _JOINTS),
     "pa_mpjpe": _mm("PA-MPJPE", "after the best rotation, scale and translation", _JOINTS),
     "mpjpe_world": _mm("MPJPE world", "mean distance of the joints, not aligned", _JOINTS),
@@ -53,7 +53,7 @@ FIGURES = {
     "bose_3cm": _percent("BoSE 3 cm", "contacts within 3 cm"),
     "bose_strict": _percent("BoSE strict", "of the paper's centre of mass, put on the floor, contacts within 2.5 cm"),
     "bose_released": _percent("BoSE released", "what the authors' code prints: agreement with the label", "labels"),
-    "tilt": Figure(
+    "tilt": Metric(
         "tilt", "°", 57.29577951308232, 2, -1, "of the pelvis, relative to gravity", f"{_JOINTS}, and a ground"
     ),
     "penetration": _mm("penetration", "of the lowest vertex into the ground", _FLOOR),

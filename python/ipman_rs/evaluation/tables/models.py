@@ -1,4 +1,4 @@
-"""The body models that frames name: embedded ones, and SMPL, SMPL+H and SMPL-X files in a folder of the user's."""
+"""The body models of frames: embedded ones, and the user's files of SMPL, SMPL+H and SMPL-X."""
 
 from __future__ import annotations
 
@@ -10,52 +10,49 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ipman_rs as ip
-from ipman_rs.body import BodyModel, embedded, mesh_file
+from ipman_rs.body import BodyModel, embedded, formats, mesh_file
 from ipman_rs.body.hands import Hands
 from ipman_rs.data.frames import Frames
 
 GENDERS = ("neutral", "male", "female")
 _ENDINGS = (".npz", ".pkl")
-# Names under which SMPL itself is downloaded; all else is called SMPLX_NEUTRAL.npz and so on.
-_DOWNLOADED = {"neutral": "basicmodel_neutral_lbs", "male": "basicmodel_m_lbs", "female": "basicmodel_f_lbs"}
-_BODY_JOINTS = 22  # of every model of the family, in one order
 
 
 @dataclass(frozen=True, eq=False)
-class Bodies:
-    """Posed bodies, or what the frames have of them; arrays (F, n, 3) m."""
+class FrameBodies:
+    """The posed bodies of F frames, as far as the frames have them; arrays (F, n, 3) m."""
 
     kind: str | None  # "smpl", "anny" …
     model: BodyModel | None  # whose faces and parts the vertices have
     vertices: NDArray[Any] | None
-    own: NDArray[Any] | None  # the joints of the posed body model
-    given: NDArray[Any] | None  # the joints that the frames name themselves: measured, or predicted without a body
-    given_names: tuple[str, ...]
-    without_model: str | None = None  # such as SMPLX_FEMALE: of a pose that has no model here, beside given joints
+    model_joints: NDArray[Any] | None  # of the posed body model
+    file_joints: NDArray[Any] | None  # that the frames name themselves: measured, or predicted without a body
+    file_joint_names: tuple[str, ...]
+    missing_model: str | None = None  # such as SMPLX_FEMALE: the model file that the poses need and that is not there
 
     @property
-    def own_names(self) -> tuple[str, ...]:
-        return () if self.own is None or self.model is None else self.model.joint_names
+    def model_joint_names(self) -> tuple[str, ...]:
+        return () if self.model_joints is None or self.model is None else self.model.joint_names
 
     @property
     def joints(self) -> NDArray[Any] | None:
-        """Some joints, by `joint_names`: the body's own before given ones."""
-        return self.given if self.own is None else self.own
+        """The joints named by `joint_names`: of the body model if there is one, else of the file."""
+        return self.file_joints if self.model_joints is None else self.model_joints
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        return self.given_names if self.own is None else self.own_names
+        return self.file_joint_names if self.model_joints is None else self.model_joint_names
 
 
 @dataclass(eq=False)
 class Models:
-    """`folder`: where model files are, anywhere below it, or None."""
+    """Body models, loaded when needed. folder: model files are anywhere below it; None: embedded ones only."""
 
     folder: Path | None = None
     _loaded: dict[tuple[str, str, int, str | None], BodyModel] = field(default_factory=dict)
 
     def get(self, kind: str, gender: str = "neutral", betas: int = 10, rest_shape: str | None = None) -> BodyModel:
-        """The model of a kind ("smpl", "smplh", "smplx", or an embedded one's name).
+        """The model of a kind (one of `body.formats.FORMATS`, or an embedded one's name).
 
         `rest_shape`: a mesh file of a person's own body in the zero pose, instead of the model's mean. ValueError if
         there is no file, or if the mesh has other vertices than the model.
@@ -91,20 +88,20 @@ class Models:
         return kind in embedded.NAMES or bool(self.files(kind))
 
     def files(self, kind: str) -> list[Path]:
-        """Of that kind, of any gender."""
-        found = [self._found(kind, gender) for gender in GENDERS]
-        return sorted({path for path in found if path is not None})
+        """The model files of a kind, of all genders."""
+        paths = [self._found(kind, gender) for gender in GENDERS]
+        return sorted({path for path in paths if path is not None})
 
-    def posed(self, frames: Frames) -> Bodies:
-        """Vertices and joints of the frames. ValueError where a pose does not fit its model, or where the pose is all
-        that there is and its model is not."""
+    def posed(self, frames: Frames) -> FrameBodies:
+        """Vertices and joints of the frames. ValueError if a pose does not match its model, or if frames have only a
+        pose and its model is missing."""
         vertices, own, kind = frames.vertices, None, frames.body
         needed = vertices is None and frames.joints is None
         model = None if kind is None or not (needed or self.has(kind)) else self.template_of(kind, _genders(frames)[0])
         if frames.pose is not None and kind is not None and model is not None and vertices is None:
             vertices, own = self._skinned(frames, kind)
         lacking = file_of(frames) if frames.pose is not None and vertices is None else None
-        return Bodies(kind, model, vertices, own, frames.joints, tuple(frames.joint_names or ()), lacking)
+        return FrameBodies(kind, model, vertices, own, frames.joints, tuple(frames.joint_names or ()), lacking)
 
     def _skinned(self, frames: Frames, kind: str) -> tuple[NDArray[Any], NDArray[Any]]:
         pose = np.asarray(frames.pose)
@@ -117,7 +114,7 @@ class Models:
             model = self.get(kind, str(gender), width, frames.rest_shape)
             betas = None if frames.rest_shape is not None else frames.betas
             posed = model(
-                _on_joints(pose[rows], model),
+                formats.on_joints(pose[rows], model, kind),
                 None if betas is None else betas[rows, : model.num_betas],
                 None if frames.transl is None else frames.transl[rows],
             )
@@ -128,16 +125,17 @@ class Models:
         return vertices, joints
 
     def file(self, kind: str, gender: str) -> Path:
-        found = self._found(kind, gender)
-        if found is not None:
-            return found
+        path = self._found(kind, gender)
+        if path is not None:
+            return path
         where = "no folder is named by --models" if self.folder is None else f"there is none under {self.folder}"
         raise ValueError(f"the body {kind} ({gender}) needs its model file, {_stem(kind, gender)}.npz or .pkl: {where}")
 
     def _found(self, kind: str, gender: str) -> Path | None:
         if self.folder is None:
             return None
-        stems = [f"{kind}_{gender}", *([_DOWNLOADED[gender]] if kind == "smpl" else [])]
+        downloaded = formats.FORMATS[kind].downloaded if kind in formats.FORMATS else {}
+        stems = [f"{kind}_{gender}", *([downloaded[gender]] if gender in downloaded else [])]
         files = sorted(path for path in self.folder.rglob("*") if path.suffix.lower() in _ENDINGS)
         return next((path for stem in stems for path in files if path.stem.lower().startswith(stem)), None)
 
@@ -152,19 +150,5 @@ def _stem(kind: str, gender: str) -> str:
 
 
 def _genders(frames: Frames) -> list[str]:
-    """Of the people, each once."""
+    """The genders of the people, without repetition."""
     return ["neutral"] if frames.genders is None or not len(frames) else np.unique(frames.genders).tolist()
-
-
-def _on_joints(pose: NDArray[Any], model: BodyModel) -> NDArray[Any]:
-    """A pose (F, j, 3) on the joints of a model: those that it lacks at the end (hands, face) are at rest."""
-    given, wanted = pose.shape[1], model.num_joints
-    if given == wanted:
-        return pose
-    if not _BODY_JOINTS <= given < wanted:
-        raise ValueError(f"pose: has {given} joints, but the body {model.name} has {wanted}; is the right body named?")
-    # Of SMPL's 24 joints the last two are the hands, which other models have as fingers, or not at all.
-    kept = given if given != 24 else _BODY_JOINTS
-    filled = np.zeros((len(pose), wanted, 3), pose.dtype)
-    filled[:, :kept] = pose[:, :kept]
-    return filled

@@ -1,7 +1,7 @@
 """The shards of an evaluation as tasks of Ray (the extra `ray`), on this machine or a cluster.
 
-The tasks write their pieces into the evaluation's folder, so on a cluster it must lie on a disk that all machines see,
-as must the predictions, the data and the models. What comes out is the same to the bit, for it is made of the pieces.
+The tasks write their pieces into the evaluation's folder, so on a cluster it must be on a disk that all machines share,
+as must the predictions, the data and the models. The results have the same bits, because they come from the pieces.
 """
 
 from __future__ import annotations
@@ -18,8 +18,11 @@ STORE = 80_000_000  # bytes, about the least that Ray takes
 
 
 def run(jobs: list[Job], progress: Callable[[int], None], address: str | None = None) -> None:
-    """Does what is missing. `progress` is told how many frames were done more. ValueError without ray, and for what the
-    tasks raise; their pieces are kept."""
+    """Computes the missing pieces. `progress(frames)` is called with the number of frames that were added.
+
+    Raises:
+        ValueError: ray is not installed, or a task failed; the pieces of other tasks are kept.
+    """
     try:
         import ray  # pyright: ignore[reportMissingImports]
     except ImportError as error:
@@ -27,7 +30,7 @@ def run(jobs: list[Job], progress: Callable[[int], None], address: str | None = 
     begun_here = not ray.is_initialized()
     if begun_here:
         quiet = {"include_dashboard": False, "log_to_driver": False, "configure_logging": False}
-        # Tasks send words only; where a cluster is joined, its store is as it is.
+        # Tasks send plain values only, so a small store will do; the store of a cluster is not changed.
         store = {} if address or os.environ.get("RAY_ADDRESS") else {"object_store_memory": STORE}
         ray.init(address=address, **quiet, **store)
     try:
@@ -41,11 +44,11 @@ def _run(ray: Any, jobs: list[Job], progress: Callable[[int], None]) -> None:
     tasks = ray.remote(num_cpus=1, max_retries=2)(_shard)
     workers = max(1, int(ray.cluster_resources().get("CPU", 1)))
     waiting = []
-    for job in map(_anywhere, jobs):
-        # Several a worker: they end at about the same time although pieces differ.
+    for job in map(_portable, jobs):
+        # Several tasks per worker, so that workers end at about the same time although pieces differ.
         count = max(1, min(4 * workers, job.pieces))
         waiting += [tasks.remote(job, Shard(index + 1, count)) for index in range(count)]
-    before = _there(jobs)
+    before = _finished_frames(jobs)
     while waiting:
         done, _ = ray.wait(list(waiting), num_returns=1, timeout=1.0)
         for each in done:
@@ -54,13 +57,13 @@ def _run(ray: Any, jobs: list[Job], progress: Callable[[int], None]) -> None:
                 ray.get(each)
             except ray.exceptions.RayTaskError as error:
                 raise ValueError(str(error.cause)) from None
-        now = _there(jobs)
+        now = _finished_frames(jobs)
         progress(now - before)
         before = now
 
 
-def _anywhere(job: Job) -> Job:
-    """The same job in words that another process understands: nothing opened, and whole paths."""
+def _portable(job: Job) -> Job:
+    """The same job for another process: nothing opened, and absolute paths."""
 
     def whole(path: str | None) -> str | None:
         return None if path is None else str(Path(path).resolve())
@@ -80,8 +83,8 @@ def _anywhere(job: Job) -> Job:
     )
 
 
-def _there(jobs: list[Job]) -> int:
-    """Frames whose piece is there, whichever task wrote it."""
+def _finished_frames(jobs: list[Job]) -> int:
+    """The number of frames whose piece exists, whichever task wrote it."""
     return sum(job.frames(number) for job in jobs for number in range(job.pieces) if job.file(number).exists())
 
 

@@ -1,7 +1,7 @@
-"""The tables of the paper (Tripathi et al., CVPR 2023): which data, which figures, and all that is printed there.
+"""The tables of the paper (Tripathi et al., CVPR 2023): their data, their metrics, and the printed values.
 
-Printed figures are in the units that the paper prints (mm, %), and of the paper's own predictions: yours are measured
-beside them. Two tables print HMR* on RICH with other last digits (48.3 and 92.4, 48.2 and 92.3); each stands as it is.
+Printed values are in the paper's units (mm, %) and of the paper's own predictions; the user's are shown beside them.
+Two tables print HMR* on RICH with different last digits (48.3 and 92.4, 48.2 and 92.3); both are kept as printed.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ Printed = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Table:
-    """figures: the columns, by their names in `figures.FIGURES`; published: by method, then by figure, as printed.
+    """metrics: the columns, by their names in `metrics.METRICS`; published: by method, then by metric, as printed.
 
-    options: of the data set's reader, where the user gives no other. regressor: whether the paper compares the joints
-    of J_regressor_h36m.npy. across: one row a figure and one column a method, instead of the other way round.
+    options: of the data set's reader, unless the user gives others. regressor: whether the paper compares the joints
+    of J_regressor_h36m.npy. across: one row per metric and one column per method, instead of the other way round.
     """
 
     title: str
     data: str
     split: str | None
-    figures: tuple[str, ...]
+    metrics: tuple[str, ...]
     published: Printed = field(default_factory=dict)
     note: str = ""
     across: bool = False
@@ -32,7 +32,7 @@ class Table:
 
 
 def _rows(figures: tuple[str, ...], rows: Mapping[str, tuple[float | None, ...]]) -> Printed:
-    """Printed rows by method and figure; None where the paper has a dash."""
+    """Printed values by method and metric; None where the paper has a dash."""
     return {
         method: {figure: value for figure, value in zip(figures, values, strict=True) if value is not None}
         for method, values in rows.items()

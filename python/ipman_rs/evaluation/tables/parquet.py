@@ -1,4 +1,4 @@
-"""Parquet files, by pyarrow (the extra `evaluate`): columns unpacked row by row, and a table written piece by piece."""
+"""Reading predictions from Parquet files with pyarrow (the extra `evaluate`): columns are unpacked into .npy files."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from ipman_rs.files import being_written
+from ipman_rs.files import atomic_write
 
 from .layout import FOR_ALL, NUMBERS, TEXT
-from .rows import RowsOnDisk, of_npy
+from .rows import RowsOnDisk, open_npy
 
 _BATCH = 4096  # rows
 
 
-def needed() -> tuple[Any, Any]:
+def require_pyarrow() -> tuple[Any, Any]:
     """pyarrow and its Parquet module; ValueError where it is missing."""
     try:
         import pyarrow
@@ -32,47 +32,54 @@ def needed() -> tuple[Any, Any]:
 
 
 def read(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any], frozenset[str]]:
-    """The columns of predictions, unpacked into a folder, what is one for all frames, and the names of all columns.
-    ValueError if damaged."""
-    needed()
+    """The columns of predictions, unpacked into a folder; the values that all frames share; the names of all columns.
+
+    Raises:
+        ValueError: the file is damaged, or pyarrow is missing.
+    """
+    require_pyarrow()
     try:
-        with _opened(path) as file:
-            known = frozenset(file.schema_arrow.names)
-            columns = {name: _unpacked(path, file, name, unpacked) for name in (*TEXT, *NUMBERS) if name in known}
-            common = {name: _one(path, file, name) for name in FOR_ALL if name in known and file.metadata.num_rows}
+        with _open(path) as file:
+            available = frozenset(file.schema_arrow.names)
+            columns = {name: _unpack(path, file, name, unpacked) for name in (*TEXT, *NUMBERS) if name in available}
+            common = {
+                name: _common_value(path, file, name)
+                for name in FOR_ALL
+                if name in available and file.metadata.num_rows
+            }
     except Exception as error:  # damaged bytes can fail in any way
         if isinstance(error, OSError) and error.errno not in (None, errno.EINVAL):
             raise  # the disk is full, say
         if str(error).startswith(f"{path}: "):
             raise
         raise ValueError(f"{path}: not a Parquet file that can be read ({error}); is it complete?") from error
-    return columns, common, known
+    return columns, common, available
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    _, parquet = needed()
+def _open(path: Path) -> Iterator[Any]:
+    _, parquet = require_pyarrow()
     # Buffered: otherwise a whole row group, often the whole file, comes into memory.
     with parquet.ParquetFile(path, buffer_size=1 << 20, pre_buffer=False) as file:
         yield file
 
 
-def _unpacked(path: Path, file: Any, name: str, folder: Path) -> RowsOnDisk:
+def _unpack(path: Path, file: Any, name: str, folder: Path) -> RowsOnDisk:
     place = folder / f"{name}.npy"
     if not place.exists():
         folder.mkdir(parents=True, exist_ok=True)
         shape, dtype = _shape(path, file, name)
-        with being_written(place) as out:
+        with atomic_write(place) as out:
             npy.write_array_header_1_0(out, {"descr": dtype.str, "fortran_order": False, "shape": shape})
             for rows in _batches(path, file, name):
                 if rows.shape[1:] != shape[1:]:
                     raise ValueError(f"{path}: {name}: rows of {rows.shape[1:]} and of {shape[1:]} numbers")
                 out.write(np.ascontiguousarray(rows, dtype).tobytes())
-    return of_npy(place)
+    return open_npy(place)
 
 
 def _shape(path: Path, file: Any, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Of the whole column; text is as wide as its longest."""
+    """Shape and type of a whole column; text is as wide as its longest entry."""
     row: tuple[int, ...] = ()
     dtype = np.dtype("U1")
     for number, rows in enumerate(_batches(path, file, name)):
@@ -84,8 +91,8 @@ def _shape(path: Path, file: Any, name: str) -> tuple[tuple[int, ...], np.dtype[
 
 
 def _batches(path: Path, file: Any, name: str) -> Iterator[NDArray[Any]]:
-    """The rows of a column, (n,) or (n, width), a batch after the other."""
-    pyarrow, _ = needed()
+    """The rows of a column, batch by batch, (n,) or (n, width)."""
+    pyarrow, _ = require_pyarrow()
     for batch in file.iter_batches(batch_size=_BATCH, columns=[name]):
         column = batch.column(0)
         count = len(column)
@@ -104,12 +111,12 @@ def _batches(path: Path, file: Any, name: str) -> Iterator[NDArray[Any]]:
 
 
 def _is_text(kind: Any) -> bool:
-    types = needed()[0].types
+    types = require_pyarrow()[0].types
     return types.is_string(kind) or types.is_large_string(kind) or types.is_dictionary(kind)
 
 
-def _one(path: Path, file: Any, name: str) -> NDArray[Any]:
-    """What every row says. ValueError where they differ."""
+def _common_value(path: Path, file: Any, name: str) -> NDArray[Any]:
+    """The value that all rows have. ValueError where they differ."""
     first = None
     for rows in _batches(path, file, name):
         first = rows[0] if first is None else first

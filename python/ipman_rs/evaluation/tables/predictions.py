@@ -1,19 +1,19 @@
-"""Estimated bodies in a file, .npz or .parquet, in the same form as those of a data set.
+"""Estimated bodies from an .npz or .parquet file, in the form of a data set.
 
 | array | | |
 |---|---|---|
-| `names` | (F,) | of the frames, as the data set calls them; in any order |
+| `names` | (F,) | names of the frames in the data set, in any order |
 | `pose`, `betas`, `transl` | (F, J, 3) or (F, 3 J), (F, n), (F, 3) | rotation vectors, shape, metres |
-| `body` | one word | "smpl", "smplh", "smplx", "anny", "anny-lite": what `pose` is of |
-| `vertices`, `joints`, `joint_names` | (F, V, 3) m, (F, K, 3) m, (K,) | instead of parameters, or beside them |
-| `ground` | (4,) or (F, 4) | the normal and the height, if not the data set's |
+| `body` | one word | the body model of `pose`: "smpl", "smplh", "smplx", "anny", "anny-lite" |
+| `vertices`, `joints`, `joint_names` | (F, V, 3) m, (F, K, 3) m, (K,) | instead of parameters, or in addition |
+| `ground` | (4,) or (F, 4) | normal and height, if they differ from the data set's |
 | `sequences`, `frame_rate`, `genders` | (F,), Hz, (F,) | |
 | `center_of_mass`, `center_of_pressure` | (F, 3) m | measured, in a data set of your own |
 | `standing`, `contact` | (F,) | labelled, in a data set of your own |
 
-`betas` and `ground` may be one row for all frames. In Parquet each is a column of that name, one list a frame; what is
-one for all frames is repeated. The data set "own" has the same form: `ipman evaluate estimated.npz --data own --path
-true.npz`.
+`betas` and `ground` may be one row for all frames. In Parquet each array is a column of that name, one list per frame,
+in which values for all frames are repeated. The data set "own" has the same form: `ipman evaluate estimated.npz --data
+own --path true.npz`.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from numpy.typing import NDArray
 
 from ipman_rs.data import check, judge
 from ipman_rs.data.frames import Frames, Rows
-from ipman_rs.files import regular, safe_npz
+from ipman_rs.files import regular_file, safe_npz
 from ipman_rs.ground import Ground
 
 from . import parquet
 from .layout import FOR_ALL, LABELS, LENGTHS, NUMBERS, POINTS, TEXT
-from .rows import RowsOnDisk, of_npz
+from .rows import RowsOnDisk, open_npz
 
 LISTED = 12  # names of arrays
 
 
 @dataclass(frozen=True)
-class Reading:
-    """How a file's numbers are to be read: metres in one of its lengths, and whether its rotations are degrees.
+class ReadOptions:
+    """How a file's numbers are read.
 
-    force: what cannot be a person is let in, too."""
+    unit: metres per unit of length. degrees: rotations are in degrees. force: implausible people are accepted."""
 
     unit: float = 1.0
     degrees: bool = False
@@ -52,72 +52,76 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Predictions:
-    """Reads like a data set: its length, and any of its frames."""
+    """Predictions as a `DataSet`: a length, and any of the frames."""
 
     path: Path
     columns: dict[str, RowsOnDisk]
-    common: dict[str, Any]  # what is one for all frames
+    common: dict[str, Any]  # values that all frames share
     fingerprint: str  # of the file's bytes
-    reading: Reading = Reading()
-    others: tuple[str, ...] = ()  # further arrays of the file, which nothing reads
+    options: ReadOptions = ReadOptions()
+    others: tuple[str, ...] = ()  # names of the file's arrays that are not used
 
     def __len__(self) -> int:
         return len(self.columns["names"])
 
     def __getitem__(self, rows: Rows) -> Frames:
-        found: dict[str, Any] = {name: column[rows] for name, column in self.columns.items()}
+        arrays: dict[str, Any] = {name: column[rows] for name, column in self.columns.items()}
         for name in POINTS:
-            if name in found:
-                found[name] = found[name].reshape(len(found[name]), int(np.prod(found[name].shape[1:])) // 3, 3)
-        for name in found.keys() & set(NUMBERS):
-            kind = found[name].dtype
-            found[name] = found[name].astype(bool if name in LABELS else np.promote_types(kind, "f4"))
-        if self.reading.unit != 1.0:
-            for name in found.keys() & {*LENGTHS}:
-                found[name] = found[name] * self.reading.unit
-        if self.reading.degrees and "pose" in found:
-            found["pose"] = np.radians(found["pose"])
+            if name in arrays:
+                arrays[name] = arrays[name].reshape(len(arrays[name]), int(np.prod(arrays[name].shape[1:])) // 3, 3)
+        for name in arrays.keys() & set(NUMBERS):
+            kind = arrays[name].dtype
+            arrays[name] = arrays[name].astype(bool if name in LABELS else np.promote_types(kind, "f4"))
+        if self.options.unit != 1.0:
+            for name in arrays.keys() & {*LENGTHS}:
+                arrays[name] = arrays[name] * self.options.unit
+        if self.options.degrees and "pose" in arrays:
+            arrays["pose"] = np.radians(arrays["pose"])
         if "betas" in self.common:
-            found["betas"] = np.repeat(self.common["betas"], len(found["names"]), axis=0)
-        if "ground" in found:
-            found["ground"] = _ground(found["ground"])
-        found.setdefault("sequences", found["names"])
-        every = {**self.common, **found}
-        if self.reading.unit != 1.0 and "ground" in every:
-            every["ground"] = Ground(every["ground"].normal, every["ground"].height * self.reading.unit)
+            arrays["betas"] = np.repeat(self.common["betas"], len(arrays["names"]), axis=0)
+        if "ground" in arrays:
+            arrays["ground"] = _ground(arrays["ground"])
+        arrays.setdefault("sequences", arrays["names"])
+        every = {**self.common, **arrays}
+        if self.options.unit != 1.0 and "ground" in every:
+            every["ground"] = Ground(every["ground"].normal, every["ground"].height * self.options.unit)
         return Frames(**every)
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
-        """What is odd about a sample, in words. ValueError, naming the option that mends it, for what is wrong."""
-        found = [each for each in check.of_frames(check.sample(self)) if not each.what.startswith("lowest of")]
-        return judge.admit(self.path, [*found, *self.unused()], self.reading.force)
+        """What is unusual about a sample, in words. ValueError, naming the option to use, for what is wrong."""
+        findings = [each for each in check.check_frames(check.sample(self)) if not each.what.startswith("lowest of")]
+        return judge.admit(self.path, [*findings, *self.unused()], self.options.force)
 
     def unused(self) -> list[check.Finding]:
-        """What of the file no figure is made of."""
-        found = []
+        """Findings about arrays that no metric uses."""
+        findings = []
         beside = [name for name in ("pose", "betas", "transl") if name in self.columns or name in self.common]
         if "vertices" in self.columns and "pose" in beside:
             what = f"vertices are compared, not the bodies of {', '.join(beside)} beside them"
-            found.append(check.Finding("odd", what, "leave one of the two out"))
+            findings.append(check.Finding("odd", what, "leave one of the two out"))
         if self.others:
-            found.append(check.Finding("odd", f"not used: {safe_npz.first(self.others, LISTED)}"))
-        return found
+            findings.append(check.Finding("odd", f"not used: {safe_npz.first_arrays(self.others, LISTED)}"))
+        return findings
 
     @cached_property
-    def index(self) -> Names:
-        return Names.of(self)
+    def index(self) -> NameIndex:
+        return NameIndex.of(self)
 
 
-def read(path: str | Path, unpacked: Path, reading: Reading | None = None) -> Predictions:
+def read(path: str | Path, unpacked: Path, options: ReadOptions | None = None) -> Predictions:
     """The frames of an .npz or .parquet file (see above).
 
-    `unpacked`: folder for what cannot be read row by row where it is (compressed, or Parquet). ValueError naming the
-    file where it is missing or damaged, where arrays differ in length, or where units cannot be right.
-    `reading`: as the options of a command say; errors name these.
+    Args:
+        unpacked: folder for arrays that cannot be read row by row in the file (compressed ones, Parquet).
+        options: those of a command; errors then name the command's options.
+
+    Raises:
+        ValueError: the file (which is named) is missing or damaged, its arrays differ in length, or its units cannot be
+            right.
     """
     path = Path(path)
-    regular(path)
+    regular_file(path)
     if path.suffix.lower() not in (".npz", ".parquet"):
         raise ValueError(f"{path}: expected predictions in .npz or .parquet, got {path.suffix or 'no ending'}")
     content = fingerprint(path)
@@ -125,41 +129,45 @@ def read(path: str | Path, unpacked: Path, reading: Reading | None = None) -> Pr
     if path.suffix.lower() == ".parquet":
         columns, common, names = parquet.read(path, unpacked)
     else:
-        columns, common, names = _npz(path, unpacked)
+        columns, common, names = _read_npz(path, unpacked)
     others = tuple(sorted(names - {*TEXT, *NUMBERS, *FOR_ALL}))
-    found = Predictions(path, *_checked(path, columns, common), content, reading or Reading(), others)
-    if reading is not None:
-        _ = found.flags
-        return found
-    check.demand(path, [each for each in check.of_frames(check.sample(found)) if not each.what.startswith("lowest of")])
-    return found
+    predictions = Predictions(path, *_check_arrays(path, columns, common), content, options or ReadOptions(), others)
+    if options is not None:
+        _ = predictions.flags
+        return predictions
+    check.raise_if_wrong(
+        path, [each for each in check.check_frames(check.sample(predictions)) if not each.what.startswith("lowest of")]
+    )
+    return predictions
 
 
 def fingerprint(path: Path) -> str:
-    """Of a file's bytes: which predictions a result belongs to."""
+    """A hash of a file's bytes, which identifies the predictions of a result."""
     digest = hashlib.sha256()
-    with regular(path).open("rb") as file:
+    with regular_file(path).open("rb") as file:
         while chunk := file.read(1 << 20):
             digest.update(chunk)
     return digest.hexdigest()
 
 
-def _npz(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any], frozenset[str]]:
+def _read_npz(path: Path, unpacked: Path) -> tuple[dict[str, RowsOnDisk], dict[str, Any], frozenset[str]]:
     names = frozenset(safe_npz.names(path))
-    known = names & {*TEXT, *NUMBERS, *FOR_ALL}
-    columns = {name: of_npz(path, name, unpacked) for name in sorted(known - {*FOR_ALL})}
-    common = {name: safe_npz.read(path, name) for name in sorted(known & {*FOR_ALL})}
+    read = names & {*TEXT, *NUMBERS, *FOR_ALL}
+    columns = {name: open_npz(path, name, unpacked) for name in sorted(read - {*FOR_ALL})}
+    common = {name: safe_npz.read(path, name) for name in sorted(read & {*FOR_ALL})}
     return columns, common, names
 
 
-def _checked(
+def _check_arrays(
     path: Path, columns: dict[str, RowsOnDisk], common: dict[str, Any]
 ) -> tuple[dict[str, RowsOnDisk], dict[str, Any]]:
-    """Arrays whose lengths and shapes fit together, and what is one for all frames in its own type."""
+    """Columns with checked lengths and shapes, and the values that all frames share. ValueError for others."""
     if "names" not in columns:
-        raise ValueError(f"{path}: expected names, the name of each frame in the data set; {_has(columns)}")
+        raise ValueError(f"{path}: expected names, the name of each frame in the data set; {_list_columns(columns)}")
     if not columns.keys() & {*POINTS}:
-        raise ValueError(f"{path}: expected pose (with betas, transl and body), vertices or joints; {_has(columns)}")
+        raise ValueError(
+            f"{path}: expected pose (with betas, transl and body), vertices or joints; {_list_columns(columns)}"
+        )
     if "pose" in columns and "body" not in common and "vertices" not in columns:
         raise ValueError(f"{path}: pose without body: add body, one of smpl, smplh, smplx, anny, anny-lite")
     frames = len(columns["names"])
@@ -199,21 +207,21 @@ def _ground(rows: NDArray[Any]) -> Ground:
     return Ground(rows[..., :3], rows[..., 3])
 
 
-def _has(columns: dict[str, RowsOnDisk]) -> str:
+def _list_columns(columns: dict[str, RowsOnDisk]) -> str:
     return f"it has {', '.join(sorted(columns)) or 'nothing of that'}"
 
 
 @dataclass(frozen=True, eq=False)
-class Names:
-    """Where each name stands in a file, in 16 bytes a name."""
+class NameIndex:
+    """The row of each frame's name in a file, in 16 bytes per name."""
 
     column: RowsOnDisk
     hashes: NDArray[np.uint64]  # sorted
     rows: NDArray[np.int64]
 
     @classmethod
-    def of(cls, predictions: Predictions) -> Names:
-        """ValueError where a name stands twice."""
+    def of(cls, predictions: Predictions) -> NameIndex:
+        """The index of all names. ValueError if a name occurs twice."""
         column = predictions.columns["names"]
         hashes = np.concatenate([_hashes(block) for block in column.blocks()] or [np.zeros(0, np.uint64)])
         rows = np.argsort(hashes, kind="stable")
@@ -227,7 +235,7 @@ class Names:
         return cls(column, hashes, rows)
 
     def find(self, names: NDArray[np.str_]) -> NDArray[np.int64]:
-        """The row of each name, −1 where it does not stand there."""
+        """The row of each name, −1 if the file does not have it."""
         if not len(self.rows):
             return np.full(len(names), -1)
         wanted = _hashes(names)
@@ -236,7 +244,7 @@ class Names:
 
 
 def _hashes(names: NDArray[Any]) -> NDArray[np.uint64]:
-    """64 bits of each name: of a million names two agree by chance in one file of 40 million."""
+    """A hash of 64 bits of each name: two of a million names collide with a probability of 1 in 40 million."""
     texts = np.char.encode(names, "utf-8") if names.dtype.kind == "U" else names
     digests = b"".join(hashlib.blake2b(text, digest_size=8).digest() for text in texts.tolist())
     return np.frombuffer(digests, np.uint64)

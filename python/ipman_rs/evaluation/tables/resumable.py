@@ -1,4 +1,4 @@
-"""Work in numbered pieces that are done once and kept, so that it goes on where it was killed, to the same bits."""
+"""Work in numbered pieces that are kept on disk, so that a killed run continues with the same bits."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files import being_written, read_json, safe_npz, write_whole
+from ipman_rs.files import atomic_write, read_json, safe_npz, write_whole
 
-MADE_OF = "made_of.json"
+MANIFEST = "made_of.json"
 
 
 class Resumable:
-    """A piece is an `.npz` file. It is named by its number, appears when it is whole, and says what it was made of.
+    """A piece is an `.npz` file named by its number. It appears when it is complete, with a hash of its inputs.
 
-    A subclass says where its pieces lie (`pieces_folder`) and what decides their content (`made_of`: plain values).
+    A subclass defines the folder of its pieces (`pieces_folder`) and the inputs that determine their content
+    (`manifest`: plain values).
     """
 
     @property
@@ -28,26 +29,27 @@ class Resumable:
         raise NotImplementedError
 
     @property
-    def made_of(self) -> dict[str, Any]:
+    def manifest(self) -> dict[str, Any]:
         raise NotImplementedError
 
     @cached_property
     def key(self) -> str:
-        """A hash of `made_of`, which every piece carries."""
-        return hashlib.sha256(json.dumps(self.made_of, sort_keys=True).encode()).hexdigest()
+        """A hash of `manifest`, which every piece carries."""
+        return hashlib.sha256(json.dumps(self.manifest, sort_keys=True).encode()).hexdigest()
 
     def file(self, number: int) -> Path:
         return self.pieces_folder / f"{number:06d}.npz"
 
     def done(self, number: int) -> bool:
-        """Whether a piece is there, whole, and made of the same."""
+        """Whether a piece exists, is complete, and has the same inputs."""
         try:
             return self.file(number).exists() and str(safe_npz.read(self.file(number), "key")) == self.key
         except ValueError:
             return False
 
     def save(self, number: int, arrays: Mapping[str, Any]) -> None:
-        with being_written(self.file(number)) as out:
+        """Writes a piece."""
+        with atomic_write(self.file(number)) as out:
             np.savez(out, allow_pickle=False, key=np.str_(self.key), **arrays)
 
     def result(self, number: int) -> dict[str, NDArray[Any]]:
@@ -56,18 +58,18 @@ class Resumable:
         return {name: safe_npz.read(self.file(number), name) for name in sorted(names)}
 
     def check_folder(self, folder: Path, what: str) -> None:
-        """ValueError where the folder holds results that were made of something else; `what`: they are."""
-        if not (folder / MADE_OF).exists():
+        """ValueError if the folder holds results (`what` names them) of other inputs."""
+        if not (folder / MANIFEST).exists():
             return
-        found = read_json(folder / MADE_OF)
-        stored = found if isinstance(found, dict) else {}
-        names = {**stored, **self.made_of}
-        other = [name for name in names if stored.get(name) != self.made_of.get(name)]
+        content = read_json(folder / MANIFEST)
+        stored = content if isinstance(content, dict) else {}
+        names = {**stored, **self.manifest}
+        other = [name for name in names if stored.get(name) != self.manifest.get(name)]
         if other:
             raise ValueError(
                 f"{folder}: holds {what} ({', '.join(other)} differ); choose another folder with -o, or delete this one"
             )
 
     def mark_folder(self, folder: Path) -> None:
-        """Writes into the folder what the results in it are made of."""
-        write_whole(folder / MADE_OF, json.dumps(self.made_of, indent=1) + "\n")
+        """Writes the manifest into the folder of the results."""
+        write_whole(folder / MANIFEST, json.dumps(self.manifest, indent=1) + "\n")

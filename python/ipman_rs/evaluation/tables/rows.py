@@ -1,4 +1,4 @@
-"""Arrays whose rows stay on disk until they are asked for: memory does not grow with their number."""
+"""Arrays whose rows are read from disk on demand, so that memory does not grow with their number."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs.data.frames import Rows
-from ipman_rs.files import being_written, regular, safe_npz
+from ipman_rs.files import atomic_write, regular_file, safe_npz
 
-BLOCK = 1 << 16  # rows that are gone through at a time
-_CHUNK = 1 << 22  # bytes that are unpacked at a time
+BLOCK = 1 << 16  # rows per block
+_CHUNK = 1 << 22  # bytes that are unpacked at once
 
 
 @dataclass(frozen=True)
 class RowsOnDisk:
-    """An array (n, ...) that lies in a file from a byte on, row after row."""
+    """An array (n, ...) in a file, stored row by row from byte `offset` on."""
 
     path: Path
     offset: int
     dtype: np.dtype[Any]
     shape: tuple[int, ...]
-    source: Path | None = None  # the file of the user's that it was unpacked from
+    source: Path | None = None  # the user's file that it was unpacked from
 
     def __len__(self) -> int:
         return self.shape[0]
 
     def __getitem__(self, rows: Rows) -> NDArray[Any]:
-        """Those rows, in this order. OSError where the file has become shorter, ValueError where text is none."""
+        """These rows, in this order. OSError if the file has become shorter, ValueError for invalid text."""
         numbers = np.arange(len(self))[rows] if isinstance(rows, slice) else np.asarray(rows)
-        found = np.empty((len(numbers), *self.shape[1:]), self.dtype)
+        values = np.empty((len(numbers), *self.shape[1:]), self.dtype)
         width = self.dtype.itemsize * int(np.prod(self.shape[1:], dtype=int))
         with self.path.open("rb", buffering=0) as file:
             for start, stop in _runs(numbers):
@@ -43,63 +43,63 @@ class RowsOnDisk:
                 part = file.read((stop - start) * width)
                 if len(part) != (stop - start) * width:
                     raise OSError(f"{self.path}: ends early; was it changed meanwhile?")
-                found[start:stop] = np.frombuffer(part, self.dtype).reshape(stop - start, *self.shape[1:])
+                values[start:stop] = np.frombuffer(part, self.dtype).reshape(stop - start, *self.shape[1:])
         try:
-            return safe_npz.checked_text(found)
+            return safe_npz.check_text(values)
         except ValueError as error:
             raise ValueError(f"{self.source or self.path}: {error}") from None
 
     def blocks(self, size: int = BLOCK) -> Iterator[NDArray[Any]]:
-        """All rows, `size` after the other."""
+        """All rows, in blocks of `size`."""
         for start in range(0, len(self), size):
             yield self[start : start + size]
 
 
 def _runs(numbers: NDArray[np.integer]) -> Iterator[tuple[int, int]]:
-    """Stretches of numbers that follow each other, which are read at once."""
+    """Start and stop of each run of consecutive numbers, which is read at once."""
     if not len(numbers):
         return
     ends = [*(np.flatnonzero(np.diff(numbers) != 1) + 1).tolist(), len(numbers)]
     yield from zip([0, *ends[:-1]], ends, strict=True)
 
 
-def of_npz(path: Path, name: str, unpacked: Path) -> RowsOnDisk:
-    """Array `name` of an .npz file: where it lies in there, or, if it is compressed, unpacked once into a folder.
+def open_npz(path: Path, name: str, unpacked: Path) -> RowsOnDisk:
+    """Array `name` of an .npz file, read in place, or, if it is compressed, unpacked once into a folder.
 
-    Nothing is executed. ValueError if it is damaged, holds Python objects, or lacks some of the bytes that it claims.
+    Nothing in the file is executed. ValueError if it is damaged, holds Python objects, or is shorter than it claims.
     """
-    regular(path)
+    regular_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
             member = archive.getinfo(f"{name}.npy")
             if member.compress_type == zipfile.ZIP_STORED:
-                return _rows(path, safe_npz.place_in(path, member))
+                return _rows(path, safe_npz.locate_array(path, member))
             place = unpacked / f"{name}.npy"
             if not place.exists():
                 unpacked.mkdir(parents=True, exist_ok=True)
                 with archive.open(member) as stream:
                     _copy(stream, place, member.file_size)
-        return replace(of_npy(place), source=path)
+        return replace(open_npy(place), source=path)
     except Exception as error:  # damaged bytes can fail in any way (zlib, struct, header syntax)
         if isinstance(error, OSError) and error.errno not in (None, errno.EINVAL):
             raise  # the disk is full, say, which is no fault of the file
         raise ValueError(f"{path}: array {name!r} cannot be read: {error}") from error
 
 
-def of_npy(path: Path) -> RowsOnDisk:
+def open_npy(path: Path) -> RowsOnDisk:
     """The array of an `.npy` file. Raises ValueError, without the file's name, where it cannot be read row by row."""
-    return _rows(path, safe_npz.place_in(path))
+    return _rows(path, safe_npz.locate_array(path))
 
 
-def _rows(path: Path, place: safe_npz.Place) -> RowsOnDisk:
+def _rows(path: Path, place: safe_npz.ArrayLocation) -> RowsOnDisk:
     if place.order == "F" and len(place.shape) > 1:
         raise ValueError("is stored column by column; save np.ascontiguousarray of it")
     return RowsOnDisk(path, place.offset, place.dtype, place.shape)
 
 
 def _copy(stream: Any, place: Path, size: int) -> None:
-    """The bytes of a stream into a file that appears once it is whole."""
-    with being_written(place) as file:
+    """Copies a stream into a file that appears when it is complete."""
+    with atomic_write(place) as file:
         copied = 0
         while chunk := stream.read(_CHUNK):
             copied += len(chunk)

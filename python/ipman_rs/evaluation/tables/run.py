@@ -12,9 +12,9 @@ from typing import Any
 from ipman_rs.progress import Progress, silent
 
 from . import report
-from .job import Job, Shard, Source, methods
+from .job import Job, Shard, Source, method_names
 from .paper import TABLES, Table
-from .summary import difference, measured
+from .summary import difference, summarise
 
 PathLike = str | os.PathLike[str]
 WHOLE = Shard()
@@ -72,7 +72,7 @@ class Evaluation:
         jobs, source = self.jobs, self.jobs[0].source
         frames = sum(len(job.data) for job in jobs)
         with _counted(progress, "adding up", 2 * frames - len(jobs[0].data)) as count:
-            summaries = [measured(job, count) for job in jobs]
+            summaries = [summarise(job, count) for job in jobs]
             differences = [difference(job, jobs[0], count) for job in jobs[1:]]
         title = self.table.title if self.table else f"{' and '.join(job.name for job in jobs)} on {source.name}"
         parts = [source.name, *([source.split] if source.split else []), *(f"{k}={v}" for k, v in source.options)]
@@ -134,7 +134,8 @@ def evaluation(
     }  # fmt: skip
     files = [Path(file) for file in predictions]
     jobs = [
-        Job(name, str(file), source, str(output), **shared) for name, file in zip(methods(files), files, strict=True)
+        Job(name, str(file), source, str(output), **shared)
+        for name, file in zip(method_names(files), files, strict=True)
     ]
     return Evaluation(jobs, Path(output), paper)
 

@@ -40,18 +40,18 @@ def parse(content: bytes) -> Mesh:
             elif words[0] in FREE_FORM:
                 free_form += 1
         except ValueError:
-            said = text.listed([line.decode("utf-8", "replace")])
+            shown = text.list_names([line.decode("utf-8", "replace")])
             comma = "; decimals need a point, not a comma" if b"," in line else ""
-            raise ValueError(f"line {number}: expected numbers, got '{said}'{comma}") from None
+            raise ValueError(f"line {number}: expected numbers, got '{shown}'{comma}") from None
     vertices = np.array(points, np.float64).reshape(-1, 3)
     sizes = np.array(counts, np.int64)
     indices = _from_zero(np.array(corners, np.int64), np.repeat(np.array(before, np.int64), sizes))
     faces = polygons.triangles(indices, sizes)
     notes = []
     if len(objects) > 1:
-        notes.append(f"{len(objects)} objects are joined: {text.listed([text.name(one) for one in objects])}")
+        notes.append(f"{len(objects)} objects are joined: {text.list_names([text.name(one) for one in objects])}")
     if free_form:
-        notes.append(f"{text.counted(free_form, 'free-form element')} (curves, surfaces) left out")
+        notes.append(f"{text.count_of(free_form, 'free-form element')} (curves, surfaces) left out")
     return Mesh(vertices, faces, notes=tuple(notes))
 
 

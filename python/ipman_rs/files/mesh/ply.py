@@ -68,7 +68,7 @@ def parse(content: bytes) -> Mesh:
         raise ValueError(f"its triangles are in strips ({strips}), which are not read; export faces")
     vertices = np.stack([_numbers(stored["vertex"], axis) for axis in "xyz"], axis=1)
     left_out = [one.name for one in elements if one.name not in ("vertex", "face", "material") and one.count]
-    notes = (f"not used: {text.listed(left_out)}",) if left_out else ()
+    notes = (f"not used: {text.list_names(left_out)}",) if left_out else ()
     return Mesh(vertices, _faces(stored.get("face", {})), notes=notes)
 
 
@@ -82,7 +82,7 @@ def _faces(columns: Columns) -> NDArray[np.int64]:
     name = next((name for name in CORNERS if name in columns), None)
     if name is None:
         if any(len(one) for one in columns.values()):
-            raise ValueError(f"its faces have {text.listed(list(columns))}; expected vertex_indices")
+            raise ValueError(f"its faces have {text.list_names(list(columns))}; expected vertex_indices")
         return np.empty((0, 3), np.int64)
     if not isinstance(columns[name], tuple):
         raise ValueError(f"{name} is a number; expected a list")
@@ -113,9 +113,9 @@ def _header(content: bytes) -> tuple[str | None, list[Element], int]:
             last = elements[-1]
             elements[-1] = Element(last.name, last.count, (*last.properties, _property(words[1:], line)))
         elif words and words[0] not in ("ply", "comment", "obj_info"):
-            raise ValueError(f"its header says '{text.listed([line])}', which is not known")
+            raise ValueError(f"its header says '{text.list_names([line])}', which is not known")
     if form not in ORDERS:
-        raise ValueError(f"its format is '{text.listed([form])}'; expected one of {', '.join(ORDERS)}")
+        raise ValueError(f"its format is '{text.list_names([form])}'; expected one of {', '.join(ORDERS)}")
     return ORDERS[form], elements, start
 
 
@@ -125,7 +125,7 @@ def _property(words: list[str], line: str) -> Property:
         return Property(words[3], kinds[2], kinds[1])
     if len(words) == 2 and kinds[0]:
         return Property(words[1], kinds[0], None)
-    raise ValueError(f"its header says '{text.listed([line])}'; expected a property of a known type")
+    raise ValueError(f"its header says '{text.list_names([line])}'; expected a property of a known type")
 
 
 class _Text:
@@ -155,8 +155,8 @@ class _Text:
             except IndexError:
                 raise ValueError(f"row {row} of {element.name} is cut; is the download complete?") from None
             except ValueError:
-                said = text.listed([b" ".join(words).decode("latin-1")])
-                raise ValueError(f"row {row} of {element.name}: expected numbers, got '{said}'") from None
+                shown = text.list_names([b" ".join(words).decode("latin-1")])
+                raise ValueError(f"row {row} of {element.name}: expected numbers, got '{shown}'") from None
         return {
             one.name: (np.array(values[k]), np.array(lengths[k], np.int64)) if one.length else np.array(values[k])
             for k, one in enumerate(element.properties)

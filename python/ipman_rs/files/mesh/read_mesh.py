@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files import regular
+from ipman_rs.files import regular_file
 
 from . import gltf, obj, ply, repair, stl
 from .repair import Mesh
@@ -21,30 +21,30 @@ def read_mesh(path: Path) -> Mesh:
 
     ValueError, naming the file, for what is missing, damaged, of another kind, or no surface.
     """
-    mesh = _parsed(path)
+    mesh = _parse(path)
     if not len(mesh.vertices) or not len(mesh.faces):
         count = len(mesh.vertices)
         what = f"it is a point cloud of {count} vertices and no faces" if count else "it is empty"
         raise _unreadable(path, f"{what}, no surface; reconstruct one (MeshLab) or export the mesh")
     try:
-        return repair.repaired(mesh)
+        return repair.repair_mesh(mesh)
     except ValueError as error:
         raise _unreadable(path, str(error)) from error
 
 
 def read_points(path: Path) -> NDArray[np.float64]:
     """All vertices (V, 3) of a file, with or without faces. ValueError, naming the file."""
-    mesh = _parsed(path)
+    mesh = _parse(path)
     if not len(mesh.vertices) or not np.isfinite(mesh.vertices).all():
         raise _unreadable(path, f"expected finite vertices, got {len(mesh.vertices)}")
     return mesh.vertices
 
 
-def _parsed(path: Path) -> Mesh:
+def _parse(path: Path) -> Mesh:
     kind = path.suffix.lower()
     if kind not in ENDINGS:
         raise ValueError(f"{path}: unknown kind {kind or 'without ending'!r}; expected {' '.join(ENDINGS)}")
-    regular(path)
+    regular_file(path)
     try:
         content = path.read_bytes()
         return PARSERS[kind](content) if kind in PARSERS else gltf.parse(content, path.parent)

@@ -1,4 +1,4 @@
-"""What a mesh from a file needs before it is a surface: shared vertices, and neither loose nor repeated pieces.
+"""Repairs that make a surface of a mesh file: shared vertices, no loose vertices, no repeated faces.
 
 Every repair leaves a note, and `vertex_map` says where each vertex of the file went.
 """
@@ -37,15 +37,15 @@ class Mesh:
         return replace(self, notes=(*self.notes, note))
 
 
-def repaired(mesh: Mesh) -> Mesh:
+def repair_mesh(mesh: Mesh) -> Mesh:
     """The surface of a mesh. ValueError where its faces name vertices that it has not, or share none."""
     outside = (mesh.faces < 0) | (mesh.faces >= len(mesh.vertices))
     if outside.any():
         raise ValueError(f"a face names vertex {mesh.faces[outside][0]} of {len(mesh.vertices)} (counted from 0)")
-    return without_unused(welded(without_repeated(mesh)))
+    return drop_unused_vertices(weld(drop_repeated_faces(mesh)))
 
 
-def without_repeated(mesh: Mesh) -> Mesh:
+def drop_repeated_faces(mesh: Mesh) -> Mesh:
     """Without faces that use a vertex twice, and without the second of two equal faces."""
     faces = mesh.faces
     flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
@@ -58,9 +58,9 @@ def without_repeated(mesh: Mesh) -> Mesh:
     face_map = kept if mesh.face_map is None else mesh.face_map[kept]
     mesh = replace(mesh, faces=faces[kept], face_map=face_map)
     if flat.any():
-        mesh = mesh.noting(f"{text.counted(int(flat.sum()), 'face')} without area (a vertex twice) left out")
+        mesh = mesh.noting(f"{text.count_of(int(flat.sum()), 'face')} without area (a vertex twice) left out")
     if again:
-        mesh = mesh.noting(f"{text.counted(again, 'repeated face')} left out")
+        mesh = mesh.noting(f"{text.count_of(again, 'repeated face')} left out")
     return mesh
 
 
@@ -84,7 +84,7 @@ def _distinct(rows: NDArray[np.generic]) -> tuple[Indices, Indices]:
     return order[new], number
 
 
-def welded(mesh: Mesh) -> Mesh:
+def weld(mesh: Mesh) -> Mesh:
     """Vertices at equal places merged where faces do not share them (STL, texture seams); closed meshes stay.
 
     Where that leaves open edges, vertices of those edges that lie within WELD of the mesh's size are merged, too.
@@ -95,8 +95,8 @@ def welded(mesh: Mesh) -> Mesh:
     first, number = _distinct(mesh.vertices + 0.0)
     if len(first) < len(mesh.vertices):
         merged = len(mesh.vertices) - len(first)
-        mesh = without_repeated(_merged(mesh, first[number]))
-        mesh = mesh.noting(f"{text.counted(merged, 'vertex', 'vertices')} that lie on each other were merged")
+        mesh = drop_repeated_faces(_merge(mesh, first[number]))
+        mesh = mesh.noting(f"{text.count_of(merged, 'vertex', 'vertices')} that lie on each other were merged")
     border = np.unique(_open_edges(mesh.faces))
     tolerance = WELD * _size(mesh.vertices[np.unique(mesh.faces)])
     if len(border) and 0.0 < tolerance < np.inf:
@@ -104,8 +104,8 @@ def welded(mesh: Mesh) -> Mesh:
         target[border] = border[_nearby(mesh.vertices[border], tolerance)]
         merged = int((target != np.arange(len(target))).sum())
         if merged:
-            mesh = without_repeated(_merged(mesh, target)).noting(
-                f"{text.counted(merged, 'vertex', 'vertices')} within {tolerance:.1g} of another were merged"
+            mesh = drop_repeated_faces(_merge(mesh, target)).noting(
+                f"{text.count_of(merged, 'vertex', 'vertices')} within {tolerance:.1g} of another were merged"
             )
     if not len(mesh.faces):
         raise ValueError("none of its faces has an area")
@@ -134,13 +134,13 @@ def _open_edges(faces: Indices) -> Indices:
     return np.stack(np.divmod(single, width), axis=1)
 
 
-def _merged(mesh: Mesh, target: Indices) -> Mesh:
+def _merge(mesh: Mesh, target: Indices) -> Mesh:
     """Each vertex becomes its target, a vertex with a lower number or itself; the order stays the file's."""
     kept = np.flatnonzero(target == np.arange(len(target)))
-    return _renumbered(mesh, kept, np.searchsorted(kept, target))
+    return _renumber(mesh, kept, np.searchsorted(kept, target))
 
 
-def _renumbered(mesh: Mesh, kept: Indices, number: Indices) -> Mesh:
+def _renumber(mesh: Mesh, kept: Indices, number: Indices) -> Mesh:
     """The vertices ``kept``; ``number`` (V,) is the new one of each, −1 for those left out."""
     old = mesh.vertex_map
     vertex_map = number if old is None else np.where(old < 0, -1, number[old])
@@ -174,12 +174,12 @@ def _nearby(points: Array, distance: float) -> Indices:
     return lowest[group[inverse.reshape(-1)]]
 
 
-def without_unused(mesh: Mesh) -> Mesh:
+def drop_unused_vertices(mesh: Mesh) -> Mesh:
     """Without the vertices that no face uses: they would count as the body's lowest point or its size."""
     used = np.zeros(len(mesh.vertices), bool)
     used[mesh.faces] = True
     if used.all():
         return mesh
-    loose = text.counted(int((~used).sum()), "vertex", "vertices")
+    loose = text.count_of(int((~used).sum()), "vertex", "vertices")
     number = np.where(used, np.cumsum(used) - 1, -1)
-    return _renumbered(mesh, np.flatnonzero(used), number).noting(f"{loose} that no face uses left out")
+    return _renumber(mesh, np.flatnonzero(used), number).noting(f"{loose} that no face uses left out")

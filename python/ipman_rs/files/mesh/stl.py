@@ -41,9 +41,9 @@ def _text(content: bytes) -> Mesh:
             try:
                 x, y, z = map(float, words[1:4])
             except ValueError:
-                said = text.listed([line.decode("utf-8", "replace")])
+                shown = text.list_names([line.decode("utf-8", "replace")])
                 comma = "; decimals need a point, not a comma" if b"," in line else ""
-                raise ValueError(f"line {number}: expected three numbers, got '{said}'{comma}") from None
+                raise ValueError(f"line {number}: expected three numbers, got '{shown}'{comma}") from None
             corners.append([x, y, z])
         elif words[0] == b"solid":
             solids.append(text.name(b" ".join(line.split()[1:])))
@@ -56,7 +56,7 @@ def _text(content: bytes) -> Mesh:
             raise ValueError(f"line {number}: expected a triangle, got {len(corners) - started} corners")
     if not ended or len(corners) % 3:
         raise ValueError("it ends within a solid; is the download complete?")
-    notes = (f"{len(solids)} solids are joined: {text.listed(solids)}",) if len(solids) > 1 else ()
+    notes = (f"{len(solids)} solids are joined: {text.list_names(solids)}",) if len(solids) > 1 else ()
     return _soup(np.array(corners, np.float64).reshape(-1, 3), notes)
 
 

@@ -1,4 +1,4 @@
-"""The lines of a text file of any encoding and line ends, and the names in it as a list for a note."""
+"""Lines of a text file of any encoding and line ends, and lists of names for notes."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def name(words: bytes) -> str:
     return words.decode("utf-8", "replace")
 
 
-def listed(names: Sequence[object], most: int = 4) -> str:
+def list_names(names: Sequence[object], most: int = 4) -> str:
     """'a, b, c': printable, and no longer than a line of a report."""
     short = ["".join(c if c.isprintable() else " " for c in str(one)).strip()[:40] or "unnamed" for one in names[:most]]
     more = len(names) - len(short)
     return ", ".join(short) + (f" and {more} more" if more else "")
 
 
-def counted(count: int, noun: str, plural: str | None = None) -> str:
+def count_of(count: int, noun: str, plural: str | None = None) -> str:
     """'1 face', '2 faces'."""
     return f"{count} {noun if count == 1 else plural or noun + 's'}"

@@ -1,4 +1,4 @@
-"""What `ipman fit` is given: files and folders of them, as items that are fitted each on its own."""
+"""The inputs of `ipman fit`: files, and folders of files, as items that are fitted each on its own."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...files import regular
+from ...data.keypoints import suffixes
+from ...files import regular_file
 from ...files.errors import FileError
 
 if TYPE_CHECKING:
     from ...data.keypoints.detections import Detections
 
 IMAGES = (".png", ".jpg", ".jpeg")
-KEYPOINTS = (".json",)
+KEYPOINTS = suffixes()
 MARKERS = (".trc", ".c3d")
 ENDINGS = (*KEYPOINTS, *IMAGES, *MARKERS)
 
@@ -30,7 +31,7 @@ class Item:
     name: str
     path: Path
     source: str
-    seen: Detections | None = None  # of one row; photos are looked at when their turn comes
+    detections: Detections | None = None  # of one row; of a photo only after `detect`
     photo: Path | None = None
     notes: list[str] = field(default_factory=list)
     flags: list[str] = field(default_factory=list)
@@ -38,14 +39,15 @@ class Item:
 
 
 @dataclass(frozen=True)
-class Reading:
-    """The options that say how inputs are read."""
+class InputOptions:
+    """How inputs are read. photo: the image of a keypoint file, drawn under its body. image_size: its width and height
+    in pixels, where the file does not say."""
 
     person: int | None = None
     image_size: tuple[float, float] | None = None
     photo: Path | None = None
     sequence: bool = False  # the images of a file are frames of one person
-    force: bool = False  # take what cannot be a person, too
+    force: bool = False  # keypoints that cannot be a person's are fitted, too
 
 
 def expand(inputs: Iterable[Path]) -> list[Path]:
@@ -62,11 +64,11 @@ def expand(inputs: Iterable[Path]) -> list[Path]:
     return files
 
 
-def items(path: Path, reading: Reading) -> list[Item]:
-    """The people of one file: one an image, and none of a photo yet. Raises FileError."""
+def read_items(path: Path, options: InputOptions) -> list[Item]:
+    """The people of one file: one per image. Those of a photo are detected later. Raises FileError."""
     kind = path.suffix.lower()
     try:
-        regular(path)
+        regular_file(path)
     except ValueError as error:
         raise FileError(path, str(error)) from None
     if kind in IMAGES:
@@ -76,42 +78,42 @@ def items(path: Path, reading: Reading) -> list[Item]:
     from ...data import keypoints
 
     try:
-        size, odd = _size(reading)
-        found = keypoints.read(path, person=reading.person, image_size=size)
+        size, odd = _size(options)
+        detections = keypoints.read(path, person=options.person, image_size=size)
     except ValueError as error:
         raise FileError(path, _advice(str(error))) from error
-    if found.image_size is None:
+    if detections.image_size is None:
         raise FileError(path, "does not say how large its image is; give --image-size WIDTHxHEIGHT, or --image PHOTO")
-    people, notes = _admitted(path, [_one(found, row) for row in range(len(found))], reading.force)
-    many = len(found) > 1
-    if many and not reading.sequence:
-        notes.append(f"{path}: {len(found)} images, each fitted on its own; --sequence fits one person over time")
-    made = [
+    people, notes = _admitted(path, [_row(detections, row) for row in range(len(detections))], options.force)
+    many = len(detections) > 1
+    if many and not options.sequence:
+        notes.append(f"{path}: {len(detections)} images, each fitted on its own; --sequence fits one person over time")
+    items = [
         Item(
             f"{path.stem}_{number}" if many else path.stem,
             path,
             one.sources[0],
             one,
-            reading.photo,
+            options.photo,
             list(one.notes),
             list(flags),
         )
         for number, (one, flags) in enumerate(people)
     ]
-    made[0].notes += notes + odd
-    return made
+    items[0].notes += notes + odd
+    return items
 
 
 def _admitted(
     path: Path, people: list[Detections], force: bool
 ) -> tuple[list[tuple[Detections, tuple[str, ...]]], list[str]]:
-    """Those whose points can be a person in the image, each with what is odd; and who was left out.
+    """The people whose points can be a person in the image, each with its flags, and notes of those left out.
 
     Raises FileError where nobody's can.
     """
     from ...data import judge
 
-    kept: list[tuple[Detections, tuple[str, ...]]] = []
+    admitted: list[tuple[Detections, tuple[str, ...]]] = []
     notes: list[str] = []
     refused: list[str] = []
     for one in people:
@@ -122,37 +124,37 @@ def _admitted(
         except judge.NoPerson as error:
             refused.append(str(error))
             continue
-        kept.append((one, odd))
-    if not kept:
+        admitted.append((one, odd))
+    if not admitted:
         raise FileError(path, refused[0])
     if refused:
         first = refused[0].removeprefix(f"{path}: ")
         notes.append(f"{path}: {len(refused)} of {len(people)} images refused; first of all: {first}")
-    return kept, notes
+    return admitted, notes
 
 
-def look(item: Item) -> None:
-    """Find the person in a photo. Raises FileError."""
+def detect(item: Item) -> None:
+    """Detect the person in an item's photo. Raises FileError."""
     from .. import photo
 
     try:
-        item.seen = photo.detect([item.path])
+        item.detections = photo.detect([item.path])
     except (ValueError, ImportError) as error:
         raise FileError(item.path, str(error)) from error
-    item.notes += item.seen.notes
+    item.notes += item.detections.notes
 
 
-def _size(reading: Reading) -> tuple[tuple[float, float] | None, list[str]]:
+def _size(options: InputOptions) -> tuple[tuple[float, float] | None, list[str]]:
     """The image's size as given, or the photo's, and a note where the two differ."""
-    if reading.photo is None:
-        return reading.image_size, []
+    if options.photo is None:
+        return options.image_size, []
     from .. import photo
 
-    height, width = photo.read(reading.photo).shape[:2]
-    size, given = (float(width), float(height)), reading.image_size
+    height, width = photo.read(options.photo).shape[:2]
+    size, given = (float(width), float(height)), options.image_size
     if given is None or given == size:
         return size, []
-    said = f"{reading.photo}: the photo has {width} × {height} pixels, --image-size says {given[0]:g} × {given[1]:g}"
+    said = f"{options.photo}: the photo has {width} × {height} pixels, --image-size says {given[0]:g} × {given[1]:g}"
     return given, [said]
 
 
@@ -162,20 +164,21 @@ def _advice(what: str) -> str:
     return what
 
 
-def _one(found: Detections, row: int) -> Detections:
+def _row(detections: Detections, row: int) -> Detections:
+    """One row of detections, with the notes that are its own."""
     from ...data.keypoints.detections import Detections
 
     def part(value: np.ndarray | None) -> np.ndarray | None:
         return None if value is None else value[row : row + 1]
 
-    points, confidence = found.points[row : row + 1], found.confidence[row : row + 1]
-    others = (part(found.image_size), part(found.points_3d), part(found.confidence_3d))
-    others_notes = tuple(f"{source}:" for source in found.sources if source != found.sources[row])
-    own = f"{found.sources[row]}:"
+    points, confidence = detections.points[row : row + 1], detections.confidence[row : row + 1]
+    others = (part(detections.image_size), part(detections.points_3d), part(detections.confidence_3d))
+    others_notes = tuple(f"{source}:" for source in detections.sources if source != detections.sources[row])
+    own = f"{detections.sources[row]}:"
     notes = tuple(  # what is said of the whole file goes to its first image
-        note for note in found.notes if note.startswith(own) or (row == 0 and not note.startswith(others_notes))
+        note for note in detections.notes if note.startswith(own) or (row == 0 and not note.startswith(others_notes))
     )
-    return Detections(found.names, points, confidence, (found.sources[row],), *others, notes)
+    return Detections(detections.names, points, confidence, (detections.sources[row],), *others, notes)
 
 
 def identity(item: Item, options: str) -> str:
@@ -187,4 +190,4 @@ def identity(item: Item, options: str) -> str:
 
 
 def _bytes(path: Path | None) -> bytes:
-    return b"" if path is None else regular(path).read_bytes()
+    return b"" if path is None else regular_file(path).read_bytes()

@@ -1,12 +1,11 @@
-"""What `ipman fit` leaves of each item in its folder, parameters, mesh, how the fit went; and back to a study.
+"""The folder of each fitted item: parameters, mesh, how the fit went; and the study of what is in it.
 
 `fit.json` is written last and says what the fit depended on: where it is and fits, the item is complete.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +20,7 @@ from ...files.item_folder import npz as npz
 from ...files.item_folder import write_files as write_files
 from ...io import write_mesh
 from ...study import Fitted, Study, camera_of, study
+from .. import photo
 from .items import Item
 
 if TYPE_CHECKING:
@@ -29,16 +29,42 @@ if TYPE_CHECKING:
 _BEFORE = "before_"
 
 
+@dataclass(frozen=True, eq=False)
+class FittedItem:
+    """One finished item: the arrays of its .npz file (`FitResult.arrays`), its posed vertices (V, 3) m, and the record
+    of its fit.json."""
+
+    item: Item
+    arrays: dict[str, np.ndarray]
+    vertices: np.ndarray
+    record: dict[str, Any]
+
+
 def write_item(
-    item: Item, result: Result, body: BodyModel, folder: Path, told: dict[str, Any], obj: bool
-) -> dict[str, Any]:
-    """Write one fitted body; the record that a later run reads back. Raises OSError."""
+    item: Item, result: Result, body: BodyModel, folder: Path, record: dict[str, Any], obj: bool
+) -> FittedItem:
+    """Write one fitted body: parameters, mesh, and the record that makes its folder complete. Raises OSError."""
     arrays = result.arrays()
     vertices = posed(body, arrays)
     files: dict[str, Any] = {f"{item.name}.npz": arrays, f"{item.name}.glb": write_mesh.glb(vertices, body.faces)}
     if obj:
         files[f"{item.name}.obj"] = write_mesh.obj(vertices, body.faces)
-    return write_files(folder, files, {"name": item.name, "source": item.source, **told})
+    record = write_files(folder, files, {"name": item.name, "source": item.source, **record})
+    return FittedItem(item, arrays, vertices, record)
+
+
+def read_item(item: Item, body: BodyModel, folder: Path, identity: str) -> FittedItem | None:
+    """An item that an earlier run finished with the same input and options, or None."""
+    record = complete(folder, identity)
+    if record is None:
+        return None
+    arrays = read_arrays(folder / f"{item.name}.npz")
+    return FittedItem(item, arrays, posed(body, arrays), record)
+
+
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """All arrays of an .npz file. Raises ValueError."""
+    return {name: safe_npz.read(path, name) for name in safe_npz.names(path)}
 
 
 def complete(folder: Path, identity: str) -> dict[str, Any] | None:
@@ -60,35 +86,26 @@ def posed(body: BodyModel, arrays: dict[str, np.ndarray], prefix: str = "") -> n
     return np.asarray(body(pose, *rows).vertices)
 
 
-def study_of(
-    item: Item,
-    body: BodyModel,
-    folder: Path,
-    record: dict[str, Any],
-    pictured: bool,
-    pixels: Callable[[Path], np.ndarray],
-) -> Study:
-    """The analysed body of a finished item; `pixels` reads a photo."""
-    path = folder / f"{item.name}.npz"
-    arrays = {name: safe_npz.read(path, name) for name in safe_npz.names(path)}
-    vertices = posed(body, arrays)
+def study_of(fitted: FittedItem, body: BodyModel, pictured: bool) -> Study:
+    """The analysed body of a finished item; with its photo and the body before the physics terms if it is pictured."""
+    item, arrays, vertices, record = fitted.item, fitted.arrays, fitted.vertices, fitted.record
     known = "ground_height" in arrays
     ground = ip.Ground(arrays["ground_normal"][0], arrays["ground_height"][0]) if known else ip.Ground.under(vertices)
     before = None
     if pictured and f"{_BEFORE}betas" in arrays:
         before = study("Before the physics terms", posed(body, arrays, _BEFORE), body.template, ground)
-    fitted = Fitted(
+    shown = Fitted(
         camera=camera_of(*(arrays[name][0] for name in ("camera_rotation", "camera_translation", "focal", "center"))),
         size=tuple(arrays["image_size"][0]),
         seen=arrays["keypoints"][0],
         projected=arrays["projected"][0],
-        photo=pixels(item.photo) if pictured and item.photo is not None else None,
+        photo=photo.read(item.photo) if pictured and item.photo is not None else None,
         before=before,
         pictured=pictured,
         record={key: value for key, value in record.items() if key not in ("name", "source")},
     )
-    found = study(item.name, vertices, body.template, ground, source=item.source, notes=notes(record))
-    return replace(found, flags=tuple(record["flags"]), fitted=fitted)
+    analyzed = study(item.name, vertices, body.template, ground, source=item.source, notes=notes(record))
+    return replace(analyzed, flags=tuple(record["flags"]), fitted=shown)
 
 
 def notes(record: dict[str, Any]) -> list[str]:

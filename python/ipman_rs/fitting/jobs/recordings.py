@@ -15,7 +15,7 @@ from ...data import judge
 from ...files import read_json, safe_npz
 from ...files.errors import FileError
 from ...progress import Progress, silent
-from .outputs import RECORD, complete, write_files
+from .outputs import RECORD, complete, read_arrays, write_files
 
 if TYPE_CHECKING:
     from ...data.markers import Point
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from ..fit import Fit
     from ..marker_fit import Person, Recorded
     from .items import Item
-    from .run import Settings
+    from .options import FitOptions
 
 
-TOLD = 3  # flags of single frames
+MAX_FRAME_FLAGS = 3  # flags of single frames in the record of a recording
 
 
 @dataclass
@@ -47,53 +47,50 @@ class Pace:
     fps: float = 30.0
 
 
-def fitted(
+@dataclass(frozen=True, eq=False)
+class FittedRecording:
+    """One finished recording: its file, the arrays in it (as `ipman analyze` reads them), and the record of its
+    fit.json."""
+
+    path: Path
+    arrays: dict[str, np.ndarray]
+    record: dict[str, Any]
+
+
+def fit_recording(
     recording: Recording,
-    settings: Settings,
+    options: FitOptions,
     pace: Pace,
     output: Path,
     resume: bool = False,
-    progress: Progress = silent,
-) -> Study:
-    """Fit a recording, write its folder and analyse it; what is odd stands in the study's flags. Raises FileError."""
-    record = kept(recording, settings, pace, output, resume, progress=progress)
-    study = _measured(recording, output / recording.name, settings)
-    flags = (*record.get("flags", ()), *study.flags)
-    return replace(study, notes=(*study.notes, *record.get("notes", ())), flags=flags)
-
-
-def kept(
-    recording: Recording,
-    settings: Settings,
-    pace: Pace,
-    output: Path,
-    resume: bool,
     person: str | None = None,
     progress: Progress = silent,
-) -> dict[str, Any]:
-    """The record of a recording's fit, which is in its folder: made now, or before with the same input and options.
+) -> FittedRecording:
+    """Fit a recording and write its folder in `output`, or read it where `resume` finds the same input and options.
 
-    `person`: the name of a marker recording that is in `output`, whose shape and places of markers are kept. Raises
-    FileError.
+    `person`: the name of a marker recording that is in `output`, whose shape and places of markers this one keeps.
+    Raises FileError, and OSError where nothing can be written.
     """
     folder = output / recording.name
-    known = None if person is None else _record(output / person)
-    identity = _identity(recording, settings, pace, None if known is None else known["identity"])
+    path = folder / f"{recording.name}.npz"
+    of_person = None if person is None else _record(output / person)
+    identity = _identity(recording, options, pace, None if of_person is None else of_person["identity"])
     record = complete(folder, identity) if resume else None
-    if record is None:
-        try:
-            shape = None if person is None else person_of(output / person)
-            found, arrays, told, rate = (
-                _fit_markers(recording, settings, pace, shape, progress)
-                if recording.frames is None
-                else _fit_frames(recording, settings, pace, progress)
-            )
-        except ValueError as error:
-            raise FileError(recording.paths[0], str(error).removeprefix(f"{recording.paths[0]}: ")) from error
-        record = {"name": recording.name, "source": recording.source, **_stages(found), **told}
-        record |= {"preset": _preset(recording, settings), "shape_from": person or "itself", "identity": identity}
-        record = write_files(folder, {f"{recording.name}.npz": {**_arrays(found, rate), **arrays}}, record)
-    return record
+    if record is not None:
+        return FittedRecording(path, read_arrays(path), record)
+    try:
+        shape = None if person is None else person_of(output / person)
+        fit, arrays, record, rate = (
+            _fit_markers(recording, options, pace, shape, progress)
+            if recording.frames is None
+            else _fit_frames(recording, options, pace, progress)
+        )
+    except ValueError as error:
+        raise FileError(recording.paths[0], str(error).removeprefix(f"{recording.paths[0]}: ")) from error
+    arrays = {**_arrays(fit, rate), **arrays}
+    record = {"name": recording.name, "source": recording.source, **_stages(fit), **record}
+    record |= {"preset": _preset(recording, options), "shape_from": person or "itself", "identity": identity}
+    return FittedRecording(path, arrays, write_files(folder, {path.name: arrays}, record))
 
 
 def person_of(folder: Path) -> Person:
@@ -123,52 +120,54 @@ def _record(folder: Path) -> dict[str, Any]:
     return read_json(folder / RECORD)
 
 
-def _preset(recording: Recording, settings: Settings) -> str:
+def _preset(recording: Recording, options: FitOptions) -> str:
     """Markers have a preset of their own, unless another was asked for."""
-    return "markers" if recording.frames is None and settings.config.name == "fast" else settings.config.name
+    return "markers" if recording.frames is None and options.config.name == "fast" else options.config.name
 
 
-Found = tuple["Fit", dict[str, np.ndarray], dict[str, Any], float]  # further arrays, what is told, frames a second
+Fitted = tuple[
+    "Fit", dict[str, np.ndarray], dict[str, Any], float
+]  # with further arrays, the record, frames per second
 
 
 def _fit_markers(
-    recording: Recording, settings: Settings, pace: Pace, person: Person | None, progress: Progress
-) -> Found:
+    recording: Recording, options: FitOptions, pace: Pace, person: Person | None, progress: Progress
+) -> Fitted:
     import ipman_rs.torch as ipt
 
     from ...data import markers
     from ...data.markers import own
-    from ...data.markers.judged import of_skin, of_tracks
+    from ...data.markers.judged import check_skin, check_tracks
     from .. import config, marker_fit
 
-    preset, path = _preset(recording, settings), recording.paths[0]
-    chosen = config.load(preset) if preset == "markers" else settings.config
-    body = ipt.BodyModel(settings.model)
-    names = None if settings.markers is None else own.read(settings.markers, body.body)
-    tracks = markers.read(path, settings.up, settings.subject, settings.units, settings.rate)
-    judged = of_tracks(tracks, names, settings.up is not None, settings.ground or 0.0)
-    flags = judge.admit(path, judged, settings.force)
+    preset, path = _preset(recording, options), recording.paths[0]
+    chosen = config.load(preset) if preset == "markers" else options.config
+    body = ipt.BodyModel(options.model)
+    names = None if options.markers is None else own.read(options.markers, body.body)
+    tracks = markers.read(path, options.up, options.subject, options.units, options.rate)
+    issues = check_tracks(tracks, names, options.up is not None, options.ground or 0.0)
+    flags = judge.admit(path, issues, options.force)
     count = len(range(0, len(tracks), pace.every))
     with progress(f"fitting {recording.name}", count) as step:
-        told = {"every": pace.every, "ground": settings.ground or 0.0, "person": person, "own": names}
-        found = marker_fit.fit_tracks(
-            body, tracks, chosen, **told, progress=lambda _stage, done: step.to(min(done, count))
-        )
-    findings, distances = marker_fit.judged_fit(found), found.skin_distances
-    flags = (*flags, *judge.admit(path, [*findings, *of_skin(distances)], settings.force))
-    errors = found.errors
-    each = {name: _mean(column) for name, column in zip(found.tracks.names, errors.T, strict=True)}
-    sites = {name: site if isinstance(site, str) else asdict(site) for name, site in found.sites.items()}
-    record = {"mean_marker_error_m": _mean(errors), "marker_errors_m": each, "skin_distances_m": distances}
-    record |= {"unknown": [*found.unknown], "unseen": [*found.unseen], "flags": [*flags]}
-    notes = [*tracks.notes, *_own_notes(names, tracks.names, settings), *_marker_notes(found, settings)]
+        fitted = marker_fit.fit_tracks(
+            body, tracks, chosen, every=pace.every, ground=options.ground or 0.0, person=person, own=names,
+            progress=lambda _stage, done: step.to(min(done, count)),
+        )  # fmt: skip
+    findings, distances = marker_fit.judged_fit(fitted), fitted.skin_distances
+    flags = (*flags, *judge.admit(path, [*findings, *check_skin(distances)], options.force))
+    errors = fitted.errors
+    by_marker = {name: _mean(column) for name, column in zip(fitted.tracks.names, errors.T, strict=True)}
+    sites = {name: site if isinstance(site, str) else asdict(site) for name, site in fitted.sites.items()}
+    record = {"mean_marker_error_m": _mean(errors), "marker_errors_m": by_marker, "skin_distances_m": distances}
+    record |= {"unknown": [*fitted.unknown], "unseen": [*fitted.unseen], "flags": [*flags]}
+    notes = [*tracks.notes, *_own_notes(names, tracks.names, options), *_marker_notes(fitted, options)]
     record |= {"notes": notes, "sites": sites}
     if any(finding.level == "wrong" for finding in findings):
         record["converged"] = False
-    return found.fit, {"times": found.tracks.times}, record, found.tracks.rate or 1.0
+    return fitted.fit, {"times": fitted.tracks.times}, record, fitted.tracks.rate or 1.0
 
 
-def _own_notes(own: Mapping[str, object] | None, names: Sequence[str], settings: Settings) -> list[str]:
+def _own_notes(own: Mapping[str, object] | None, names: Sequence[str], options: FitOptions) -> list[str]:
     """Which of the user's names of markers no marker of the recording has."""
     from ...data.markers.names import unmatched
 
@@ -176,14 +175,14 @@ def _own_notes(own: Mapping[str, object] | None, names: Sequence[str], settings:
     if not none:
         return []
     more = f" and {len(none) - 8} more" if len(none) > 8 else ""
-    return [f"no marker is called {', '.join(none[:8])}{more}, as {settings.markers} has it (--markers)"]
+    return [f"no marker is called {', '.join(none[:8])}{more}, as {options.markers} has it (--markers)"]
 
 
-def _marker_notes(found: Recorded, settings: Settings) -> list[str]:
+def _marker_notes(found: Recorded, options: FitOptions) -> list[str]:
     """What was done with the markers that is not odd."""
     notes = []
-    if settings.up is not None:
-        axis = ", ".join(f"{number:g}" for number in settings.up)
+    if options.up is not None:
+        axis = ", ".join(f"{number:g}" for number in options.up)
         notes.append(f"up: ({axis}) of the file's axes, turned to y: the bodies are y up")
     if found.unseen:
         notes.append(f"{len(found.unseen)} markers of the file were never seen: {', '.join(found.unseen)}")
@@ -200,47 +199,47 @@ def _mean(errors: np.ndarray) -> float | None:
     return float(known.mean()) if len(known) else None
 
 
-def _fit_frames(recording: Recording, settings: Settings, pace: Pace, progress: Progress) -> Found:
+def _fit_frames(recording: Recording, options: FitOptions, pace: Pace, progress: Progress) -> Fitted:
     import ipman_rs.torch as ipt
 
     from ...data.keypoints.detections import join
     from .. import start
     from ..sequence import fit_sequence
-    from .items import look
-    from .run import problem_of
+    from .items import detect
 
     assert recording.frames is not None
-    items, unseen = recording.frames[:: pace.every], []
+    items, left_out = recording.frames[:: pace.every], []
     with progress(f"reading {recording.name}", len(items)) as step:
         for item in items:
             try:
-                if item.seen is None:
-                    look(item)
+                if item.detections is None:
+                    detect(item)
             except FileError as error:
-                unseen.append(f"{item.source}: {error.what}")
+                left_out.append(f"{item.source}: {error.what}")
             step.one()
-    kept = [item for item in items if item.seen is not None]
-    if not kept:
-        raise ValueError(f"nobody was found in any of {len(items)} frames; first of all: {unseen[0]}")
-    body = ipt.BodyModel(settings.model)
-    seen, imitated = join([item.seen for item in kept if item.seen is not None]), settings.presented(body.body)
-    problem = problem_of(body, seen, settings, imitated)
+    frames = [item.detections for item in items if item.detections is not None]
+    if not frames:
+        raise ValueError(f"nobody was found in any of {len(items)} frames; first of all: {left_out[0]}")
+    model = ipt.BodyModel(options.model)
+    presented_body = options.presented(model.body)
+    problem = options.problem(model, join(frames), presented_body)
     rate = pace.fps / pace.every
-    with progress(f"fitting {recording.name}", len(kept)) as step:
-        problem, variables = start.begin(problem, settings.config.start)
-        told = {"rate": rate, "progress": lambda _stage, done: step.to(min(done, len(kept)))}
-        found = fit_sequence(problem, variables, settings.config, **told)
+    with progress(f"fitting {recording.name}", len(frames)) as step:
+        problem, variables = start.begin(problem, options.config.start)
+        fitted = fit_sequence(
+            problem, variables, options.config, rate=rate, progress=lambda _stage, done: step.to(min(done, len(frames)))
+        )
     assert problem.points is not None
-    median = (found.candidate.projected - problem.points).norm(dim=-1).median()
+    median = (fitted.candidate.projected - problem.points).norm(dim=-1).median()
     notes = list(dict.fromkeys(note for item in items for note in item.notes))
     flags = list(dict.fromkeys(flag for item in items for flag in item.flags))
-    if len(flags) > TOLD:
-        flags = [*flags[:TOLD], f"{len(flags) - TOLD} more such flags of frames"]
-    record: dict[str, Any] = {"frames_left_out": unseen, "median_error_px": _number(median)}
+    if len(flags) > MAX_FRAME_FLAGS:
+        flags = [*flags[:MAX_FRAME_FLAGS], f"{len(flags) - MAX_FRAME_FLAGS} more such flags of frames"]
+    record: dict[str, Any] = {"frames_left_out": left_out, "median_error_px": _number(median)}
     record |= {"notes": notes, "flags": flags}
-    if imitated is not None:
-        record |= {"presented": imitated.record(body.body), "notes": [*notes, *imitated.notes]}
-    return found, {}, record, rate
+    if presented_body is not None:
+        record |= {"presented": presented_body.record(model.body), "notes": [*notes, *presented_body.notes]}
+    return fitted, {}, record, rate
 
 
 def _stages(found: Fit) -> dict[str, Any]:
@@ -268,20 +267,26 @@ def _arrays(found: Fit, rate: float) -> dict[str, np.ndarray]:
     return arrays
 
 
-def _measured(recording: Recording, folder: Path, settings: Settings) -> Study:
+def study_of(fitted: FittedRecording, model: str) -> Study:
+    """The analysed bodies of a fitted recording; what is odd stands in the study's flags. Raises FileError."""
     from ...study.from_file import Request, analyze_file
 
-    path = folder / f"{recording.name}.npz"
-    height = float(safe_npz.read(path, "ground_height")[0]) if "ground_height" in safe_npz.names(path) else None
-    study = analyze_file(path, Request(model=settings.model, ground=height))
-    slow = judge.rate(float(safe_npz.read(path, "mocap_frame_rate")))  # some of the recording's frames are left out
-    known = {finding.what for finding in slow}
-    return replace(study, flags=tuple(flag for flag in study.flags if flag.partition(";")[0] not in known))
+    arrays, record = fitted.arrays, fitted.record
+    ground = float(arrays["ground_height"][0]) if "ground_height" in arrays else None
+    analyzed = analyze_file(fitted.path, Request(model=model, ground=ground), arrays=arrays)
+    slow = judge.rate(float(arrays["mocap_frame_rate"]))  # some of the recording's frames are left out
+    of_pace = {finding.what for finding in slow}
+    flags = [flag for flag in analyzed.flags if flag.partition(";")[0] not in of_pace]
+    return replace(
+        analyzed,
+        notes=(*analyzed.notes, *record.get("notes", ())),
+        flags=(*record.get("flags", ()), *flags),
+    )
 
 
-def _identity(recording: Recording, settings: Settings, pace: Pace, person: str | None) -> str:
+def _identity(recording: Recording, options: FitOptions, pace: Pace, person: str | None) -> str:
     """A hash of all that a fit depends on; `person`: that of the fit whose shape is kept."""
-    digest = hashlib.sha256(json.dumps([settings.identity(), repr(pace), person]).encode())
+    digest = hashlib.sha256(json.dumps([options.identity(), repr(pace), person]).encode())
     for path in recording.paths:
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()

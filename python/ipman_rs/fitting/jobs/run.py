@@ -1,140 +1,199 @@
-"""Fit items in batches and keep their outputs, one item's failure being its own."""
+"""Fit files, in batches and resumable, one input's failure being its own.
+
+    fits = fit_files(["photo.jpg", "squats.trc"], "out", fit_options(preset="fast"))
+    fits.studies[0].numbers["stability"], fits.failures
+
+Each body is posed, analysed and handed over as it was written; only what `resume` finds finished is read back.
+"""
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import ipman_rs as ip
 import ipman_rs.torch as ipt
 
-from ...body import BodyModel
-from ...data.keypoints.detections import Detections, join
+from ...data.keypoints.detections import join
+from ...files import safe_names
 from ...files.errors import FileError
 from ...progress import Progress, silent
-from .. import detected, presented, start
+from ...study import Study
+from .. import detected, start
 from ..camera_file import KnownCamera
-from ..config import Config, weighs
 from ..fit import fit
 from ..presented import PresentedBody
-from ..problem import Problem
 from ..result import Result, results
-from .items import Item, identity, look
-from .outputs import complete, write_item
+from . import recordings
+from .items import MARKERS, InputOptions, Item, detect, expand, identity, read_items
+from .options import FitOptions, fit_options
+from .outputs import FittedItem, read_item, study_of, write_item
+from .recordings import Pace
 
 BATCH = 64  # items fitted together; after each batch its outputs are on the disk
+_INPUT = InputOptions()
+_PACE = Pace()
 
 
 @dataclass(frozen=True)
-class Settings:
-    """The options of one command that decide how bodies come out."""
+class Fits:
+    """The analysed bodies, recordings first; (input, reason) of each that has none; and of recordings (input, flags),
+    what is odd about them."""
 
-    config: Config
-    model: str
-    focal: float | None = None
-    pitch: float = 0.0
-    camera: KnownCamera | None = None
-    ground: float | None = None
-    height: float | None = None
-    mass: float | None = None
-    pose: str | None = None
-    pose_frame: int | None = None
-    pose_up: tuple[float, float, float] | None = None
-    contact: Path | None = None
-    subject: str | None = None
-    up: tuple[float, float, float] | None = None  # of a marker file, in its own axes
-    units: float | None = None  # metres in one of a marker file's lengths
-    rate: float | None = None  # Hz, of a marker file
-    markers: Path | None = None  # a file of marker names and their places
-    force: bool = False  # markers that cannot be a person's are fitted, too
-    obj: bool = False
-
-    def identity(self) -> str:
-        files = [path for path in (self.pose, self.contact, self.markers) if path is not None and Path(path).is_file()]
-        content = [hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in files]
-        return json.dumps([ip.__version__, asdict(self), content], default=str, sort_keys=True)
-
-    def presented(self, body: BodyModel) -> PresentedBody | None:
-        """The pose that `--pose` names, if it names one. Raises ValueError."""
-        if self.pose is None:
-            return None
-        return presented.load(self.pose, body, contact=self.contact, frame=self.pose_frame, up=self.pose_up)
+    studies: list[Study]
+    failures: list[tuple[str, str]]
+    flags: list[tuple[str, tuple[str, ...]]]
 
 
-def run(
-    items: list[Item], settings: Settings, output: Path, resume: bool = False, progress: Progress = silent
-) -> dict[str, dict[str, Any]]:
-    """Fit the items and write them under `output`; the records of those that have a body, by name.
+def fit_files(
+    inputs: Sequence[str | Path],
+    output: str | Path,
+    options: FitOptions | None = None,
+    reading: InputOptions = _INPUT,
+    pace: Pace = _PACE,
+    resume: bool = False,
+    pictures: int = 8,
+    progress: Progress = silent,
+) -> Fits:
+    """Fit photos, keypoint files, marker files and folders of them; each gets a folder in `output`.
 
-    Items that fail say so in `failure`. Raises ValueError for options that fit no item.
+    `pictures`: of the first so many items the photo and the body before the physics terms are kept for the report. The
+    report itself is `view.report.write_report(fits.studies, output, fits.failures, own_folders=True)`.
+
+    Raises:
+        ValueError: options that fit no input or contradict each other.
+        OSError: `output` cannot be written.
     """
-    _check(settings)
-    body = ipt.BodyModel(settings.model)
-    imitated = settings.presented(body.body)
-    options = settings.identity()
-    records: dict[str, dict[str, Any]] = {}
-    hashes = {item.name: identity(item, options) for item in items}
+    output, options = Path(output), options or fit_options()
+    items, markers, failures = read_inputs([Path(path) for path in inputs], reading)
+    needless = next((name for name in ("up", "units", "rate", "markers") if getattr(options, name) is not None), None)
+    if needless and not markers and not failures:
+        raise ValueError(f"--{needless} belongs to marker files (.trc, .c3d), of which there are none")
+    if pace.fps <= 0:
+        raise ValueError(f"--fps: expected more than 0, got {pace.fps}")
+    studies: list[Study] = []
+    flags: list[tuple[str, tuple[str, ...]]] = []
+    for recording in recordings.recordings(markers, items if reading.sequence else []):
+        try:
+            fitted = recordings.fit_recording(recording, options, pace, output, resume, progress=progress)
+            studies.append(recordings.study_of(fitted, options.model))
+            flags.append((recording.source, studies[-1].flags))
+        except FileError as error:
+            failures.append((recording.source, error.what))
+        except OSError as error:
+            failures.append((recording.source, str(error)))
+    if items and not reading.sequence:
+        studies += fit_items(items, options, output, resume, pictures, progress)
+        failures += [(item.source, item.failure) for item in items if item.failure is not None]
+    return Fits(studies, failures, flags)
+
+
+def read_inputs(inputs: Sequence[Path], reading: InputOptions) -> tuple[list[Item], list[Path], list[tuple[str, str]]]:
+    """The people in the inputs, under names of their own; the marker files; and (input, reason) of the others.
+
+    Raises ValueError where a photo is given for more than one input.
+    """
+    items: list[Item] = []
+    paths: list[Path] = []
+    failures: list[tuple[str, str]] = []
+    for path in inputs:
+        try:
+            paths += expand([path])
+        except FileError as error:
+            failures.append((str(path), error.what))
+    if reading.photo is not None and len(paths) > 1:
+        raise ValueError(f"--image belongs to one keypoint file, got {len(paths)} inputs")
+    markers = [path for path in paths if path.suffix.lower() in MARKERS]
+    for path in paths:
+        if path in markers:
+            continue
+        try:
+            items += read_items(path, reading)
+        except FileError as error:
+            failures.append((str(path), error.what))
+        except (OSError, ValueError) as error:
+            failures.append((str(path), str(error)))
+    for item, name in zip(items, safe_names([item.name for item in items]), strict=True):
+        item.name = name
+    return items, markers, failures
+
+
+def fit_items(
+    items: list[Item],
+    options: FitOptions,
+    output: Path,
+    resume: bool = False,
+    pictures: int = 8,
+    progress: Progress = silent,
+) -> list[Study]:
+    """Fit items, write the folder of each under `output`, and analyse those that have a body, in their order.
+
+    Items without a body say why in `failure`. Raises ValueError for options that fit no item, and OSError.
+    """
+    options.check()
+    model = ipt.BodyModel(options.model)
+    body, presented_body = model.body, options.presented(model.body)
+    text = options.identity()
+    hashes = {item.name: identity(item, text) for item in items}
+    finished: dict[str, FittedItem] = {}
     if resume:
-        found = {item.name: complete(output / item.name, hashes[item.name]) for item in items}
-        records = {name: record for name, record in found.items() if record is not None}
-    waiting = [item for item in items if item.name not in records]
-    for batch in _batches(waiting, progress):
-        for item, result in _fitted(batch, settings, body, imitated, progress):
-            told = {**result.record(), "preset": settings.config.name, "model": body.body.name}
-            if imitated is not None:
-                told["presented"] = imitated.record(body.body)
-                item.notes += imitated.notes
-            told |= {"flags": item.flags, "notes": item.notes, "identity": hashes[item.name]}
-            records[item.name] = write_item(item, result, body.body, output / item.name, told, settings.obj)
-    return records
-
-
-def _check(settings: Settings) -> None:
-    config = settings.config
-    if settings.pose is None and weighs(config, "presented_pose", "presented_contact"):
-        raise ValueError(f"preset {config.name} imitates a pose: give its name or file with --pose")
-    if settings.pose is None and (settings.contact or settings.pose_frame is not None or settings.pose_up):
-        raise ValueError("--contact, --pose-frame and --pose-up say more of a --pose: give that, too")
-    if settings.height is None and settings.mass is None and weighs(config, "measured_shape"):
-        raise ValueError(f"preset {config.name} knows the person's size: give --height or --mass, or both")
+        stored = [read_item(item, body, output / item.name, hashes[item.name]) for item in items]
+        finished = {fitted.item.name: fitted for fitted in stored if fitted is not None}
+    for batch in _batches([item for item in items if item.name not in finished], progress):
+        for item, result in _fit_batch(batch, options, model, presented_body, progress):
+            record: dict[str, Any] = {**result.record(), "preset": options.config.name, "model": body.name}
+            if presented_body is not None:
+                record["presented"] = presented_body.record(body)
+                item.notes += presented_body.notes
+            record |= {"flags": item.flags, "notes": item.notes, "identity": hashes[item.name]}
+            finished[item.name] = write_item(item, result, body, output / item.name, record, options.obj)
+    studies = []
+    with progress("measuring", len(finished)) as step:
+        for number, fitted in enumerate(finished[item.name] for item in items if item.name in finished):
+            studies.append(study_of(fitted, body, number < pictures))
+            step.one()
+    return studies
 
 
 def _batches(items: Iterable[Item], progress: Progress) -> Iterator[list[Item]]:
     """Items whose points have the same names, up to `BATCH` together: what else is in a batch changes no bit of any."""
-    waiting: dict[tuple[str, ...], list[Item]] = {}
+    groups: dict[tuple[str, ...], list[Item]] = {}
     todo = list(items)
     with progress("reading", len(todo)) as step:
         for item in todo:
             try:
-                if item.seen is None:
-                    look(item)
-                assert item.seen is not None
-                waiting.setdefault(item.seen.names, []).append(item)
+                if item.detections is None:
+                    detect(item)
+                assert item.detections is not None
+                groups.setdefault(item.detections.names, []).append(item)
             except FileError as error:
                 item.failure = error.what
             step.one()
-    for group in waiting.values():
+    for group in groups.values():
         for first in range(0, len(group), BATCH):
             yield group[first : first + BATCH]
 
 
-def _fitted(
-    batch: list[Item], settings: Settings, body: ipt.BodyModel, imitated: PresentedBody | None, progress: Progress
+def _fit_batch(
+    batch: list[Item],
+    options: FitOptions,
+    model: ipt.BodyModel,
+    presented_body: PresentedBody | None,
+    progress: Progress,
 ) -> Iterator[tuple[Item, Result]]:
-    kept = [item for item in batch if not _refused(item, body, settings.camera)]
-    if not kept:
+    """The items of a batch that have a body, each with its result."""
+    usable = [item for item in batch if not _refuse(item, model, options.camera)]
+    if not usable:
         return
-    problem = problem_of(body, join([item.seen for item in kept if item.seen is not None]), settings, imitated)
-    config = settings.config
-    with progress(f"fitting {len(kept)}", len(kept) * len(config.stages)) as step:
+    detections = join([item.detections for item in usable if item.detections is not None])
+    problem = options.problem(model, detections, presented_body)
+    config = options.config
+    with progress(f"fitting {len(usable)}", len(usable) * len(config.stages)) as step:
         problem, variables = start.begin(problem, config.start)
-        done = {stage.name: number * len(kept) for number, stage in enumerate(config.stages)}
-        found = fit(problem, variables, config, lambda stage, ended: step.to(done[stage] + ended), trace=True)
-    for item, result in zip(kept, results(found, config, variables), strict=True):
+        before = {stage.name: number * len(usable) for number, stage in enumerate(config.stages)}
+        fitted = fit(problem, variables, config, lambda stage, ended: step.to(before[stage] + ended), trace=True)
+    for item, result in zip(usable, results(fitted, config, variables), strict=True):
         if not result.finite:
             item.failure = "the fit found no finite body; check focal length, image size and points"
             continue
@@ -142,27 +201,15 @@ def _fitted(
         yield item, result
 
 
-def problem_of(
-    body: ipt.BodyModel, seen: Detections, settings: Settings, imitated: PresentedBody | None = None
-) -> Problem:
-    """What is known of each person that was seen, who imitates a pose, or none."""
-    where = {"focal": settings.focal, "pitch": settings.pitch, "ground": settings.ground}
-    where |= {} if settings.camera is None else {"camera": settings.camera}
-    problem = detected.problem(body, seen, **where, height=settings.height, mass=settings.mass)
-    if imitated is None:
-        return problem
-    return presented.present(problem, [imitated], settings.config.moves_camera)
-
-
-def _refused(item: Item, body: ipt.BodyModel, camera: KnownCamera | None) -> bool:
-    """Whether too little is seen of an item; else its oddities become flags."""
-    assert item.seen is not None
-    names = detected.shared_names(body, item.seen)
-    seen = item.seen.select(names)
-    item.failure = detected.too_little(names, seen.confidence[0])
+def _refuse(item: Item, model: ipt.BodyModel, camera: KnownCamera | None) -> bool:
+    """Whether too few points of an item are visible, which becomes its failure; else its oddities become flags."""
+    assert item.detections is not None
+    names = detected.shared_names(model, item.detections)
+    shared = item.detections.select(names)
+    item.failure = detected.too_little(names, shared.confidence[0])
     if item.failure is not None:
         return True
-    assert seen.image_size is not None
-    item.flags += detected.oddities(names, seen.points[0], seen.confidence[0], seen.image_size[0])
-    item.flags += [] if camera is None else detected.unlike(camera, seen.image_size[0])
+    assert shared.image_size is not None
+    item.flags += detected.oddities(names, shared.points[0], shared.confidence[0], shared.image_size[0])
+    item.flags += [] if camera is None else detected.unlike(camera, shared.image_size[0])
     return False

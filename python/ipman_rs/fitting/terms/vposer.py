@@ -20,7 +20,7 @@ from torch import Tensor
 from torch.nn.functional import leaky_relu
 
 from ipman_rs.body import joints
-from ipman_rs.files import regular
+from ipman_rs.files import regular_file
 
 from ..candidate import Candidate
 from ..problem import Problem
@@ -59,7 +59,7 @@ def affine(map: Tensor, rows: Tensor) -> Tensor:
 
 def load(path: Path) -> tuple[Tensor, Tensor]:
     """The encoder's two affine maps, (512, 64) and (32, 513). ValueError if the file is not such a checkpoint."""
-    regular(path)
+    regular_file(path)
     try:
         content = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:  # damaged bytes can fail in any way

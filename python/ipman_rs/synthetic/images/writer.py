@@ -15,7 +15,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ipman_rs.files import being_written, write_whole
+from ipman_rs.files import atomic_write, write_whole
 from ipman_rs.processes import end_with_parent
 
 from ...data.rendered.layout import FORMAT, INDEX, SPLITS, Shard, plan, read_index
@@ -46,7 +46,7 @@ def write(
     with closing(packed(settings, missing, workers)) as samples:
         for shard in missing:
             with (
-                being_written(folder / shard.name) as file,
+                atomic_write(folder / shard.name) as file,
                 tarfile.open(fileobj=file, mode="w", format=tarfile.USTAR_FORMAT) as archive,
             ):
                 for key, contents in itertools.islice(samples, shard.count):

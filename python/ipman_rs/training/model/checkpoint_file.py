@@ -7,12 +7,12 @@ from typing import Any
 
 import torch
 
-from ipman_rs.files import regular
+from ipman_rs.files import regular_file
 
 
 def read_checkpoint(path: str | os.PathLike[str]) -> Any:
     """The content, on the CPU. ValueError, naming the file, if it cannot be read."""
-    regular(path)
+    regular_file(path)
     try:
         return torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:  # damaged bytes can fail in any way

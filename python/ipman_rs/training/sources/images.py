@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ipman_rs.body import BodyModel, rotations
-from ipman_rs.body.embedded import kind_of
 from ipman_rs.data import DataSet, Frames
-from ipman_rs.files import regular
+from ipman_rs.files import regular_file
 
 from ..augment import Augmentation, Augmenting, Pixels, cut, follow, normalised, to_crop
 from ..posed_estimate import HIPS, REGRESSED
@@ -162,7 +161,7 @@ class Images:
 
     def _is_own(self, name: str | None) -> bool:
         """Whether parameters of the body `name` are those of this model."""
-        return name == kind_of(self.body)
+        return name == self.body.kind
 
     def _image(self, frame: Frames, row: int) -> Any:
         """A PIL image: the data set's own, or the file that the frame names."""
@@ -173,7 +172,7 @@ class Images:
             return Image.fromarray(own(row))
         if frame.images is None:
             raise BadSample(f"{frame.names[0]}: no image")
-        with Image.open(regular(self.folder / str(frame.images[0])), formats=("JPEG", "PNG")) as image:
+        with Image.open(regular_file(self.folder / str(frame.images[0])), formats=("JPEG", "PNG")) as image:
             return image.convert("RGB")
 
 

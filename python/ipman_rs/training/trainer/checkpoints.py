@@ -10,14 +10,14 @@ import torch
 from lightning.pytorch.callbacks import Checkpoint
 from lightning.pytorch.plugins.io import TorchCheckpointIO
 
-from ipman_rs.files import being_written
+from ipman_rs.files import atomic_write
 
 
 class WholeFiles(TorchCheckpointIO):
     def save_checkpoint(self, checkpoint: dict[str, Any], path: Any, storage_options: Any = None) -> None:
         place = Path(path)
         place.parent.mkdir(parents=True, exist_ok=True)
-        with being_written(place) as file:
+        with atomic_write(place) as file:
             torch.save(checkpoint, file)
 
 

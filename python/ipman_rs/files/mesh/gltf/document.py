@@ -11,7 +11,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files import parse_json, regular
+from ipman_rs.files import parse_json, regular_file
 
 from .. import text
 
@@ -49,20 +49,22 @@ class Document:
         self.size = len(self._binary or b"")  # bytes of the buffers that have been read
         version = str(self.json.get("asset", {}).get("version", ""))
         if not version.startswith("2."):
-            raise ValueError(f"it is glTF {text.listed([version])}; export it as glTF 2.0")
+            raise ValueError(f"it is glTF {text.list_names([version])}; export it as glTF 2.0")
         for name in self.json.get("extensionsRequired", []):
             if not str(name).startswith((*SURFACE, *LOOKS)):
-                raise ValueError(f"it needs the extension {text.listed([name])}, which is not read; export it without")
+                raise ValueError(
+                    f"it needs the extension {text.list_names([name])}, which is not read; export it without"
+                )
 
     def all(self, kind: str) -> list[dict[str, Any]]:
         if kind not in self._lists:
-            self._lists[kind] = checked(kind, self.json.get(kind, []))
+            self._lists[kind] = check_entries(kind, self.json.get(kind, []))
         return self._lists[kind]
 
     def one(self, kind: str, index: Any) -> dict[str, Any]:
         listed = self.all(kind)
         if type(index) is not int or not 0 <= index < len(listed):
-            raise ValueError(f"it names {text.listed([index])} of {len(listed)} {kind}")
+            raise ValueError(f"it names {text.list_names([index])} of {len(listed)} {kind}")
         return listed[index]
 
     def array(self, index: Any) -> NDArray[Any]:
@@ -95,7 +97,7 @@ class Document:
         where, what, count = sparse["indices"], sparse["values"], sparse["count"]
         index_kind = TYPES.get(where.get("componentType", 0), "")
         if type(count) is not int or not 0 < count <= len(values) or index_kind[1:2] != "u":
-            raise ValueError(f"its {name} replaces {text.listed([count])} of {len(values)} rows")
+            raise ValueError(f"its {name} replaces {text.list_names([count])} of {len(values)} rows")
         rows = self._view(where["bufferView"], where.get("byteOffset", 0), index_kind, count, 1, name)[:, 0]
         if rows.max() >= len(values):
             raise ValueError(f"its {name} replaces row {rows.max()} of {len(values)}")
@@ -142,25 +144,27 @@ class Document:
         name = unquote(uri)
         place = (self._folder / name).resolve()
         if ":" in name or "\\" in name or not place.is_relative_to(self._folder.resolve()):
-            raise ValueError(f"its buffer '{text.listed([name])}' lies outside of its folder; put it beside the file")
+            raise ValueError(
+                f"its buffer '{text.list_names([name])}' lies outside of its folder; put it beside the file"
+            )
         if not place.is_file():
             raise ValueError(
-                f"there is no file '{text.listed([name])}' beside it, which holds its buffer; copy it there"
+                f"there is no file '{text.list_names([name])}' beside it, which holds its buffer; copy it there"
             )
-        return self._counted(regular(place).read_bytes())
+        return self._counted(regular_file(place).read_bytes())
 
     def _counted(self, content: bytes) -> bytes:
         self.size += len(content)
         return content
 
 
-def checked(kind: str, listed: Any) -> list[dict[str, Any]]:
+def check_entries(kind: str, listed: Any) -> list[dict[str, Any]]:
     """A list of objects whose entries are what glTF has there. ValueError where they are not."""
     if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
         raise ValueError(f"its {kind} are no list of objects")
-    for name, (expected, said) in ENTRIES.get(kind, {}).items():
+    for name, (expected, kind_name) in ENTRIES.get(kind, {}).items():
         if any(name in one and not isinstance(one[name], expected) for one in listed):
-            raise ValueError(f"the {name} of its {kind}: expected {said}")
+            raise ValueError(f"the {name} of its {kind}: expected {kind_name}")
     return listed
 
 
@@ -186,9 +190,9 @@ def _chunks(content: bytes) -> tuple[dict[str, Any], bytes | None]:
             place += 8 + size
         words, binary = chunks.get(JSON, b""), chunks.get(BIN)
     try:
-        found = parse_json(words)
+        content_json = parse_json(words)
     except ValueError as error:
-        raise ValueError(f"it holds no JSON of glTF ({text.listed([error])})") from None
-    if not isinstance(found, dict) or not isinstance(found.get("asset", {}), dict):
+        raise ValueError(f"it holds no JSON of glTF ({text.list_names([error])})") from None
+    if not isinstance(content_json, dict) or not isinstance(content_json.get("asset", {}), dict):
         raise ValueError("it holds no JSON of glTF")
-    return found, binary
+    return content_json, binary

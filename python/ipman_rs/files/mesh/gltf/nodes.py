@@ -30,7 +30,7 @@ def world_matrices(document: Document) -> dict[int, Array]:
     return world
 
 
-def moved(points: Array, matrix: Array) -> Array:
+def transform(points: Array, matrix: Array) -> Array:
     """(N, 3) by a matrix (4, 4), or one for each point (N, 3, 4), in the same sums: equal points stay equal."""
     columns = [matrix[..., :3, k] for k in range(4)]
     x, y, z = (points[:, k, None] for k in range(3))
@@ -49,14 +49,14 @@ def _roots(document: Document) -> list[int]:
 def _descendants(document: Document, roots: list[int]) -> list[int]:
     """Depth first, in the file's order. ValueError for a node that is reached twice."""
     order: list[int] = []
-    seen: set[int] = set()
+    visited: set[int] = set()
     stack = list(reversed(roots))
     while stack:
         index = stack.pop()
         node = document.one("nodes", index)
-        if index in seen:
+        if index in visited:
             raise ValueError(f"its node {index} has two parents or is its own")
-        seen.add(index)
+        visited.add(index)
         order.append(index)
         stack.extend(reversed(node.get("children", [])))
     return order

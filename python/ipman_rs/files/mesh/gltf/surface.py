@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import text
 from ..repair import Mesh
 from . import nodes
-from .document import DRACO, Document, checked
+from .document import DRACO, Document, check_entries
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -57,7 +57,7 @@ class _Scene:
         self.names.append(name)
         weights = node.get("weights", mesh.get("weights", []))
         starts: dict[str, int] = {}  # primitives may share their vertices
-        for primitive in checked("primitives", mesh["primitives"]):
+        for primitive in check_entries("primitives", mesh["primitives"]):
             mode = primitive.get("mode", TRIANGLES)
             if mode not in (TRIANGLES, STRIP, FAN):
                 self.lines += 1
@@ -98,7 +98,7 @@ class _Scene:
 
     def _morphed(self, points: Array, primitive: dict[str, Any], weights: list[float], mesh: dict[str, Any]) -> Array:
         """With the morph targets added by their weights."""
-        targets = checked("targets", primitive.get("targets", []))
+        targets = check_entries("targets", primitive.get("targets", []))
         if targets and len(weights) not in (0, len(targets)):
             raise ValueError(f"it has {len(weights)} weights for {len(targets)} morph targets")
         extras = mesh.get("extras")
@@ -121,7 +121,7 @@ class _Scene:
         if skin is None or "JOINTS_0" not in attributes:
             if skin is not None or "JOINTS_0" in attributes:
                 self.unskinned.append(name)
-            return nodes.moved(points, self.world[index])
+            return nodes.transform(points, self.world[index])
         return self._skinned(points, attributes, self.document.one("skins", skin))
 
     def _skinned(self, points: Array, attributes: dict[str, int], skin: dict[str, Any]) -> Array:
@@ -147,9 +147,9 @@ class _Scene:
                 blended += weights[:, column, None, None] * matrices[used[:, column], :3]
                 total += weights[:, column]
         if not (total > 0).all():
-            loose = text.counted(int((~(total > 0)).sum()), "vertex has", "vertices have")
+            loose = text.count_of(int((~(total > 0)).sum()), "vertex has", "vertices have")
             raise ValueError(f"{loose} no skin weights; weight them, or export the posed mesh without its skin")
-        return nodes.moved(points, blended / total[:, None, None])
+        return nodes.transform(points, blended / total[:, None, None])
 
     def _world(self, joint: Any) -> Array:
         self.document.one("nodes", joint)
@@ -159,29 +159,29 @@ class _Scene:
         """What was joined, applied and left out."""
         document, notes = self.document, []
         if len(self.names) > 1:
-            notes.append(f"{len(self.names)} meshes are joined: {text.listed(self.names)}")
+            notes.append(f"{len(self.names)} meshes are joined: {text.list_names(self.names)}")
         if self.joints:
-            notes.append(f"skin: posed by {text.counted(len(self.joints), 'joint')} of the file")
+            notes.append(f"skin: posed by {text.count_of(len(self.joints), 'joint')} of the file")
         if self.morphs:
-            said = [f"{name} {weight:g}" for name, weight in self.morphs.items()]
-            notes.append(f"morph targets applied: {text.listed(said)}")
+            weights = [f"{name} {weight:g}" for name, weight in self.morphs.items()]
+            notes.append(f"morph targets applied: {text.list_names(weights)}")
         if self.idle:
-            notes.append(f"{text.counted(self.idle, 'morph target')} of weight 0")
+            notes.append(f"{text.count_of(self.idle, 'morph target')} of weight 0")
         if self.unskinned:
-            notes.append(f"without a whole skin, so placed by the node alone: {text.listed(self.unskinned)}")
+            notes.append(f"without a whole skin, so placed by the node alone: {text.list_names(self.unskinned)}")
         if self.lines:
-            notes.append(f"{text.counted(self.lines, 'primitive')} of points or lines left out")
+            notes.append(f"{text.count_of(self.lines, 'primitive')} of points or lines left out")
         hidden = {node["mesh"] for node in document.all("nodes") if "mesh" in node} - {
             document.one("nodes", index)["mesh"] for index in shown
         }
         if hidden:
             names = [document.one("meshes", mesh).get("name", f"mesh {mesh}") for mesh in sorted(hidden)]
-            notes.append(f"outside of the scene and left out: {text.listed(names)}")
+            notes.append(f"outside of the scene and left out: {text.list_names(names)}")
         if len(document.all("scenes")) > 1:
             notes.append(f"one of {len(document.all('scenes'))} scenes is read")
         animations = [one.get("name", f"animation {k}") for k, one in enumerate(document.all("animations"))]
         if animations:
-            notes.append(f"the pose of the nodes is read; animations left out: {text.listed(animations)}")
+            notes.append(f"the pose of the nodes is read; animations left out: {text.list_names(animations)}")
         if any("EXT_mesh_gpu_instancing" in node.get("extensions", {}) for node in document.all("nodes")):
             notes.append("instances by EXT_mesh_gpu_instancing left out")
         return notes

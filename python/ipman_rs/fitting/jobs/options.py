@@ -1,0 +1,108 @@
+"""The options of a fit: preset, body model, what is known of the camera, the person and the markers."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import ipman_rs as ip
+import ipman_rs.torch as ipt
+
+from ...body import BodyModel
+from ...data.keypoints.detections import Detections
+from .. import camera_file, config, detected, presented
+from ..camera_file import KnownCamera
+from ..config import Config, weighs
+from ..presented import PresentedBody
+from ..problem import Problem
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """All that decides how bodies come out, beside the inputs.
+
+    model: name or file of the body model. focal: pixels. pitch: degrees that the camera looks down. ground: height of
+    the floor, m; None: under the feet. height, mass: of the person, m and kg. pose: name or file of a presented pose,
+    with its frame, its up axis and the file of its contact. Of marker files: subject, up (in the file's own axes),
+    units (metres in one of its lengths), rate (Hz), markers (a file of marker names and their places), force (fit
+    markers that cannot be a person's, too). obj: write meshes as .obj, too.
+    """
+
+    config: Config
+    model: str
+    focal: float | None = None
+    pitch: float = 0.0
+    camera: KnownCamera | None = None
+    ground: float | None = None
+    height: float | None = None
+    mass: float | None = None
+    pose: str | None = None
+    pose_frame: int | None = None
+    pose_up: tuple[float, float, float] | None = None
+    contact: Path | None = None
+    subject: str | None = None
+    up: tuple[float, float, float] | None = None
+    units: float | None = None
+    rate: float | None = None
+    markers: Path | None = None
+    force: bool = False
+    obj: bool = False
+
+    def identity(self) -> str:
+        """Text that differs wherever the fits could: the version, the options, and the bytes of their files."""
+        files = [path for path in (self.pose, self.contact, self.markers) if path is not None and Path(path).is_file()]
+        content = [hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in files]
+        return json.dumps([ip.__version__, asdict(self), content], default=str, sort_keys=True)
+
+    def presented(self, body: BodyModel) -> PresentedBody | None:
+        """The presented pose, if one is named. Raises ValueError."""
+        if self.pose is None:
+            return None
+        return presented.load(self.pose, body, contact=self.contact, frame=self.pose_frame, up=self.pose_up)
+
+    def check(self) -> None:
+        """ValueError where the preset needs what is not given, or options contradict each other."""
+        if self.pose is None and weighs(self.config, "presented_pose", "presented_contact"):
+            raise ValueError(f"preset {self.config.name} imitates a pose: give its name or file with --pose")
+        if self.pose is None and (self.contact or self.pose_frame is not None or self.pose_up):
+            raise ValueError("--contact, --pose-frame and --pose-up say more of a --pose: give that, too")
+        if self.height is None and self.mass is None and weighs(self.config, "measured_shape"):
+            raise ValueError(f"preset {self.config.name} knows the person's size: give --height or --mass, or both")
+
+    def problem(
+        self, model: ipt.BodyModel, detections: Detections, presented_body: PresentedBody | None = None
+    ) -> Problem:
+        """The fitting problem of detected people, who imitate a presented pose if there is one."""
+        known = {"focal": self.focal, "pitch": self.pitch, "ground": self.ground}
+        known |= {} if self.camera is None else {"camera": self.camera}
+        problem = detected.problem(model, detections, **known, height=self.height, mass=self.mass)
+        if presented_body is None:
+            return problem
+        return presented.present(problem, [presented_body], self.config.moves_camera)
+
+
+def fit_options(
+    preset: str | Path = "fast",
+    model: str = "anny-lite",
+    iterations: int | None = None,
+    camera: str | Path | None = None,
+    markers: Path | None = None,
+    **others: Any,
+) -> FitOptions:
+    """The options of a fit by a preset's name or file.
+
+    iterations: end each stage after so many at most. camera: a JSON file (`camera_file`). markers, others: as in
+    `FitOptions`. Raises ValueError for a preset, camera or markers that cannot be read.
+    """
+    from ...data.markers import own
+
+    chosen = config.load(preset)
+    if iterations is not None:
+        chosen = config.capped(chosen, iterations)
+    if markers is not None:
+        own.read(markers, ip.load_body(model))  # before anything is fitted
+    known = None if camera is None else camera_file.read(camera)
+    return FitOptions(chosen, model, camera=known, markers=markers, **others)
