@@ -51,8 +51,8 @@ def _limit() -> str:
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY or limit >= _LEAST:
         return ""
-    given = f"memory is limited to {limit / 1e6:.0f} MB (ulimit -v), but NumPy and SciPy need {_LEAST / 1e6:.0f}"
-    return f"{given}; raise the limit"
+    limited = f"memory is limited to {limit / 1e6:.0f} MB (ulimit -v), but NumPy and SciPy need {_LEAST / 1e6:.0f}"
+    return f"{limited}; raise the limit"
 
 
 class _Commands(click.Group):
@@ -62,17 +62,17 @@ class _Commands(click.Group):
         for stream in (sys.stdout, sys.stderr):  # names of files need not be text, and terminals not know all letters
             if hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-        said = _limit()
+        message = _limit()
         try:
-            if not said:
+            if not message:
                 return super().invoke(ctx)
         except MemoryError:
-            said = "needs more memory than there is"
+            message = "needs more memory than there is"
         except OSError as error:
             if error.errno == errno.EPIPE:  # whoever read the output has left
                 raise
-            said = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
-        click.echo(f"ipman: error: {one_line(said)}", err=True)
+            message = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+        click.echo(f"ipman: error: {one_line(message)}", err=True)
         sys.exit(1)
 
 
@@ -154,7 +154,7 @@ def analyze(
     parts: Path | None,
     preset: str,
     as_json: bool,
-    **mended: Any,
+    **reading: Any,
 ) -> None:
     """Analyse bodies and write a report: report.html, report.json, report.npz and pictures.
 
@@ -179,7 +179,7 @@ def analyze(
     from . import console
     from .report import print_json, write
 
-    request = Request(model=model, up=up, ground=ground, parts=parts, preset=preset, **mended)
+    request = Request(model=model, up=up, ground=ground, parts=parts, preset=preset, **reading)
     studies: list[Study] = []
     failures: list[tuple[str, str]] = []
     for path in bodies:

@@ -45,8 +45,8 @@ def writing(output: Path, what: str = "") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        said = f"{what} cannot be written" if what else "cannot be written"
-        console.error(f"{output}: {said} ({error.strerror or error}); choose another folder")
+        message = f"{what} cannot be written" if what else "cannot be written"
+        console.error(f"{output}: {message} ({error.strerror or error}); choose another folder")
         sys.exit(1)
 
 

@@ -9,26 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import one_line_errors
-from .options import PRESETS, Setting, degrees, force, units
+from .options import PRESETS, SETTING, SHARD, degrees, force, units
 
 if TYPE_CHECKING:
     from ..evaluation.tables import Evaluation
 
 # Kept equal to `ipman_rs.evaluation.tables.paper.TABLES` by a test.
 TABLES = ("rich", "h36m", "moyo", "biomech", "com", "3dpw", "push-pull", "rich-o-star")
-
-
-class ShardOf(click.ParamType):
-    name = "i/n"
-
-    def convert(self, value, param, ctx):
-        """Number and count, from 1."""
-        if isinstance(value, tuple):
-            return value
-        words = value.split("/")
-        if len(words) != 2 or not all(word.isdecimal() for word in words) or not 1 <= int(words[0]) <= int(words[1]):
-            self.fail(f"{value!r} is no shard such as 2/7, the second of seven", param, ctx)
-        return int(words[0]), int(words[1])
 
 
 @click.command()
@@ -38,7 +25,7 @@ class ShardOf(click.ParamType):
 @click.option("--path", type=click.Path(path_type=Path), metavar="PATH", help="Folder or file of the data set.")
 @click.option("--split", metavar="NAME", help="Part of the data set, such as test.")
 @click.option(
-    "--option", "options", type=Setting(), multiple=True, help="Of the data set's reader, such as frame=camera."
+    "--option", "options", type=SETTING, multiple=True, help="Of the data set's reader, such as frame=camera."
 )
 @click.option("--table", type=click.Choice(TABLES), help="A table of the paper: its data set, split and figures.")
 @click.option(
@@ -57,10 +44,10 @@ class ShardOf(click.ParamType):
 @units
 @degrees
 @force
-@click.option("--shard", type=ShardOf(), help="Do this part only, such as 2/7; the last one writes the report.")
+@click.option("--shard", type=SHARD, help="Do this part only, such as 2/7; the last one writes the report.")
 @click.option("--ray", is_flag=True, help="Do the shards on Ray (RAY_ADDRESS: a cluster; else this machine).")
 def evaluate(
-    predictions: tuple[Path, ...], output: Path, shard: tuple[int, int] | None, ray: bool, **given: Any
+    predictions: tuple[Path, ...], output: Path, shard: tuple[int, int] | None, ray: bool, **options: Any
 ) -> None:
     """Measure predictions against a data set: errors, balance, contact and pressure, with intervals.
 
@@ -91,13 +78,13 @@ def evaluate(
         from ..evaluation.tables import TABLES as PAPER
         from ..evaluation.tables import evaluation
 
-        name = given["data"] or (None if given["table"] is None else PAPER[given["table"]].data)
+        name = options["data"] or (None if options["table"] is None else PAPER[options["table"]].data)
         if name is None:
             raise click.UsageError("Missing option '--data', the data set, or '--table', one of the paper's.")
-        if given["path"] is None:
+        if options["path"] is None:
             raise click.UsageError(f"Missing option '--path', where {name} is.")
-        given["options"] = dict(given["options"])
-        _evaluate(evaluation(predictions, output, unit=given.pop("units"), **given), shard, ray)
+        options["options"] = dict(options["options"])
+        _evaluate(evaluation(predictions, output, unit=options.pop("units"), **options), shard, ray)
 
 
 def _evaluate(whole: Evaluation, shard: tuple[int, int] | None, ray: bool) -> None:

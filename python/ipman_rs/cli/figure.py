@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import one_line_errors
-from .options import GROUND, PRESETS, UP, Setting, of_files
+from .options import GROUND, PRESETS, SETTING, UP, of_files
 
 if TYPE_CHECKING:
     from ..paper_figures import PaperFigure
@@ -29,7 +29,7 @@ _models = click.option(
 )  # fmt: skip
 _split = click.option("--split", metavar="NAME", help="Part of the data sets, such as test.")
 _option = click.option(
-    "--option", "options", type=Setting(), multiple=True, help="Of the data set's reader, such as frame_rate=30."
+    "--option", "options", type=SETTING, multiple=True, help="Of the data set's reader, such as frame_rate=30."
 )
 _people = click.option(
     "--people", type=click.IntRange(1), default=PEOPLE, show_default=True,

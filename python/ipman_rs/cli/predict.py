@@ -85,8 +85,8 @@ def predict(
             from ..training.predict import Trained
         trained = Trained.load(checkpoint)
         if data is not None and path is not None:
-            of_data = {"split": split, "images": image_folder, "regressor": regressor, "progress": console.progress}
-            file, count, total = library.predict_data_set(trained, data, path, output, **of_data)
+            source = {"split": split, "images": image_folder, "regressor": regressor, "progress": console.progress}
+            file, count, total = library.predict_data_set(trained, data, path, output, **source)
             console.say(f"{file}: {count} of {total} people")
             return
         paths = [each for path in images for each in (_inside(path, IMAGES) if path.is_dir() else [path])]
@@ -95,8 +95,8 @@ def predict(
                 box_of = detector.enter_context(_boxes(box, whole))
             except ImportError as error:
                 raise ImportError(f"{error}; or give --box or --whole") from error
-            seen = {"focal": focal, "pitch": pitch, "pictures": pictures, "progress": console.progress}
-            studies, failures = library.predict_images(trained, paths, output, box_of, **seen)
+            camera = {"focal": focal, "pitch": pitch, "pictures": pictures, "progress": console.progress}
+            studies, failures = library.predict_images(trained, paths, output, box_of, **camera)
     for failure in failures:
         console.error(str(failure))
     if studies:
@@ -114,11 +114,11 @@ def _inside(folder: Path, endings: tuple[str, ...]) -> list[Path]:
     return sorted(path for path in folder.iterdir() if path.suffix.lower() in endings)
 
 
-def _boxes(given: Box | None, whole: bool) -> AbstractContextManager[BoxOf]:
+def _boxes(box: Box | None, whole: bool) -> AbstractContextManager[BoxOf]:
     """Where the person is, of an image's path and pixels."""
     from ..fitting import photo
     from ..training.predicted_images import whole_image
 
     if whole:
         return nullcontext(whole_image)
-    return photo.boxes() if given is None else nullcontext(lambda path, pixels: given)
+    return photo.boxes() if box is None else nullcontext(lambda path, pixels: box)

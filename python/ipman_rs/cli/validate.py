@@ -66,7 +66,7 @@ def validate(
     rate: float,
     fresh: bool,
     recorded_rate: float | None,
-    **said: Any,
+    **options: Any,
 ) -> None:
     """Compare the engine's centre of mass, centre of pressure and pressure with measurements.
 
@@ -94,8 +94,8 @@ def validate(
     from . import console
 
     try:
-        said["rate"] = recorded_rate
-        plan = run.plan(folder, output, model, person, rate, not fresh, **said)
+        options["rate"] = recorded_rate
+        plan = run.plan(folder, output, model, person, rate, not fresh, **options)
     except (ValueError, ImportError) as error:
         raise click.UsageError(str(error)) from error
     with writing(output, "outputs"):
