@@ -135,7 +135,7 @@ def test_validate(run, tmp_path):
     laboratory_files.mot(folder / "static_grf.mot", center, lambda t: weight + 0 * t)
     assert run("validate").strip() == str(tmp_path / "out/validation.md")
     (record,) = json.loads((tmp_path / "out/validation.json").read_text())["recordings"]
-    assert record["mass"]["plates"] == pytest.approx(laboratory_files.MASS, rel=1e-3)
+    assert record["mass"]["plates"] == pytest.approx(laboratory_files.MASS, abs=0.2)  # the second plate's 1.5 N
 
 
 @pytest.mark.slow
