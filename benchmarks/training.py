@@ -24,8 +24,8 @@ import ipman_rs.torch as ipt
 from ipman_rs.synthetic import population
 from ipman_rs.training.batch import Batch
 from ipman_rs.training.lifting import views
-from ipman_rs.training.lifting.network import lifter
-from ipman_rs.training.losses import Loss, Physics
+from ipman_rs.training.lifting.network import lifting_network
+from ipman_rs.training.losses import Loss, PhysicsLoss
 from ipman_rs.training.model import HMR, MeanParameters
 from ipman_rs.training.model.keypoint_encoder import KEYPOINTS
 from ipman_rs.training.posed_estimate import Posed, Posing
@@ -74,9 +74,13 @@ def measured(backbone: str, size: int, count: int, body: str, rounds: int) -> di
     """Medians of ms an image: of steps, and of the terms alone."""
     posing = Posing(ipt.BodyModel(body), KEYPOINTS)
     template = posing.body.template
-    terms = {name: Physics(template, name) for name in ("paper-r", "balanced")} | {"literal": LiteralTerms(template)}
+    terms = {name: PhysicsLoss(template, name) for name in ("paper-r", "balanced")} | {
+        "literal": LiteralTerms(template)
+    }
     batch = _batch(count, size, posing)
-    model = lifter(0) if backbone == "keypoints" else HMR.of_images(MeanParameters.of(posing.body.body), backbone)
+    model = (
+        lifting_network(0) if backbone == "keypoints" else HMR.of_images(MeanParameters.of(posing.body.body), backbone)
+    )
     optimizer = torch.optim.Adam(model.parameters(), lr=1e-5)
 
     def step(physics: nn.Module | None) -> Callable[[], None]:
@@ -112,7 +116,7 @@ def _batch(count: int, size: int, posing: Posing) -> Batch:
     """People on the floor, seen as keypoints or as images of noise."""
     from dataclasses import replace
 
-    seen = views.views(population.draw_bodies(count, 7), 7)
+    seen = views.views(population.draw_population(count, 7), 7)
     images = torch.randn(count, 3, size, size, generator=torch.Generator().manual_seed(0)) if size else seen.inputs
     return replace(seen, inputs=images)
 

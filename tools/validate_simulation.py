@@ -77,14 +77,14 @@ def people(count: int, poses: int, progress: Callable[[], None]) -> People:
     return People(template, np.stack(vertices), np.array(person), np.array(near), np.array(rests))
 
 
-def settled(body, template, families: Sequence[str], draw) -> resting.Scene:
+def settled(body, template, families: Sequence[str], draw) -> resting.PosedPerson:
     """The person at rest on the floor, in a pose of one of the families, so that a nudge changes nothing."""
     while True:
         family = str(draw.choice(families))
         name = str(draw.choice(resting.FAMILIES[family]))
-        found = resting.settle(resting.perturbed(ip.body.poses.pose_of(body, name), body, draw), body, template)
+        found = resting.settle(resting.perturb(ip.body.poses.pose_of(body, name), body, draw), body, template)
         if found is not None:
-            scene = resting.Scene(body, template, family, name, *found)
+            scene = resting.PosedPerson(body, template, family, name, *found)
             if tip_test(scene.vertices, template, FLOOR, nudge=FIRM).nudged_tilt < FIRM:
                 return scene
 
@@ -94,7 +94,7 @@ def at_rest(body, template, draw) -> Array:
 
 
 def tipped(body, template, draw) -> Array:
-    return resting.disturbed(settled(body, template, STANDING, draw), "tipped", draw).vertices
+    return resting.disturb(settled(body, template, STANDING, draw), "tipped", draw).vertices
 
 
 def near_limit(body, template, draw) -> Array:
@@ -119,7 +119,7 @@ def near_limit(body, template, draw) -> Array:
         return bent(scene, heading, float(low + beyond / speed))
 
 
-def bent(scene: resting.Scene, heading: float, degrees: float) -> Array:
+def bent(scene: resting.PosedPerson, heading: float, degrees: float) -> Array:
     """The three joints of the back share a turn about a level axis."""
     turn = np.radians(degrees) / 3 * np.array([np.cos(heading), 0.0, np.sin(heading)])
     pose = scene.full_pose.copy()

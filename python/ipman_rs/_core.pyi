@@ -17,6 +17,12 @@ ANALYSIS_COLUMNS: dict[str, int]
 """Name and first column of each result in the rows of `analysis`: points take three columns, `inertia` nine,
 `part_volumes` one per part, all others one."""
 
+GRAVITY: float
+"""m/s²"""
+
+TERMS: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]]
+"""The terms that a loss may be made of, in their order: the names of the numbers, of the modes and of the options."""
+
 _Float = TypeVar("_Float", np.float32, np.float64)
 
 @final
@@ -127,9 +133,18 @@ class Quantity:
         valid: NDArray[np.bool_] | None,
         reduction: str,
     ) -> tuple[NDArray[_Float], NDArray[_Float], NDArray[_Float]]:
-        """(terms, shares, jacobian) of loss terms: the first two as in `weighted`; for each body the gradient of the
-        first term by the vertices, V·3 numbers, then those of pull and of push by the vertices' heights: (B, 5·V).
+        """(terms, shares, jacobian) of loss terms: the first two as in `weighted`; for each body the gradients of its
+        numbers one after the other, V·3 numbers by the vertices, or V by their heights: (B, J).
         """
+
+    def terms_backward(
+        self,
+        jacobian: NDArray[_Float],
+        shares: NDArray[_Float],
+        d_terms: NDArray[_Float],
+        normal: NDArray[np.float64],
+    ) -> NDArray[_Float]:
+        """The gradient (B, V, 3) of what `terms` gave, for its terms' upstream d_terms, (K,) or (B, K)."""
 
 @final
 class Collision:
@@ -270,11 +285,6 @@ def set_num_threads(threads: int | None) -> None:
 
 def follow_threads(threads: int) -> None:
     """Uses as many threads as torch, unless `set_num_threads` or RAYON_NUM_THREADS say otherwise."""
-
-def terms_backward(
-    jacobian: NDArray[_Float], shares: NDArray[_Float], d_terms: NDArray[_Float], normal: NDArray[np.float64]
-) -> NDArray[_Float]:
-    """The gradient (B, V, 3) of what `Quantity.terms` gave, for its terms' upstream d_terms, (K,) or (B, K)."""
 
 def simd_levels() -> list[str]:
     """The CPU levels that this machine has, best first."""

@@ -10,7 +10,8 @@ from typing import Literal
 class Preset:
     """One set of constants. Pressure: alpha, gamma (1/m), epsilon. Ground: alpha1, alpha2 (m), beta1, beta2 (m).
     Support: threshold (m), contact. `stability` says which term pulls towards balance: the paper's norm, or the balance
-    cost with balance_gamma (1/m) and sigma (m). `weights` are the λ of each term of the loss."""
+    cost with balance_gamma (1/m) and sigma (m). `weights` are the λ of the loss's numbers; the
+    loss has the terms that these belong to."""
 
     name: str
     alpha: float = 100.0

@@ -10,13 +10,14 @@ Raises (all functions):
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ipman_rs import _core
-from ipman_rs.checks import LARGEST, SMALLEST, body_template, choice, not_negative, positive, real_array
+from ipman_rs.checks import LARGEST, SMALLEST, body_template, choice, not_negative, number, positive, real_array
 
 if TYPE_CHECKING:
     from ipman_rs.presets import Preset
@@ -127,16 +128,54 @@ def balance_cost(alpha: float, gamma: float, sigma: float, wrap: Wrap, method: M
     return Quantity("balance_cost", (choice("wrap", wrap, Wrap), choice("method", method, Method)), options)
 
 
+class Term(NamedTuple):
+    """A term that `IntuitivePhysicsLoss` may have.
+
+    numbers: their names, such as ("pull", "push"); each has a weight.
+    modes: the arguments that choose its variant; options: its constants, by their names in a preset.
+    """
+
+    numbers: tuple[str, ...]
+    modes: tuple[str, ...]
+    options: tuple[str, ...]
+
+
+TERMS = {name: Term(*described) for name, described in _core.TERMS.items()}
+MODES = {"method": Method, "points": Points, "curve": Curve, "wrap": Wrap}
+PAPER_TERMS = ("stability", "ground")  # Eqs. 4 and 5
+
+
+def numbers_of(terms: Iterable[str]) -> tuple[str, ...]:
+    """The names of the numbers of terms, in their order."""
+    return tuple(number for term in terms for number in TERMS[term].numbers)
+
+
+def terms_of(preset: Preset) -> tuple[str, ...]:
+    """The terms that a preset has weights for.
+
+    Raises:
+        ValueError: a weight is of no term, or a number of a term has none.
+    """
+    terms = tuple(name for name, term in TERMS.items() if set(term.numbers) & set(preset.weights))
+    if set(numbers_of(terms)) != set(preset.weights) or not terms:
+        known = ", ".join(" and ".join(term.numbers) for term in TERMS.values())
+        raise ValueError(f"weights of preset {preset.name!r}: expected {known}, got {', '.join(preset.weights)}")
+    return terms
+
+
 def physics_terms(preset: Preset, method: Method, points: Points, curve: Curve, wrap: Wrap) -> Quantity:
-    """The terms of `IntuitivePhysicsLoss` together: stability or balance, as the preset has it, then pull and push."""
-    if preset.stability == "balance":
-        word, first = "balance", balance_cost(preset.alpha, preset.balance_gamma, preset.sigma, wrap, method)
-    else:
-        word, first = "stability", stability_loss(preset.alpha, preset.gamma, preset.epsilon, method)
-    ground = ground_loss(preset.alpha1, preset.alpha2, preset.beta1, preset.beta2, points, curve)
-    return Quantity("terms", (word, *first.modes, *ground.modes), first.options + ground.options, (3,))
+    """The terms of a preset together: their numbers side by side."""
+    given = {"method": method, "points": points, "curve": curve, "wrap": wrap}
+    terms = terms_of(preset)
+    words: list[str] = []
+    options: list[float] = []
+    for name in terms:
+        term = TERMS[name]
+        words += [name, *(choice(mode, given[mode], MODES[mode]) for mode in term.modes)]
+        options += [number(option, getattr(preset, option)) for option in term.options]
+    return Quantity("terms", tuple(words), tuple(options), (len(numbers_of(terms)),))
 
 
 def is_paper_terms(quantity: Quantity) -> bool:
-    """Whether these are `physics_terms` with the paper's stability, centre of mass and points; the curve may be any."""
-    return quantity.name == "terms" and quantity.modes[:-1] == ("stability", "pcom", "samples")
+    """Whether these are `physics_terms` with the paper's terms, centre of mass and points; the curve may be any."""
+    return quantity.name == "terms" and quantity.modes[:-1] == ("stability", "pcom", "ground", "samples")

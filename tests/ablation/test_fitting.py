@@ -22,7 +22,7 @@ from ipman_rs.synthetic import at_rest, people
 
 @pytest.fixture(scope="module")
 def drawn():
-    return at_rest.draw_scenes(4, seed=5)
+    return at_rest.draw_people(4, seed=5)
 
 
 @pytest.fixture(scope="module")
@@ -33,11 +33,11 @@ def known(drawn):
 @pytest.mark.slow
 def test_people_are_out_of_reach(known):
     """The best betas leave 5 to 20 mm of their resting surfaces, and next to nothing of a body of the fitter's own."""
-    assert 5 < truth.floors(known)["shape"] < 20
-    assert truth.floors(known)["correspondence"] < 0.1
+    assert 5 < truth.error_floors(known)["shape"] < 20
+    assert truth.error_floors(known)["correspondence"] < 0.1
     own = np.asarray(load_body("anny")(betas=0.5 * np.ones(10)).vertices)
-    reachable = dataclasses.replace(known, resting=np.repeat(truth.corresponding(own)[None], 4, axis=0))
-    assert truth.floors(reachable)["shape"] < 0.5  # the two meshes' betas agree so far
+    reachable = dataclasses.replace(known, resting=np.repeat(truth.corresponding_points(own)[None], 4, axis=0))
+    assert truth.error_floors(reachable)["shape"] < 0.5  # the two meshes' betas agree so far
 
 
 def test_people_are_people():
@@ -50,10 +50,10 @@ def test_people_are_people():
 
 
 def test_the_same_seed_draws_the_same(drawn):
-    again = at_rest.draw_scenes(2, seed=5)
+    again = at_rest.draw_people(2, seed=5)
     for one, other in zip(drawn, again, strict=False):
         assert np.array_equal(one.vertices, other.vertices)
-    assert not np.array_equal(at_rest.draw_scenes(1, seed=6)[0].vertices, drawn[0].vertices)
+    assert not np.array_equal(at_rest.draw_people(1, seed=6)[0].vertices, drawn[0].vertices)
 
 
 def test_balanced_bodies_rest_on_the_floor(drawn, known):
@@ -65,10 +65,10 @@ def test_balanced_bodies_rest_on_the_floor(drawn, known):
 
 
 def test_controls_are_not_balanced():
-    tipped = truth.Truth.of(at_rest.draw_scenes(4, 5, "tipped"))
+    tipped = truth.Truth.of(at_rest.draw_people(4, 5, "tipped"))
     assert (tipped.margin_3 < 0).mean() >= 0.75
     np.testing.assert_allclose(tipped.lowest, 0, atol=1e-9)
-    jumping = truth.Truth.of(at_rest.draw_scenes(2, 5, "jumping"))
+    jumping = truth.Truth.of(at_rest.draw_people(2, 5, "jumping"))
     assert ((jumping.lowest >= 0.15) & (jumping.lowest <= 0.40)).all()
 
 
@@ -87,9 +87,9 @@ def test_the_camera_sees_the_person(known):
     np.testing.assert_allclose(turns @ turns.transpose(1, 2), np.eye(3)[None].repeat(4, 0), atol=1e-12)
     assert (torch.linalg.det(turns) > 0.999).all()
     assert (turns[:, 1, 1] < -0.5).all()
-    task = observations.calibrated(known, 0)
+    task = observations.calibrated_task(known, 0)
     landmarks = torch.from_numpy(known.landmarks)
-    there = truth.known(load_body(truth.FITTED))
+    there = truth.landmark_names(load_body(truth.FITTED))
     points = task.camera.project(landmarks[:, [there.index(name) for name in task.problem.landmarks.names]])
     assert (points - task.problem.points).norm(dim=-1).median() < 25
     assert task.problem.confidence.unique().tolist() == [0.0, 1.0]
@@ -103,8 +103,8 @@ def test_along_floor_finds_a_turn_and_a_shift(known):
 
 
 def test_snapped_bodies_lie_on_the_floor(known):
-    task = observations.calibrated(known, 0)
-    found = metrics.figures(metrics.snapped(Fit(task.problem, task.starts)), task, known)
+    task = observations.calibrated_task(known, 0)
+    found = metrics.fit_metrics(metrics.snap_to_floor(Fit(task.problem, task.starts)), task, known)
     assert abs(found.lowest).max() < 1e-6
 
 

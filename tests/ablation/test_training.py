@@ -14,18 +14,18 @@ from click.testing import CliRunner
 
 import ipman_rs.data
 from ipman_rs.ablation.training import claims, report
-from ipman_rs.ablation.training.from_images import AUGMENTING, Pictures, moved
+from ipman_rs.ablation.training.from_images import AUGMENTING, ImageTask, jitter
 from ipman_rs.ablation.training.intervals import paired_over_seeds
-from ipman_rs.ablation.training.variants import BASELINE, CONTROL, OURS, settings
+from ipman_rs.ablation.training.variants import BASELINE, CONTROL, OURS, ablation_of
 from ipman_rs.body import load_body
 from ipman_rs.cli import main
 from ipman_rs.training.augment import normalised
 from ipman_rs.training.lifting import views
-from ipman_rs.training.metrics import figures
+from ipman_rs.training.metrics import pose_metrics
 from ipman_rs.training.model import Estimate
 from ipman_rs.training.model.keypoint_encoder import KEYPOINTS
 from ipman_rs.training.sources.images import Images
-from ipman_rs.training.train_loop import Drill
+from ipman_rs.training.train_loop import TrainingPlan
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def exact(truth, pose=None) -> Estimate:
 
 
 def test_the_truth_has_no_error(truth, posing):
-    found = figures(exact(truth), truth, posing)
+    found = pose_metrics(exact(truth), truth, posing)
     for name in ("mpjpe", "pa_mpjpe", "pve", "lowest", "tilt"):
         assert np.abs(getattr(found, name)).max() < 2e-6
     assert found.strict.mean() > 0.9  # the support at 2.5 cm is wider than that at 1 cm, but for samples
@@ -54,19 +54,19 @@ def test_a_lean_is_a_tilt(truth, posing):
         )
         pose = truth.pose.clone()
         pose[:, 0] = truth.camera @ turn @ truth.camera.transpose(1, 2) @ pose[:, 0]
-        found = figures(exact(truth, pose), truth, posing)
+        found = pose_metrics(exact(truth, pose), truth, posing)
         np.testing.assert_allclose(np.degrees(found.tilt), tilt, atol=2e-3)
         assert found.pa_mpjpe.max() < 1e-5
         assert found.mpjpe.min() > 0.01
         if axis == 1:
             assert np.abs(found.lowest).max() < 1e-5
-            np.testing.assert_allclose(found.bose, figures(exact(truth), truth, posing).bose)
+            np.testing.assert_allclose(found.bose, pose_metrics(exact(truth), truth, posing).bose)
 
 
 def test_sinking_does_not_pass_the_strict_figure(truth, posing):
     """Bodies are judged on the floor: moving the hips changes height and BoSE, and not the strict figure."""
     lower = dataclasses.replace(truth, hips=truth.hips - torch.tensor([0.0, 0.08, 0.0]))
-    usual, sunk = figures(exact(truth), truth, posing), figures(exact(truth), lower, posing)
+    usual, sunk = pose_metrics(exact(truth), truth, posing), pose_metrics(exact(truth), lower, posing)
     np.testing.assert_allclose(sunk.lowest, -0.08, atol=1e-5)
     assert np.array_equal(usual.strict, sunk.strict)
 
@@ -87,18 +87,18 @@ def test_intervals_hold_the_mean_and_tell_a_difference():
 
 @pytest.mark.parametrize("task", ["keypoints", "images"])
 def test_the_settings_have_all_rows(task):
-    rows = {row.name: row for row in settings(task).rows}
+    rows = {row.name: row for row in ablation_of(task).rows}
     assert next(iter(rows)) == BASELINE
     assert rows[BASELINE].preset is None
     assert rows[CONTROL] == dataclasses.replace(rows[OURS], name=CONTROL, shuffled=True)
     template = views.posing().body.template
-    for row in settings(task).rows[1:]:
+    for row in ablation_of(task).rows[1:]:
         physics = row.physics(template)
         assert physics is not None
         assert sum(weight > 0 for weight in physics.loss.weights.values()) >= 1
     assert rows["both, λ of the paper"].weights == {}
     assert rows["push only"].weights == {"stability": 0, "pull": 0, "push": 0.05}
-    assert (settings(task).plan.first is None) == (task == "keypoints")
+    assert (ablation_of(task).plan.first is None) == (task == "keypoints")
 
 
 @pytest.mark.slow
@@ -110,7 +110,7 @@ def test_command(tmp_path):
     record = json.loads((tmp_path / "training_benchmark.json").read_text())
     assert [block["tilt"] for block in record["blocks"]] == [0, 8]
     rows = record["blocks"][1]["rows"]
-    assert [row["name"] for row in rows] == [row.name for row in settings("keypoints").rows]
+    assert [row["name"] for row in rows] == [row.name for row in ablation_of("keypoints").rows]
     assert rows[0]["against baseline"]["PVE"] == [0, 0, 0]
     with (tmp_path / "training_benchmark.csv").open() as file:
         lines = list(csv.DictReader(file))
@@ -150,7 +150,7 @@ def test_command_on_images(tmp_path):
     page = (tmp_path / "out/training_benchmark_images.md").read_text()
     assert "small" in page
     assert "--tilt" not in page  # as by default
-    kept = Pictures(tmp_path / "out", tmp_path / "images")
+    kept = ImageTask(tmp_path / "out", tmp_path / "images")
     assert len(kept.training()) == 2 * 8
     # Crops as they are kept, with their colours as they are, are those of the trainer, turned.
     source = Images(data, load_body("anny-lite"), KEYPOINTS, 96)
@@ -162,13 +162,13 @@ def test_command_on_images(tmp_path):
         expected = normalised(torch.from_numpy(pixels)[None], torch.ones(1, 3))[0]
         torch.testing.assert_close(found, expected, rtol=0, atol=1e-6)
     # And bodies stand in the world as they did before: true ones have no error there.
-    exactly = figures(exact(truth), truth, kept.posing())
+    exactly = pose_metrics(exact(truth), truth, kept.posing())
     assert truth.turn.abs().min() > 0.01
     assert max(exactly.tilt.max(), exactly.mpjpe.max()) < 1e-5
     assert np.abs(exactly.lowest).max() < 1e-5
     # What the backbone finds is in the crop, and depends on the seed alone.
     for name, seed in (("seen", 0), ("again", 0), ("other", 1)):
-        kept.see(seed, Drill(2, 1e-3, 4), tmp_path / name)
+        kept.fit_backbone(seed, TrainingPlan(2, 1e-3, 4), tmp_path / name)
     seen, again, other = (kept.training(tmp_path / name).inputs for name in ("seen", "again", "other"))
     assert seen.shape == (2 * 8, len(KEYPOINTS), 3)
     assert seen[..., :2].abs().max() <= 1
@@ -203,7 +203,7 @@ def test_moved_crops_have_their_keypoints_with_them(truth):
     inputs[torch.arange(count), pixels[:, 1], pixels[:, 0]] = 255
     middles = (pixels[:, None] + 0.5) * 2 / side - 1
     batch = dataclasses.replace(batch, inputs=inputs, keypoints=torch.cat([middles, torch.ones(count, 1, 1)], dim=2))
-    after = moved(batch, generator)
+    after = jitter(batch, generator)
     bright = (after.inputs - after.inputs.amin(dim=(2, 3), keepdim=True)).sum(dim=1)
     grid = (torch.arange(side) + 0.5) * 2 / side - 1
     total = bright.sum(dim=(1, 2))
@@ -245,7 +245,7 @@ def test_the_paper_s_claims_are_judged_by_their_intervals():
     assert printed["+ ground", "BoSE"] == pytest.approx(66.5 - 62.0)
     assert printed["+ stability", "PVE"] == pytest.approx(90.8 - 92.4)
     assert (printed["push only", "PVE"], printed["pull only", "PVE"]) == pytest.approx((96.6 - 92.3, 99.4 - 92.3))
-    assert {claim.row for claim in claims.CLAIMS} <= {row.name for row in settings("keypoints").rows}
+    assert {claim.row for claim in claims.CLAIMS} <= {row.name for row in ablation_of("keypoints").rows}
     pve, bose = claims.Claim("x", "PVE", -2.5), claims.Claim("x", "BoSE", 9.2)
     worse = claims.Claim("x", "PVE", 4.3)
     assert [one.question for one in (pve, bose, worse)] == ["x: PVE better?", "x: BoSE better?", "x: PVE worse?"]

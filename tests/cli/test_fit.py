@@ -15,7 +15,7 @@ from click.testing import CliRunner
 import ipman_rs as ip
 from ipman_rs.cli import main
 from ipman_rs.data import keypoints
-from ipman_rs.fitting import camera_file, detected
+from ipman_rs.fitting import camera_file, detection_problem
 from tests.helpers import keypoint_files as files
 
 
@@ -174,7 +174,8 @@ def test_x_and_y_swapped(standing):
     points, size = standing[known, :2] * [1920, 1080], np.array([1920, 1080])
     seen = [str(names[column]) for column in known], standing[known, 3]
     right, swapped = (
-        detected.oddities(seen[0], each, seen[1], size[::way]) for each, way in ((points, 1), (points[:, ::-1], -1))
+        detection_problem.suspicious_keypoints(seen[0], each, seen[1], size[::way])
+        for each, way in ((points, 1), (points[:, ::-1], -1))
     )
     said = "lies across the image, head beside feet: are x and y of the keypoints swapped?"
     assert said not in right

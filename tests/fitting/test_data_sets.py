@@ -18,7 +18,7 @@ from ipman_rs.data.keypoints.openpose import BODY_25
 from ipman_rs.evaluation.tables.job import Source
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.fitting import config, data_fits
-from ipman_rs.fitting.landmarks import Landmarks, known
+from ipman_rs.fitting.landmarks import Landmarks, landmark_names
 from tests.helpers.miniatures import models as model_files
 from tests.helpers.miniatures import moyo, rich
 
@@ -49,7 +49,7 @@ stages:
 def keypoints(folder, frames, body):
     """An OpenPose file for each frame: where its cameras see the landmarks of its true body."""
     model = ipt.BodyModel(body, torch.float64)
-    names = [name for name in BODY_25 if name in known(body)]
+    names = [name for name in BODY_25 if name in landmark_names(body)]
     pose = torch.from_numpy(np.asarray(frames.pose, float) - body.pose_mean)
     betas = torch.from_numpy(np.asarray(frames.betas, float)[:, : body.num_betas])
     points = Landmarks(model, names)(pose, betas, torch.from_numpy(np.asarray(frames.transl, float))).numpy()

@@ -12,7 +12,7 @@ torch = pytest.importorskip("torch", reason="torch is an extra")
 import ipman_rs as ip  # noqa: E402
 import ipman_rs.torch as ipt  # noqa: E402
 from ipman_rs.body.landmarks import ends, point_rows, skin_points  # noqa: E402
-from ipman_rs.fitting.landmarks import Landmarks, Site, known  # noqa: E402
+from ipman_rs.fitting.landmarks import Landmarks, Site, landmark_names  # noqa: E402
 
 
 @pytest.fixture(scope="module", params=["anny", "anny-lite"])
@@ -110,7 +110,7 @@ def test_joints_alone(body):
 def test_an_unknown_name(body):
     with pytest.raises(ValueError, match=r"names: the body 'anny.*no landmark 'tail'; it has pelvis, "):
         Landmarks(body, ["nose", "tail"])
-    assert "nose" in known(body.body)
+    assert "nose" in landmark_names(body.body)
 
 
 def test_pose_blend_shapes_and_finger_joints(body):

@@ -24,7 +24,7 @@ from ipman_rs.fitting.geodesics import geodesics
 from ipman_rs.fitting.landmarks import Landmarks
 from ipman_rs.fitting.objective import Objective
 from ipman_rs.fitting.problem import Presented
-from ipman_rs.fitting.result import parameters, results
+from ipman_rs.fitting.result import fit_results, parameters
 from ipman_rs.fitting.rotations import matrix, vector
 from ipman_rs.fitting.terms.contact_normals import ContactNormals
 from ipman_rs.fitting.terms.expression_prior import ExpressionPrior
@@ -408,16 +408,16 @@ def test_contact_normals_gradients_and_rows():
 @pytest.mark.slow
 def test_a_fit_starts_where_its_preset_says():
     problem, _ = cases.smplx_observed(2)
-    _, begun = start.begin(problem, config.load("ipman-o-star").start)
+    _, begun = start.initial_state(problem, config.load("ipman-o-star").start)
     term = PosePrior(problem)
     assert term.cost(Candidate(problem, begun)).abs().max() < 1e-20  # the prior's own mean
     assert not begun["betas"].any()
     assert not begun["expression"].any()
     assert torch.equal(begun["face"], torch.zeros(2, 3, 3, dtype=torch.float64))
     for row in range(2):
-        _, alone = start.begin(problem.rows(torch.tensor([row])), {"search": "mean", "yaws": 2})
+        _, alone = start.initial_state(problem.rows(torch.tensor([row])), {"search": "mean", "yaws": 2})
         assert all(torch.equal(alone[name][0], value[row]) for name, value in begun.items())
-    named = start.begin(problem, {"search": "body", "yaws": 4})[1]
+    named = start.initial_state(problem, {"search": "body", "yaws": 4})[1]
     expected = start.before_camera(problem)
     assert all(torch.equal(named[name], value) for name, value in expected.items())
 
@@ -426,7 +426,7 @@ def test_the_camera_s_search_lays_the_ground():
     problem, _ = cases.smplx_observed(1)
     pose = torch.from_numpy(poses.pose_of(problem.body.body, "kneeling"))[None]
     problem = replace(problem, presented=Presented(pose[:, 1:], orient=pose[:, 0]))
-    known, begun = start.begin(problem, {"search": "camera", "yaws": 2, "iterations": 2})
+    known, begun = start.initial_state(problem, {"search": "camera", "yaws": 2, "iterations": 2})
     lowest = Candidate(known, begun).vertices[..., 1].amin()
     assert known.ground.height.item() == pytest.approx(lowest.item(), abs=1e-12)
     assert torch.equal(variables.full_pose(begun, problem.body.body), pose)
@@ -442,9 +442,9 @@ def test_presets_fit_a_body_with_fingers_and_a_face(preset):
     loaded = config.load(preset)
     stages = [replace(stage, options=replace(stage.options, iterations=3)) for stage in loaded.stages]
     loaded = replace(loaded, stages=tuple(stages))
-    problem, begun = start.begin(problem, {**loaded.start, "iterations": 2})
+    problem, begun = start.initial_state(problem, {**loaded.start, "iterations": 2})
     found = fit(problem, begun, loaded)
-    (body,) = results(found, loaded, begun)
+    (body,) = fit_results(found, loaded, begun)
     assert body.finite
     moves = preset in ("smplify-x", "ipman-o-star")
     for name in ("face", "expression"):

@@ -14,7 +14,7 @@ import ipman_rs.torch as ipt  # noqa: E402
 from ipman_rs.data import markers  # noqa: E402
 from ipman_rs.data.markers.sets import OPENCAP, OPENSIM_GAIT, PLUG_IN_GAIT  # noqa: E402
 from ipman_rs.fitting.landmarks import Landmarks, Site  # noqa: E402
-from ipman_rs.fitting.marker_calibration import calibrated  # noqa: E402
+from ipman_rs.fitting.marker_calibration import calibrate_sites  # noqa: E402
 
 
 def trc(rows, units="mm", names=("C7", "L.ASIS")):
@@ -210,12 +210,12 @@ def test_calibration_finds_where_the_markers_are(body):
     true["L_HJC"] = replace(sites["L_HJC"], place=tuple(move + sites["L_HJC"].place))
     seen = torch.tensor([[1.0, 1, 0, 1, 1]] * 3 + [[0.5, 0, 0, 1, 1]] * 3, dtype=torch.float64)
     observed = Landmarks(body, true, true)(*people) + 9 * (seen == 0)[..., None]
-    found = calibrated(body, sites, people, observed, seen)
+    found = calibrate_sites(body, sites, people, observed, seen)
     for name in ("C7", "L.ASIS"):
         np.testing.assert_allclose(found[name].shift, true[name].shift, atol=1e-12)
     assert found["R.Heel"] == sites["R.Heel"]  # never seen
     assert found["LKJC"] == "left_knee"  # joints of the rig stay
     np.testing.assert_allclose(found["L_HJC"].place, true["L_HJC"].place, atol=1e-12)
-    far = calibrated(body, sites, people, observed + 1, torch.ones_like(seen))
+    far = calibrate_sites(body, sites, people, observed + 1, torch.ones_like(seen))
     moved = np.subtract(far["R.Heel"].shift, sites["R.Heel"].shift)
     assert np.linalg.norm(moved) == pytest.approx(0.05)

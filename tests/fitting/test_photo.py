@@ -61,7 +61,7 @@ def test_nobody_in_the_photo(pose, tmp_path):
 
 def test_box_around_landmarks():
     points = np.array([[10.0, 20.0], [30.0, 120.0], [20.0, 60.0]])
-    assert photo.around(points) == pytest.approx((6, 16, 28, 108))  # 4 % of 100 around
+    assert photo.box_around(points) == pytest.approx((6, 16, 28, 108))  # 4 % of 100 around
 
 
 def test_boxes_of_several_images(pose, shared, tmp_path):
@@ -71,7 +71,7 @@ def test_boxes_of_several_images(pose, shared, tmp_path):
         whole, part = box(path, pixels), box("part", pixels[40:, :300])
         with pytest.raises(ValueError, match="meadow: expected a person, found none"):
             box("meadow", np.full((300, 200, 3), (90, 120, 60), np.uint8))
-    assert whole == photo.around(photo.detect([path]).points[0])
+    assert whole == photo.box_around(photo.detect([path]).points[0])
     np.testing.assert_allclose(np.subtract(whole, part), [0, 40, 0, 0], atol=8)
 
 

@@ -120,13 +120,13 @@ def test_the_start_lies_on_the_points():
     seen = torch.ones(4, 5, dtype=torch.float64)
     seen[1, 3] = 0
     problem = replace(problem, points_3d=points, confidence_3d=seen)
-    found = start.at_points(problem)
+    found = start.start_at_points(problem)
     torch.testing.assert_close(matrix(found["orient"]), matrix(truth["orient"]), atol=1e-6, rtol=0)
     torch.testing.assert_close(found["transl"], truth["transl"], atol=1e-6, rtol=0)
     for row in range(4):
-        alone = start.at_points(problem.rows(torch.tensor([row])))
+        alone = start.start_at_points(problem.rows(torch.tensor([row])))
         assert all(torch.equal(alone[name][0], found[name][row]) for name in alone)
-    nothing = start.at_points(replace(problem, confidence_3d=torch.zeros_like(seen)))
+    nothing = start.start_at_points(replace(problem, confidence_3d=torch.zeros_like(seen)))
     assert all(value.isfinite().all() for value in nothing.values())
     with pytest.raises(ValueError, match="points_3d: expected points"):
-        start.at_points(replace(problem, points_3d=None))
+        start.start_at_points(replace(problem, points_3d=None))

@@ -15,7 +15,7 @@ from ipman_rs.fitting.camera import Camera  # noqa: E402
 from ipman_rs.fitting.candidate import Candidate  # noqa: E402
 from ipman_rs.fitting.config import load  # noqa: E402
 from ipman_rs.fitting.rotations import vector  # noqa: E402
-from ipman_rs.fitting.solvers import Look  # noqa: E402
+from ipman_rs.fitting.solvers import Evaluation  # noqa: E402
 from ipman_rs.fitting.solvers.arrow import Arrow, solve  # noqa: E402
 from ipman_rs.fitting.terms.smoothness import Smoothness  # noqa: E402
 from tests.helpers.fit_terms_cases import body_model  # noqa: E402
@@ -45,7 +45,7 @@ def recording(frames: int = 6, noise: float = 0.005, seed: int = 4):
 
 
 def fitted(problem, **options):
-    return sequence.fit_sequence(problem, start.at_points(problem), MARKERS, **{"rate": 5.0, **options})
+    return sequence.fit_sequence(problem, start.start_at_points(problem), MARKERS, **{"rate": 5.0, **options})
 
 
 def jitter(fit) -> float:
@@ -76,7 +76,7 @@ def test_what_was_recorded_is_found():
     weights = {"points_3d": 1e4, "shape_prior": 1e-3, "pose_prior": 1e-4}
     near, stage = MARKERS.stages
     config = replace(MARKERS, stages=(near, replace(stage, weights=weights)))
-    found = sequence.fit_sequence(exact, start.at_points(exact), config, smoothness=0)
+    found = sequence.fit_sequence(exact, start.start_at_points(exact), config, smoothness=0)
     away = (found.candidate.landmarks - exact.points_3d).norm(dim=-1)
     assert away.max() < 0.002  # what the priors leave
     assert (found.variables["betas"][0] - truth["betas"][0]).abs()[:2].max() < 0.5
@@ -157,11 +157,11 @@ def test_one_ground_for_all_frames():
 
 def test_the_gradient_is_that_of_the_value(problem):
     """Against central differences, in own numbers of three frames and in shared ones."""
-    values = {name: value + 0.1 for name, value in start.at_points(problem).items()}
+    values = {name: value + 0.1 for name, value in start.start_at_points(problem).items()}
     for name in ("betas", "log_focal"):
         values[name] = values[name][:1].expand_as(values[name]).clone()
     smooth = Smoothness(problem.body, problem.num_bodies, 5.0)
-    together = sequence.Together(problem, values, MARKERS.stages[0], MARKERS, smooth)
+    together = sequence.SequenceObjective(problem, values, MARKERS.stages[0], MARKERS, smooth)
     look = together.look(together.start)
     rng = np.random.default_rng(0)
     for place in [0, 4, together.size + 5, 5 * together.size + 70, -1, -8, *rng.integers(len(together.start), size=4)]:
@@ -213,7 +213,7 @@ def test_the_arrow_is_solved_like_the_whole_matrix(reach, shared, rng):
 def test_the_promised_decrease_is_the_models(rng):
     root = rng.normal(size=(2, 3, 3))
     arrow = Arrow((root @ root.swapaxes(1, 2))[None], np.zeros((2, 3, 1)), np.ones((1, 1)))
-    look = Look(1.0, rng.normal(size=7), arrow)
+    look = Evaluation(1.0, rng.normal(size=7), arrow)
     step, promised = solve(look, 0.1)
     assert promised == pytest.approx(-look.gradient @ step - 0.5 * step @ arrow.dense() @ step)
     hopeless = replace(look, hessian=replace(arrow, corner=-np.ones((1, 1))))
@@ -225,10 +225,10 @@ def test_the_promised_decrease_is_the_models(rng):
 
 
 def test_key_frames_come_first():
-    steps = list(sequence.rounds(seed=4, frames=10, stride=3))
+    steps = list(sequence.propagation_order(seed=4, frames=10, stride=3))
     assert steps == [[(7, 4)], [(1, 4)], [(0, 1), (2, 1), (3, 4), (5, 4), (6, 7), (8, 7), (9, 7)]]
-    assert list(sequence.rounds(0, 3, 1)) == [[(1, 0)], [(2, 1)]]
-    assert list(sequence.rounds(0, 1, 1)) == []
+    assert list(sequence.propagation_order(0, 3, 1)) == [[(1, 0)], [(2, 1)]]
+    assert list(sequence.propagation_order(0, 1, 1)) == []
 
 
 @pytest.mark.slow

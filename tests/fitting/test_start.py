@@ -14,7 +14,7 @@ from ipman_rs.data.keypoints import mediapipe
 from ipman_rs.fitting import config, start
 from ipman_rs.fitting.camera import Camera
 from ipman_rs.fitting.fit import fit
-from ipman_rs.fitting.landmarks import Landmarks, known
+from ipman_rs.fitting.landmarks import Landmarks, landmark_names
 from ipman_rs.fitting.problem import Presented, Problem
 from ipman_rs.fitting.rotations import matrix, vector
 from tests.helpers import fit_terms_cases as cases
@@ -30,7 +30,7 @@ def seen_problem(turns=TURNS) -> Problem:
     """People in named poses, turned about the vertical, 4 m before a level camera."""
     body = cases.body_model()
     count = len(turns)
-    landmarks = Landmarks(body, tuple(name for name in mediapipe.NAMES if name in known(body.body)))
+    landmarks = Landmarks(body, tuple(name for name in mediapipe.NAMES if name in landmark_names(body.body)))
     angles = torch.stack([torch.as_tensor(poses.pose_of(body.body, name)) for name in turns]).double()
     yaw = torch.zeros(count, 3, dtype=torch.float64)
     yaw[:, 1] = torch.deg2rad(double(*turns.values()))

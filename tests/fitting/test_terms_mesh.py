@@ -281,12 +281,12 @@ def test_switch_leaves_jumping_and_tipping_bodies_alone():
     broken[0, 5, 1] = torch.nan
     leans = vertices(standing(("lean_past_toes",)))
     batch = torch.cat([stands, hovers, jumps, sinks, vertices(tips), broken, leans])
-    gates = static_gate.static(batch, template, floor)
+    gates = static_gate.static_mask(batch, template, floor)
     margins = ipt.support_margin(batch[[0, 4, 6]], template, floor)
     assert margins[0] > 0 > margins[2] > -static_gate.LEAN > margins[1]
     assert gates.tolist() == [True, True, False, True, False, False, True]
     assert gates.dtype == torch.bool
-    alone = torch.cat([static_gate.static(one[None], template, floor) for one in batch])
+    alone = torch.cat([static_gate.static_mask(one[None], template, floor) for one in batch])
     assert torch.equal(alone, gates)
 
 
@@ -295,7 +295,7 @@ def test_only_static_holds_from_the_start_of_a_stage():
     on_floor, in_air = standing(("standing",)), standing(("standing",), lift=0.5)
     start = cases.candidate(problem, **{name: torch.cat([on_floor[name], in_air[name]]) for name in on_floor})
     landed = cases.candidate(problem, **{name: torch.cat([on_floor[name]] * 2) for name in on_floor})
-    judged = replace(problem, static=static_gate.static(start.vertices, problem.body.template, problem.ground))
+    judged = replace(problem, static=static_gate.static_mask(start.vertices, problem.body.template, problem.ground))
     always, static = Ground(problem), Ground(judged, only_static=True)
     for body in (start, landed):
         assert torch.equal(static.cost(body)[0], always.cost(body)[0])

@@ -35,10 +35,10 @@ def seen(pose: str = "standing", depth: float = 4.0, body: str = "anny-lite") ->
     import torch
 
     import ipman_rs.torch as ipt
-    from ipman_rs.fitting.landmarks import Landmarks, known
+    from ipman_rs.fitting.landmarks import Landmarks, landmark_names
 
     model = ipt.BodyModel(body)
-    names = [name for name in mediapipe.NAMES if name is not None and name in known(model.body)]
+    names = [name for name in mediapipe.NAMES if name is not None and name in landmark_names(model.body)]
     angles = torch.as_tensor(ip.body.poses.pose_of(model.body, pose))[None]
     points = dict(zip(names, Landmarks(model, names)(angles)[0].double().numpy(), strict=True))
     found = np.zeros((33, 4))

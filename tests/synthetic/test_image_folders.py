@@ -24,9 +24,9 @@ from ipman_rs.cli import main
 from ipman_rs.data import rendered
 from ipman_rs.data.rendered.torch_images import RenderedImages
 from ipman_rs.synthetic.images import writer
-from ipman_rs.synthetic.images.samples import Settings
+from ipman_rs.synthetic.images.samples import RenderSettings
 
-SETTINGS = Settings(seed=2, size=32)
+SETTINGS = RenderSettings(seed=2, size=32)
 COUNTS = {"train": 9, "val": 2, "test": 1}
 
 
@@ -174,7 +174,7 @@ def rewritten(path, change):
         for name, content in files:
             content = change(name, content)
             if content is not None:
-                writer.add(archive, name, content)
+                writer.add_member(archive, name, content)
 
 
 def with_nan(content):
@@ -277,7 +277,7 @@ def test_folder_that_is_not_ours(prepare, match, tmp_path):
 
 def test_folder_of_other_settings(whole):
     with pytest.raises(ValueError, match=r"holds other images \(settings: .*\"seed\": 2.* asked for .*\"seed\": 5"):
-        writer.write(whole, Settings(seed=5, size=32), COUNTS, 4)
+        writer.write(whole, RenderSettings(seed=5, size=32), COUNTS, 4)
     with pytest.raises(ValueError, match="holds other images"):
         writer.write(whole, SETTINGS, {**COUNTS, "train": 10}, 4)
 
@@ -308,7 +308,7 @@ def test_worker_that_dies(tmp_path, monkeypatch):
     def die(*_):
         raise BrokenProcessPool("a child process terminated abruptly")
 
-    monkeypatch.setattr(writer, "drawn", die)
+    monkeypatch.setattr(writer, "draw_files", die)
     done = CliRunner().invoke(main, command(tmp_path / "out", 1))
     assert done.exit_code == 1
     assert "a process ended too early" in done.output

@@ -13,11 +13,11 @@ import ipman_rs as ip
 from ipman_rs.body.landmarks import skin_points
 from ipman_rs.synthetic.at_rest import FAMILIES
 from ipman_rs.synthetic.images import cameras, clothing, environment, renderer, textures
-from ipman_rs.synthetic.images.people import draw_figure, keypoint_names
-from ipman_rs.synthetic.images.renderer import Solid, shaded
-from ipman_rs.synthetic.images.samples import Settings, draw_sample, seen
+from ipman_rs.synthetic.images.people import draw_person, keypoint_names
+from ipman_rs.synthetic.images.renderer import Solid, shadow
+from ipman_rs.synthetic.images.samples import RenderSettings, draw_sample, visible_points
 
-SETTINGS = Settings(seed=3, size=112, moving=0.5)
+SETTINGS = RenderSettings(seed=3, size=112, moving=0.5)
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +102,7 @@ def test_who_is_static_rests_on_the_floor(samples):
 
 def test_bodies_face_every_way_and_stand_about():
     draw = np.random.default_rng(0)
-    figures = [draw_figure(draw, "anny-lite", "standing", 0.0) for _ in range(40)]
+    figures = [draw_person(draw, "anny-lite", "standing", 0.0) for _ in range(40)]
     facing = ip.load_body("anny-lite")
     ahead = np.array([figure.posed()[1] for figure in figures])
     across = ahead[:, facing.joint_names.index("left_hip")] - ahead[:, facing.joint_names.index("right_hip")]
@@ -116,10 +116,10 @@ def test_bodies_face_every_way_and_stand_about():
 
 
 def test_seeds_splits_and_numbers_draw_other_people():
-    small = Settings(seed=3, size=32)
+    small = RenderSettings(seed=3, size=32)
     drawn = [
         draw_sample(small, "train", 0), draw_sample(small, "val", 0), draw_sample(small, "train", 7),
-        draw_sample(Settings(seed=4, size=32), "train", 0),
+        draw_sample(RenderSettings(seed=4, size=32), "train", 0),
     ]  # fmt: skip
     assert {sample.record["family"] for sample in drawn} == {"standing"}
     for one, other in itertools.combinations(drawn, 2):
@@ -137,18 +137,18 @@ def ball():
 
 
 def plain(color):
-    pattern = textures.draw_pattern(np.random.default_rng(0), ("plain",), np.array(color, float), (1, 1), 0.0)
-    return textures.Pattern("plain", pattern.first, pattern.first, 1.0, 0.0, 0.0, pattern.lattice)
+    pattern = textures.draw_texture(np.random.default_rng(0), ("plain",), np.array(color, float), (1, 1), 0.0)
+    return textures.Texture("plain", pattern.first, pattern.first, 1.0, 0.0, 0.0, pattern.lattice)
 
 
 def test_ball_covers_what_perspective_says(ball):
     """A ball straight ahead at distance d is a disc of radius f r / √(d² − r²)."""
-    rotation = cameras.looking(0.0, 0.0, 0.0)
-    camera = cameras.Camera(
+    rotation = cameras.view_rotation(0.0, 0.0, 0.0)
+    camera = cameras.ImageCamera(
         200, rotation, -rotation @ [0.0, 0.5, 2.0], np.array([[300, 0, 100], [0, 300, 100], [0, 0, 1.0]])
     )
     draw = np.random.default_rng(0)
-    clothes, around = clothing.draw_clothes(draw, "anny-lite"), environment.draw_surroundings(draw)
+    clothes, around = clothing.draw_clothes(draw, "anny-lite"), environment.draw_environment(draw)
     picture = renderer.render(ball, ball.vertices, clothes, "anny-lite", around, camera)
     radius = 300 * 0.2 / math.sqrt(2**2 - 0.2**2)
     assert picture.covered.sum() == pytest.approx(math.pi * radius**2, rel=0.005)
@@ -160,7 +160,7 @@ def test_shadow_of_a_ball(ball):
     towards = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
     grid = np.stack(np.meshgrid(np.linspace(-1.2, 0.6, 181), np.linspace(-0.6, 0.6, 121)), axis=-1).reshape(-1, 2)
     points = np.stack([grid[:, 0], np.zeros(len(grid)), grid[:, 1]], axis=1)
-    dark = shaded(ball, points, np.tile(towards, (len(points), 1)))
+    dark = shadow(ball, points, np.tile(towards, (len(points), 1)))
     within = ((grid[:, 0] + 0.5) / (0.2 * math.sqrt(2))) ** 2 + (grid[:, 1] / 0.2) ** 2
     assert (dark[within < 0.94] == 1).all()
     assert (dark[within > 1.06] == 0).all()
@@ -169,7 +169,7 @@ def test_shadow_of_a_ball(ball):
 @pytest.mark.filterwarnings("error")
 def test_no_floor_is_seen(ball):
     """A camera that looks up sees what is behind the ball."""
-    around = environment.draw_surroundings(np.random.default_rng(0))
+    around = environment.draw_environment(np.random.default_rng(0))
     eye, rays = np.array([0.0, 0.3, 2.0], np.float32), np.array([[0, 0.3, -1], [0.2, 0.5, -1]], np.float32)
     np.testing.assert_array_equal(renderer.background(ball, eye, rays, 0 * rays, around), around.behind(eye, rays))
 
@@ -185,26 +185,26 @@ def test_light_follows_lambert():
 
 
 def test_visible_is_what_nothing_hides(ball):
-    rotation = cameras.looking(0.0, 0.0, 0.0)
-    camera = cameras.Camera(200, rotation, -rotation @ [0.0, 0.5, 2.0], np.eye(3))
+    rotation = cameras.view_rotation(0.0, 0.0, 0.0)
+    camera = cameras.ImageCamera(200, rotation, -rotation @ [0.0, 0.5, 2.0], np.eye(3))
     points = np.array([[0, 0.5, 0.1], [0, 0.5, 0.2], [0, 0.5, -0.2], [0.5, 0.5, -1.0]])
-    assert seen(ball, camera, points, num_joints=1).tolist() == [True, True, False, True]
-    assert seen(ball, camera, points, num_joints=3).tolist() == [True, True, False, True]
+    assert visible_points(ball, camera, points, num_joints=1).tolist() == [True, True, False, True]
+    assert visible_points(ball, camera, points, num_joints=3).tolist() == [True, True, False, True]
 
 
 def test_looking_down_and_about():
     """At zero along −z with y up; turned by 90° along −x; looking down by 90° along −y."""
     ahead = np.array([0.0, 0.0, 1.0])
     for angles, expected in (((0, 0, 0), (0, 0, -1)), ((90, 0, 0), (-1, 0, 0)), ((0, 90, 0), (0, -1, 0))):
-        np.testing.assert_allclose(cameras.looking(*angles).T @ ahead, expected, atol=1e-12)
-    np.testing.assert_allclose(cameras.looking(0, 0, 0) @ [0, 1, 0], [0, -1, 0], atol=1e-12)
+        np.testing.assert_allclose(cameras.view_rotation(*angles).T @ ahead, expected, atol=1e-12)
+    np.testing.assert_allclose(cameras.view_rotation(0, 0, 0) @ [0, 1, 0], [0, -1, 0], atol=1e-12)
 
 
 def test_patterns_repeat_by_the_cell():
     colors = plain((0.2, 0.4, 0.6))(np.array([[0.3, 0.4]]))
     np.testing.assert_allclose(colors, [[0.2, 0.4, 0.6]], rtol=1e-6)
     first, second = np.zeros(3), np.ones(3)
-    checks = textures.Pattern("checks", first, second, 0.5, 0.0, 0.0, np.zeros((64, 64)))
+    checks = textures.Texture("checks", first, second, 0.5, 0.0, 0.0, np.zeros((64, 64)))
     plane = np.array([[0.1, 0.1], [0.3, 0.1], [0.3, 0.3], [0.6, 0.1], [0.1, 0.9]])
     assert checks(plane)[:, 0].tolist() == [0, 1, 0, 0, 1]
 

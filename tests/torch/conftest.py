@@ -72,13 +72,13 @@ SINGLE = [
 ]
 FUSED = [
     *(
-        Case(f"terms.stability.{method}.{points}.{shape}", (100.0, 10.0, 0.0, *GROUND_OPTIONS))
+        Case(f"terms.stability.{method}.ground.{points}.{shape}", (100.0, 10.0, 0.0, *GROUND_OPTIONS))
         for method in METHODS
         for points, shape in GROUND_TERMS
     ),
-    Case("terms.stability.pcom.samples.tanh_squared", (100.0, 10.0, 1e-6, 1.0, 0.5, 1.0, 0.15)),
+    Case("terms.stability.pcom.ground.samples.tanh_squared", (100.0, 10.0, 1e-6, 1.0, 0.5, 1.0, 0.15)),
     *(
-        Case(f"terms.balance.{wrap}.{method}.{points}.{shape}", (100.0, 50.0, 0.02, *GROUND_OPTIONS))
+        Case(f"terms.balance.{wrap}.{method}.ground.{points}.{shape}", (100.0, 50.0, 0.02, *GROUND_OPTIONS))
         for wrap in ("log", "saturate", "none")
         for method in METHODS
         for points, shape in GROUND_TERMS
@@ -92,10 +92,10 @@ MAIN = [
     if not case.quantity.startswith(("balance_cost.saturate", "balance_cost.none", "support_margin.released"))
     or case.quantity.endswith("pcom")
 ] + [
-    Case("terms.stability.pcom.samples.tanh_squared", (100.0, 10.0, 0.0, *GROUND_OPTIONS)),
-    Case("terms.stability.exact.vertices.tanh_of_square", (100.0, 10.0, 1e-6, *GROUND_OPTIONS)),
-    Case("terms.balance.log.pcom.samples.tanh_squared", (100.0, 50.0, 0.02, *GROUND_OPTIONS)),
-    Case("terms.balance.saturate.face_area.vertices.tanh_squared", (100.0, 50.0, 0.02, *GROUND_OPTIONS)),
+    Case("terms.stability.pcom.ground.samples.tanh_squared", (100.0, 10.0, 0.0, *GROUND_OPTIONS)),
+    Case("terms.stability.exact.ground.vertices.tanh_of_square", (100.0, 10.0, 1e-6, *GROUND_OPTIONS)),
+    Case("terms.balance.log.pcom.ground.samples.tanh_squared", (100.0, 50.0, 0.02, *GROUND_OPTIONS)),
+    Case("terms.balance.saturate.face_area.ground.vertices.tanh_squared", (100.0, 50.0, 0.02, *GROUND_OPTIONS)),
 ]
 # One of each room.
 ROOMS = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from dataclasses import replace
 
 import pytest
 import torch
@@ -25,6 +26,35 @@ def terms_by_hand(vertices, body, preset):
         return {"balance": first, "pull": pull, "push": push}
     first = ipt.stability_loss(vertices, body.template, body.ground, p.alpha, p.gamma, p.epsilon)
     return {"stability": first, "pull": pull, "push": push}
+
+
+def test_a_loss_has_the_terms_that_its_preset_weighs(tiny):
+    """Those of any subset of the core's list, with the numbers of the whole."""
+    paper = presets.get("paper-r")
+    whole = ipt.IntuitivePhysicsLoss(tiny.template, paper)(tiny.vertices, tiny.ground)
+    for weights in ({"stability": 1.0}, {"pull": 1.0, "push": 2.0}, {"balance": 1.0, "stability": 1.0}):
+        loss = ipt.IntuitivePhysicsLoss(tiny.template, replace(paper, weights=weights))
+        assert loss.terms == tuple(sorted(weights, key=("stability", "balance", "pull", "push").index))
+        leaf = tiny.vertices.clone().requires_grad_()
+        terms = loss(leaf, tiny.ground)
+        for name in set(terms) & set(whole):
+            torch.testing.assert_close(terms[name].detach(), whole[name], rtol=1e-14, atol=0)
+        (slope,) = torch.autograd.grad(sum(terms.values()), leaf)
+        with ipt.dispatch._reference_path():
+            (expected,) = torch.autograd.grad(sum(loss(leaf, tiny.ground).values()), leaf)
+        # Sums in another order in double precision; the balance cost's inner solve ends at 1e-12 of a metre.
+        torch.testing.assert_close(slope, expected, rtol=0, atol=1e-10 * expected.abs().max().item())
+    for weights in ({}, {"pull": 1.0}, {"stability": 1.0, "comfort": 1.0}):
+        with pytest.raises(ValueError, match="weights of preset 'paper-r': expected stability, balance, pull and push"):
+            ipt.IntuitivePhysicsLoss(tiny.template, replace(paper, weights=weights))
+    with pytest.raises(ValueError, match="alpha2"):
+        ipt.IntuitivePhysicsLoss(tiny.template, replace(paper, alpha2=-1.0))
+
+
+@PRESETS
+def test_presets_name_the_term_that_they_weigh(preset):
+    numbers = presets.get(preset)
+    assert (numbers.stability == "balance") == ("balance" in numbers.weights) != ("stability" in numbers.weights)
 
 
 def reduce(values, valid, reduction):

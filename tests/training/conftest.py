@@ -20,7 +20,7 @@ def _one_thread():
 @pytest.fixture(scope="session")
 def static():
     """28 static people, four of each family."""
-    return population.draw_bodies(28, seed=7)
+    return population.draw_population(28, seed=7)
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ from PIL import Image
 
 import ipman_rs.torch as ipt
 from ipman_rs.body import joints, poses, rotations
-from ipman_rs.training.augment import MEAN, SPREAD, Augmentation, Augmenting, crop, follow, to_crop
+from ipman_rs.training.augment import MEAN, SPREAD, Augmentation, AugmentConfig, augment_labels, crop, to_crop
 from ipman_rs.training.batch import Batch
 from ipman_rs.training.model.keypoint_encoder import KEYPOINTS
 from ipman_rs.training.world import to_world
@@ -84,7 +84,7 @@ def test_the_image_shows_the_labels_and_the_body_stands(scene, change):
         "pose": pose.float(),
     }
     whole = to_crop(BOX, change)
-    followed = follow(labels, whole, change, KEYPOINTS, joints.SMPL)
+    followed = augment_labels(labels, whole, change, KEYPOINTS, joints.SMPL)
 
     # The labelled body, drawn by itself with its pelvis where the augmented camera has it, is what the crop shows.
     labelled = body(columns(followed["pose"].double()))
@@ -137,7 +137,7 @@ def test_sides_are_swapped():
         "pose": torch.eye(3).expand(24, 3, 3),
     }
     change = Augmentation(flip=True)
-    followed = follow(labels, to_crop((0, 0, 40, 40), change), change, names, joints.SMPL)["keypoints"]
+    followed = augment_labels(labels, to_crop((0, 0, 40, 40), change), change, names, joints.SMPL)["keypoints"]
     half = 24.0  # of the crop, 1.2 times the box
     expected = torch.tensor([[10 / half, 0, 1], [12 / half, -2 / half, 0.25], [8 / half, -2 / half, 0.5]])
     torch.testing.assert_close(followed, expected)
@@ -145,7 +145,7 @@ def test_sides_are_swapped():
 
 def test_drawing_is_spins():
     draw = np.random.default_rng(0)
-    drawn = [Augmenting().draw(draw) for _ in range(4000)]
+    drawn = [AugmentConfig().draw(draw) for _ in range(4000)]
     assert np.mean([one.flip for one in drawn]) == pytest.approx(0.5, abs=0.03)
     degrees = np.array([one.degrees for one in drawn])
     assert (degrees != 0).mean() == pytest.approx(0.4, abs=0.03)
@@ -157,7 +157,7 @@ def test_drawing_is_spins():
 
 
 def test_nothing_is_nothing():
-    change = Augmenting(flip=0, degrees=0, scale=0, noise=0).draw(np.random.default_rng(0))
+    change = AugmentConfig(flip=0, degrees=0, scale=0, noise=0).draw(np.random.default_rng(0))
     assert change == Augmentation()
 
 

@@ -23,7 +23,7 @@ from ipman_rs.training.batch import Batch
 from ipman_rs.training.model import Estimate
 from ipman_rs.training.model.keypoint_encoder import KEYPOINTS
 from ipman_rs.training.posed_estimate import REGRESSED, Posing
-from ipman_rs.training.predict import Trained
+from ipman_rs.training.predict import TrainedModel
 from ipman_rs.training.projection import project
 from ipman_rs.training.sources import Images
 from ipman_rs.training.world import to_world
@@ -216,13 +216,13 @@ class Looking(torch.nn.Module):
 
 @pytest.mark.parametrize("of_body", [True, False])
 def test_predicted_bodies_stand_on_the_labelled_hips(frames, body, regressor, of_body):
-    from ipman_rs.training.trainer.config import config
+    from ipman_rs.training.trainer.config import config_of
 
     if not of_body:
         frames = dataclasses.replace(frames, pose=None, betas=None, transl=None, body=None, genders=None)
     rough = true(dataclasses.replace(frames, pose=np.zeros((COUNT, 24, 3)), betas=np.zeros((COUNT, 10))))
-    settings = config({"data": [{"name": "x", "path": "y"}], "model": {"size": 32}})
-    trained = Trained(Looking(rough), settings, Posing(ipt.BodyModel(body), KEYPOINTS))  # type: ignore[arg-type]
+    settings = config_of({"data": [{"name": "x", "path": "y"}], "model": {"size": 32}})
+    trained = TrainedModel(Looking(rough), settings, Posing(ipt.BodyModel(body), KEYPOINTS))  # type: ignore[arg-type]
     found = trained.of_data_set(Data(frames), regressor=regressor)
     posed = body(found["pose"], found["betas"], found["transl"])
     middle = posed.joints[:, 1:3] if of_body else regressor.joints(posed.vertices)[:, :2]

@@ -14,9 +14,9 @@ from ipman_rs.body import load_body
 from ipman_rs.synthetic import population
 from ipman_rs.synthetic.at_rest import FAMILIES
 from ipman_rs.training.lifting import views
-from ipman_rs.training.lifting.network import lifter
-from ipman_rs.training.losses import Loss, Physics
-from ipman_rs.training.train_loop import Drill, drill, estimated
+from ipman_rs.training.lifting.network import lifting_network
+from ipman_rs.training.losses import Loss, PhysicsLoss
+from ipman_rs.training.train_loop import TrainingPlan, estimate_all, run_plan
 
 
 def test_people_stand(static):
@@ -30,21 +30,21 @@ def test_people_stand(static):
 
 
 def test_people_depend_on_seed_and_number_alone(static):
-    again = population.draw_bodies(9, seed=7)
+    again = population.draw_population(9, seed=7)
     assert np.array_equal(again.pose, static.pose[:9])
-    assert not np.array_equal(population.draw_bodies(1, seed=8).pose, static.pose[:1])
+    assert not np.array_equal(population.draw_population(1, seed=8).pose, static.pose[:1])
 
 
 def test_people_survive_their_file(static, tmp_path):
     static.save(tmp_path / "people.npz")
-    loaded = population.Bodies.load(tmp_path / "people.npz")
+    loaded = population.Population.load(tmp_path / "people.npz")
     assert all(np.array_equal(value, getattr(loaded, name)) for name, value in vars(static).items())
 
 
 def test_a_mirrored_pose_is_a_mirror_image(static):
     """Joints of the mirrored pose are the mirrored joints of the other side, as far as the mean body is symmetric."""
     body = load_body(population.BODY)
-    own, other = (np.asarray(body(pose).joints) for pose in (static.pose, population.mirrored(static.pose)))
+    own, other = (np.asarray(body(pose).joints) for pose in (static.pose, population.mirror(static.pose)))
     swap = [body.joint_names.index(population._other_side(name)) for name in body.joint_names]
     np.testing.assert_allclose(other[:, swap] * [-1, 1, 1], own, atol=6e-3)
 
@@ -81,7 +81,7 @@ def test_keypoints_are_the_projected_body(static, posing):
 
 def test_noise(static):
     truth = views.views(static, seed=1, per_body=40)
-    noisy = views.noisy(truth, torch.Generator().manual_seed(0))
+    noisy = views.add_noise(truth, torch.Generator().manual_seed(0))
     there = noisy.inputs[..., 2] > 0
     assert 1 - there.float().mean().item() == pytest.approx(views.DROPPED, rel=0.1)
     error = (noisy.inputs - truth.inputs)[..., :2][there]
@@ -93,13 +93,18 @@ def test_noise(static):
 @pytest.mark.slow
 def test_it_learns_and_repeats_itself(static, posing):
     data = views.views(static, seed=1, per_body=4)
-    plan = Drill(60, 1e-3, 32)
-    models = [lifter(3) for _ in range(3)]
+    plan = TrainingPlan(60, 1e-3, 32)
+    models = [lifting_network(3) for _ in range(3)]
     start = copy.deepcopy(models[0])
-    for model, physics in zip(models, (None, None, Physics(posing.body.template)), strict=True):
+    for model, physics in zip(models, (None, None, PhysicsLoss(posing.body.template)), strict=True):
         loss = Loss(posing, physics)
-        drill(
-            model, lambda batch, model=model, loss=loss: loss(model(batch.inputs), batch)[0], data, views.noisy, plan, 5
+        run_plan(
+            model,
+            lambda batch, model=model, loss=loss: loss(model(batch.inputs), batch)[0],
+            data,
+            views.add_noise,
+            plan,
+            5,
         )
     first, again, physical = (model.state_dict() for model in models)
     assert all(torch.equal(first[name], again[name]) for name in first)
@@ -107,7 +112,7 @@ def test_it_learns_and_repeats_itself(static, posing):
     errors = []
     for model in (start, models[0]):
         with torch.no_grad():
-            errors.append(Loss(posing)(estimated(model, data.inputs), data)[1]["joints_3d"].item())
+            errors.append(Loss(posing)(estimate_all(model, data.inputs), data)[1]["joints_3d"].item())
     assert errors[1] < 0.5 * errors[0]
     assert math.isfinite(errors[1])
 
@@ -124,7 +129,7 @@ def test_a_step_whose_gradient_is_infinite_is_left_out(static):
         seen.append(model.weight.item())
         return next(steps) * model.weight.sum()
 
-    drill(model, loss, data, lambda batch, generator: batch, Drill(3, 0.1, 4), 0)
+    run_plan(model, loss, data, lambda batch, generator: batch, TrainingPlan(3, 0.1, 4), 0)
     assert seen[1] == pytest.approx(0.9)  # Adam's first step is the rate
     assert seen[2] == seen[1]
     assert model.weight.item() < seen[1]

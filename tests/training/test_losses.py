@@ -12,7 +12,7 @@ import ipman_rs.torch as ipt
 from ipman_rs import presets
 from ipman_rs.training import losses
 from ipman_rs.training.lifting import views
-from ipman_rs.training.lifting.network import lifter
+from ipman_rs.training.lifting.network import lifting_network
 from ipman_rs.training.model import Estimate
 from ipman_rs.training.posed_estimate import Posing
 from ipman_rs.training.projection import FOCAL, project
@@ -27,7 +27,7 @@ def truth(static):
 @pytest.fixture(scope="module")
 def estimate(truth):
     with torch.no_grad():
-        return lifter(0)(truth.inputs)
+        return lifting_network(0)(truth.inputs)
 
 
 def exact(truth) -> Estimate:
@@ -100,7 +100,7 @@ def test_physics_is_the_loss_in_the_world(truth, estimate, posing):
     posed = posing(estimate)
     world = to_world(posed.vertices, posed.hips(truth.regressed), truth)
     expected = ipt.IntuitivePhysicsLoss(posing.body.template, "paper-r")(world, ipt.Ground.y_up())
-    total, terms = losses.Physics(posing.body.template)(posed, truth)
+    total, terms = losses.PhysicsLoss(posing.body.template)(posed, truth)
     for name, value in expected.items():
         assert terms[name].item() == pytest.approx(value.item(), rel=1e-6)
     weights = presets.get("paper-r").weights
@@ -115,17 +115,17 @@ def test_whose_bodies_count(truth, estimate, posing, missing):
     masked = dataclasses.replace(truth, **{missing: some})
     template = posing.body.template
     part = dataclasses.replace(posed, vertices=posed.vertices[some], joints=posed.joints[some])
-    alone = losses.Physics(template)(part, truth[some])[1]
-    everyone = losses.Physics(template)(posed, truth)[1]
-    for name, value in losses.Physics(template)(posed, masked)[1].items():
+    alone = losses.PhysicsLoss(template)(part, truth[some])[1]
+    everyone = losses.PhysicsLoss(template)(posed, truth)[1]
+    for name, value in losses.PhysicsLoss(template)(posed, masked)[1].items():
         assert value.item() == pytest.approx(alone[name].item(), rel=1e-5)
-    counted = losses.Physics(template, counted="world")(posed, masked)[1]
+    counted = losses.PhysicsLoss(template, counted="world")(posed, masked)[1]
     expected = alone if missing == "has_world" else everyone
     assert counted["stability"].item() == pytest.approx(expected["stability"].item(), rel=1e-5)
 
 
 def test_the_weights_of_spin_and_of_the_paper(truth, estimate, posing):
-    total, terms = losses.Loss(posing, losses.Physics(posing.body.template))(estimate, truth)
+    total, terms = losses.Loss(posing, losses.PhysicsLoss(posing.body.template))(estimate, truth)
     bracket = 5 * terms["keypoints_2d"] + 5 * terms["joints_3d"] + terms["pose"] + 0.001 * terms["betas"]
     bracket = bracket + terms["scale"] + 0.01 * (terms["stability"] + terms["pull"] + terms["push"])
     assert total.item() == pytest.approx(60 * bracket.item(), rel=1e-5)
@@ -139,7 +139,7 @@ def test_the_gradient_is_that_of_the_loss(static):
     truth = truth._map(lambda value: value.double() if value.is_floating_point() else value)
     start = exact(truth)
     given = [(value.double() + 0.05 * torch.randn_like(value)).requires_grad_() for value in vars(start).values()]
-    loss = losses.Loss(posing, losses.Physics(posing.body.template, "balanced"))
+    loss = losses.Loss(posing, losses.PhysicsLoss(posing.body.template, "balanced"))
 
     def value(*parameters):
         estimate = Estimate(*parameters)
@@ -156,7 +156,7 @@ def test_the_gradient_is_that_of_the_loss(static):
 
 def test_broken_labels_are_left_out(truth, estimate, posing):
     """A NaN anywhere: the sums are those of the batch whose label is missing, and the gradient is finite."""
-    loss = losses.Loss(posing, losses.Physics(posing.body.template))
+    loss = losses.Loss(posing, losses.PhysicsLoss(posing.body.template))
     nan = float("nan")
 
     def broken(name, index):

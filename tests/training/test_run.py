@@ -23,7 +23,7 @@ from PIL import Image
 
 from ipman_rs.cli import main
 from ipman_rs.training import recipes
-from ipman_rs.training.augment import Augmentation, Augmenting, crop
+from ipman_rs.training.augment import Augmentation, AugmentConfig, crop
 from ipman_rs.training.projection import project
 from ipman_rs.training.trainer import config
 from ipman_rs.training.trainer.checkpoints import WholeFiles
@@ -321,7 +321,7 @@ def test_configurations_that_cannot_be(settings, change, said):
 def test_configurations_survive_their_file(settings):
     made = config.load(settings, ["model.size=128", "augment.flip=0.25", "loss.pose=2", "precision=bf16-mixed"])
     assert (made.model.size, made.augment.flip, made.loss.pose, made.precision) == (128, 0.25, 2.0, "bf16-mixed")
-    assert config.config(config.plain(made)) == made
+    assert config.config_of(config.as_dict(made)) == made
 
 
 def test_the_recipes_are_the_paper_s():
@@ -334,9 +334,9 @@ def test_the_recipes_are_the_paper_s():
         assert (one.steps, one.batch, one.rate, one.schedule) == (14_600, 64, 5e-5, "constant")
         assert one.steps == pytest.approx(3 * 312_188 / 64, rel=5e-3)
         assert one.clip == math.inf
-        assert config.config(config.plain(one)) == one
+        assert config.config_of(config.as_dict(one)) == one
         assert (one.loss.keypoints_2d, one.loss.keypoints_2d_count, one.loss.all) == (5, 49, 60)
-        assert one.augment == Augmenting()
+        assert one.augment == AugmentConfig()
         for told in one.data:
             assert told.options["split"] in module(told.name).FORM.files
     shares = {(one.name, one.options["split"]): one.share for one in made["ipman-r"].data}
@@ -344,8 +344,8 @@ def test_the_recipes_are_the_paper_s():
     for name, size in sizes.items():
         assert shares.pop(tuple(name.split())) == pytest.approx(0.4 * size / sum(sizes.values()), abs=5e-4)
     assert shares == {("human36m", "train"): 0.3, ("mpi-inf-3dhp", "train"): 0.1, ("rich-ipman", "train"): 0.2}
-    assert made["hmr-star"] == dataclasses.replace(made["ipman-r"], physics=config.Physics())
-    assert made["ipman-r"].physics == config.Physics("paper-r")
+    assert made["hmr-star"] == dataclasses.replace(made["ipman-r"], physics=config.PhysicsConfig())
+    assert made["ipman-r"].physics == config.PhysicsConfig("paper-r")
     assert [told.name for told in made["ipman-r-human36m"].data] == ["human36m"]
 
 
@@ -439,7 +439,7 @@ accelerator: cpu
     import numpy as np
 
     from ipman_rs.data import open as open_data
-    from ipman_rs.training.predict import Trained
+    from ipman_rs.training.predict import TrainedModel
 
     data = open_data("rendered", tmp_path / "images", split="val")
     photos = tmp_path / "photos"
@@ -463,7 +463,7 @@ accelerator: cpu
     assert (tmp_path / "found" / "0" / "overlay.png").exists()
     stored = np.load(tmp_path / "found" / "1" / "1.npz")
     # The stored body, seen by the stored camera, lies in the image where the regressor's own camera put it.
-    trained = Trained.load(tmp_path / "out" / "last.ckpt")
+    trained = TrainedModel.load(tmp_path / "out" / "last.ckpt")
     body = trained.posing.body.body
     pose = np.concatenate([stored["global_orient"], stored["body_pose"].reshape(23, 3)])
     joints = np.asarray(body(pose, stored["betas"][0], stored["transl"][0]).joints)

@@ -12,7 +12,7 @@ from PIL import Image
 import ipman_rs as ip
 from ipman_rs.body import joints, load_body, rotations
 from ipman_rs.data import Cameras, Frames
-from ipman_rs.training.augment import Augmenting
+from ipman_rs.training.augment import AugmentConfig
 from ipman_rs.training.batch import Batch
 from ipman_rs.training.model.keypoint_encoder import KEYPOINTS
 from ipman_rs.training.sources import BadSample, Images, Mixture, Share
@@ -166,7 +166,7 @@ def test_a_frame_becomes_a_sample(frames):
 
 
 def test_augmentation_is_drawn(frames):
-    source = images(frames, augmenting=Augmenting(turned=1.0))
+    source = images(frames, augmenting=AugmentConfig(turned=1.0))
     one, again, other = (source.sample(0, np.random.default_rng(seed)) for seed in (1, 1, 2))
     assert all(torch.equal(one[name], again[name]) for name in one)
     assert one["turn"] != other["turn"]

@@ -11,8 +11,8 @@ import torch
 
 from ipman_rs.ablation.training.shuffled_camera import shuffled_camera
 from ipman_rs.training.lifting import views
-from ipman_rs.training.tilted_labels import leaning
-from ipman_rs.training.world import seen_from, to_world
+from ipman_rs.training.tilted_labels import tilt_labels
+from ipman_rs.training.world import to_world, world_to_camera
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def angle_of(turn):
 @pytest.mark.parametrize("lean", ["camera", "any"])
 def test_labels_lean_as_told(clean, lean):
     """Root and joints turn together, about level axes, by 8 ± 5 degrees; nothing else changes."""
-    found = leaning(clean, 8.0, 3, lean)
+    found = tilt_labels(clean, 8.0, 3, lean)
     for name in ("inputs", "keypoints", "camera", "hips", "betas"):
         assert torch.equal(getattr(clean, name), getattr(found, name))
     turn = found.pose[:, 0].double() @ clean.pose[:, 0].double().transpose(1, 2)  # in camera axes
@@ -52,9 +52,9 @@ def test_labels_lean_as_told(clean, lean):
 
 
 def test_no_lean_changes_nothing_and_leans_grow_with_the_angle(clean):
-    assert leaning(clean, 0.0, 3) is clean
+    assert tilt_labels(clean, 0.0, 3) is clean
     angles = [
-        angle_of(leaning(clean, d, 3).pose[:, 0].double() @ clean.pose[:, 0].double().transpose(1, 2))
+        angle_of(tilt_labels(clean, d, 3).pose[:, 0].double() @ clean.pose[:, 0].double().transpose(1, 2))
         for d in (4.0, 8.0)
     ]
     there = angles[0] > 1
@@ -68,13 +68,13 @@ def test_labels_of_augmented_images_lean_as_those_of_the_images(clean):
     turned = dataclasses.replace(clean, turn=torch.rand(count, generator=generator) - 0.5)
     flipped = dataclasses.replace(turned, flip=torch.ones(count, dtype=torch.bool))
     mirror = torch.diag(torch.tensor([-1.0, 1.0, 1.0]))
-    wanted = clean.camera.transpose(1, 2) @ leaning(clean, 8.0, 3).pose[:, 0]
+    wanted = clean.camera.transpose(1, 2) @ tilt_labels(clean, 8.0, 3).pose[:, 0]
     for batch, side in ((turned, torch.eye(3)), (flipped, mirror)):
         # The labels of such an image: the world's body, mirrored where it is, seen by its camera.
-        seen = seen_from(batch)
+        seen = world_to_camera(batch)
         root = seen @ side @ clean.camera.transpose(1, 2) @ clean.pose[:, 0] @ side
         pose = torch.cat([root[:, None], clean.pose[:, 1:]], dim=1)
-        found = leaning(dataclasses.replace(batch, pose=pose), 8.0, 3)
+        found = tilt_labels(dataclasses.replace(batch, pose=pose), 8.0, 3)
         torch.testing.assert_close(side @ seen.transpose(1, 2) @ found.pose[:, 0] @ side, wanted, atol=2e-6, rtol=0)
 
 
@@ -85,7 +85,7 @@ def test_the_camera_of_the_augmented_image_is_the_way_back_of_the_world(clean):
     points = torch.randn(len(clean), 5, 3, generator=torch.Generator().manual_seed(0))
     world = to_world(points, torch.zeros(len(clean), 3), batch)
     side = torch.where(batch.flip[:, None], torch.tensor([-1.0, 1.0, 1.0]), 1.0)
-    back = (world - (side * batch.hips)[:, None]) @ seen_from(batch).transpose(1, 2)
+    back = (world - (side * batch.hips)[:, None]) @ world_to_camera(batch).transpose(1, 2)
     torch.testing.assert_close(back, points, atol=1e-5, rtol=0)
 
 

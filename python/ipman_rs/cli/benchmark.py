@@ -111,10 +111,12 @@ def train(
 
     with one_line_errors(output):
         from ..ablation.training.benchmark import benchmark as run
-        from ..ablation.training.from_images import Pictures
-        from ..ablation.training.from_keypoints import Keypoints
+        from ..ablation.training.from_images import ImageTask
+        from ..ablation.training.from_keypoints import KeypointTask
         from ..ablation.training.run import Benchmark
 
-        task = Keypoints(output, people, bodies, split) if images is None else Pictures(output, images, split, others)
+        task = (
+            KeypointTask(output, people, bodies, split) if images is None else ImageTask(output, images, split, others)
+        )
         page = run(Benchmark(output, task, seeds, part, lean), tilts, workers, console.progress)
     click.echo(page.read_text())

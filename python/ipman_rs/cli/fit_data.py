@@ -43,7 +43,7 @@ def fit_data(
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     if options["iterations"] is not None:
-        chosen = config.capped(chosen, options["iterations"])
+        chosen = config.limit_iterations(chosen, options["iterations"])
     of_person = {name: options[name] for name in ("height", "mass", "pose", "pose_frame", "pose_up", "contact")}
     data = source_of(source["name"], source["path"], source["split"], dict(source["options"]))
     job = DataFit(data, chosen, output, models, options["model"], keypoints, images, every, **of_person)

@@ -82,8 +82,8 @@ def predict(
     with one_line_errors(output):
         with extra("train"):
             from ..training import predicted_images as library
-            from ..training.predict import Trained
-        trained = Trained.load(checkpoint)
+            from ..training.predict import TrainedModel
+        trained = TrainedModel.load(checkpoint)
         if data is not None and path is not None:
             source = {"split": split, "images": image_folder, "regressor": regressor, "progress": console.progress}
             file, count, total = library.predict_data_set(trained, data, path, output, **source)

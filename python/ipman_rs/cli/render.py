@@ -60,10 +60,10 @@ def render(
         "test": images // 10 if test is None else test,
     }
     with one_line_errors(output), writing(output):
-        from ..synthetic.images.samples import Settings
+        from ..synthetic.images.samples import RenderSettings
         from ..synthetic.images.writer import write
 
         with console.progress("rendering", sum(counts.values())) as step:
-            drawn = write(output, Settings(seed, size, body, moving), counts, shard_size, workers, step.to)
+            drawn = write(output, RenderSettings(seed, size, body, moving), counts, shard_size, workers, step.to)
     listed = ", ".join(f"{count} {split}" for split, count in counts.items())
     console.say(f"{output}: {listed}; {drawn} drawn now")

@@ -6,7 +6,11 @@ import warnings
 from importlib import import_module
 from types import ModuleType
 
-_MOVED = {"keypoints": "ipman_rs.data.keypoints", "markers": "ipman_rs.data.markers"}
+_MOVED = {
+    "detected": "ipman_rs.fitting.detection_problem",
+    "keypoints": "ipman_rs.data.keypoints",
+    "markers": "ipman_rs.data.markers",
+}
 
 
 def __getattr__(name: str) -> ModuleType:

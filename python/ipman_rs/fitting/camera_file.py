@@ -30,7 +30,7 @@ class KnownCamera:
 
 
 def read(path: str | os.PathLike[str]) -> KnownCamera:
-    """The camera of a file. ValueError, naming file and key, for what is no camera."""
+    """Read a camera file. ValueError, naming file and key, if it does not describe a camera."""
     content = read_json(path)
     if not isinstance(content, dict) or not set(content) <= set(KEYS):
         raise ValueError(f"{path}: expected an object with some of {', '.join(KEYS)}, got {_short(content)}")

@@ -1,4 +1,4 @@
-"""Bodies as a fit proposes them: computed when a term first looks at them, and then kept for the others."""
+"""Bodies at one point of an optimisation: each quantity is computed when a term first needs it, then cached."""
 
 from __future__ import annotations
 

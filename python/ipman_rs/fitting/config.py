@@ -56,13 +56,13 @@ class Config:
         return self.start.get("search") == "camera"
 
 
-def weighs(config: Config, *terms: str) -> bool:
+def uses_terms(config: Config, *terms: str) -> bool:
     """Whether any stage has a weight for any of these terms."""
     return any(stage.weights.get(name, 0) > 0 for stage in config.stages for name in terms)
 
 
-def capped(config: Config, iterations: int) -> Config:
-    """The same with stages that end after so many iterations at most."""
+def limit_iterations(config: Config, iterations: int) -> Config:
+    """Copy of the configuration whose stages end after at most `iterations` iterations."""
     stages = (
         replace(stage, options=replace(stage.options, iterations=min(stage.options.iterations, iterations)))
         for stage in config.stages
@@ -87,7 +87,7 @@ def load(name: str | Path) -> Config:
 
 
 def search_of(start: Mapping[str, Any]) -> str:
-    """What a preset's `start` looks for. ValueError for what is not known."""
+    """The kind of search that a preset's `start` names. ValueError for an unknown one."""
     search_options(start)
     how = start.get("search", "body")
     if how not in SEARCHES:

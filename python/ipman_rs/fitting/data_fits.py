@@ -1,10 +1,10 @@
-"""Fits of a data set's people, a frame each, in pieces that are done once and kept: predictions for `ipman evaluate`.
+"""Fits of a data set's people, frame by frame, saved piece by piece: predictions for `ipman evaluate`.
 
 Keypoints are the data set's, or those of files, or MediaPipe's in its images; cameras and ground are the data set's. A
 preset that imitates a pose is presented the frame's recorded pose (as in the paper), or one pose for all.
 
-A piece holds the fits of some frames (`evaluation.tables.resumable`): a run that was killed goes on where it was, to
-the same bits.
+A piece holds the fits of some frames (`evaluation.tables.resumable`): a killed run continues from the last saved
+piece, and its results are the same bits.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from ipman_rs.files import atomic_write, regular_file, write_whole
 from ..data import keypoints
 from ..data.keypoints.detections import Detections, join
 from . import data_frames, photo, presented, start
-from .config import Config, weighs
-from .data_frames import World
-from .detected import too_little
+from .config import Config, uses_terms
+from .data_frames import FitToWorld
+from .detection_problem import missing_keypoints
 from .fit import fit
-from .landmarks import known
+from .landmarks import landmark_names
 from .problem import Problem
-from .result import Result, parameters, results
+from .result import FitResult, fit_results, parameters
 from .terms.measured_shape import DENSITY
 from .variables import full_pose
 
@@ -52,8 +52,8 @@ Progress = Callable[[int], None]
 
 
 @dataclass(frozen=True)
-class Paper:
-    """What the paper fits of a data set, and the table of `ipman evaluate` that holds it."""
+class PaperFit:
+    """The paper's fit of a data set: preset, split, and the table of `ipman evaluate` that reports it."""
 
     preset: str
     split: str
@@ -62,13 +62,13 @@ class Paper:
 
 
 PAPER = {
-    "moyo": Paper("ipman-o", "val", "moyo", {"frames": "selected", "camera": 1}),
-    "rich": Paper("ipman-o-star", "ipman-test", "rich-o-star"),
+    "moyo": PaperFit("ipman-o", "val", "moyo", {"frames": "selected", "camera": 1}),
+    "rich": PaperFit("ipman-o-star", "ipman-test", "rich-o-star"),
 }
 
 
 def source_of(name: str, path: str, split: str | None, options: Mapping[str, str | float]) -> Source:
-    """A data set; what is not said is as in the paper, if it fits that data set."""
+    """A data set; settings that are not given are the paper's, if the paper fits that data set."""
     paper = PAPER.get(name)
     if paper is None:
         return Source(name, path, split, tuple(options.items()))
@@ -76,8 +76,8 @@ def source_of(name: str, path: str, split: str | None, options: Mapping[str, str
 
 
 @dataclass(frozen=True)
-class Seen:
-    """A frame with what a detector saw of its person, and its world."""
+class DetectedFrame:
+    """A frame with the keypoints detected in it and the gender of its body model."""
 
     frame: Frames
     detections: Detections
@@ -129,7 +129,7 @@ class DataFit(Resumable):
 
     @cached_property
     def imitates(self) -> bool:
-        return weighs(self.config, "presented_pose", "presented_contact")
+        return uses_terms(self.config, "presented_pose", "presented_contact")
 
     def begin(self) -> None:
         """Makes the folder. ValueError where it holds other fits, or something that all frames need is missing."""
@@ -142,7 +142,7 @@ class DataFit(Resumable):
         if first.cameras is None and not self.config.moves_camera:
             raise ValueError(f"{self.source.name}: has no cameras here, and the preset needs them")
         self._presented_to_all(body)
-        if weighs(self.config, "measured_shape") and self.height is None and self.mass is None:
+        if uses_terms(self.config, "measured_shape") and self.height is None and self.mass is None:
             self.size(first)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.check_folder(self.folder, "fits of other options")
@@ -223,9 +223,9 @@ class DataFit(Resumable):
         columns = {name: np.array([row[name] for row in kept]) for name in (kept[0] if kept else ())}
         return {**columns, "left_out": np.array([*lost], np.str_), "why": np.array([*lost.values()], np.str_)}
 
-    def _seen(self, frames: Sequence[Frames]) -> tuple[list[Seen], dict[str, str]]:
+    def _seen(self, frames: Sequence[Frames]) -> tuple[list[DetectedFrame], dict[str, str]]:
         """The frames with keypoints, and why others are left out."""
-        seen: list[Seen] = []
+        seen: list[DetectedFrame] = []
         left_out: dict[str, str] = {}
         with ExitStack() as opened:
             detect: Callable[[Path], Detections] | None = None
@@ -239,9 +239,9 @@ class DataFit(Resumable):
                             raise ValueError("has no keypoints and no image")
                         detect = detect or opened.enter_context(photo.detector())
                         found = detect(self.images / str(frame.images[0]))
-                    there = known(self.model(self._gender(frame)))
+                    there = landmark_names(self.model(self._gender(frame)))
                     shared = [name for name in found.names if name in there]
-                    why = too_little(shared, found.select(shared).confidence[0])
+                    why = missing_keypoints(shared, found.select(shared).confidence[0])
                     if why is not None or found.image_size is None:
                         raise ValueError(why or "the size of its image is not known")
                 except ImportError as error:
@@ -250,7 +250,7 @@ class DataFit(Resumable):
                 except ValueError as error:
                     left_out[name] = str(error)
                     continue
-                seen.append(Seen(frame, found, self._gender(frame)))
+                seen.append(DetectedFrame(frame, found, self._gender(frame)))
         return seen, left_out
 
     def _keypoints(self, frame: Frames) -> Detections | None:
@@ -270,26 +270,26 @@ class DataFit(Resumable):
             raise ValueError(f"{place}: expected the keypoints of one frame, got {len(found)} images")
         return found
 
-    def _fitted(self, seen: Sequence[Seen], gender: str) -> Iterator[dict[str, Any]]:
+    def _fitted(self, seen: Sequence[DetectedFrame], gender: str) -> Iterator[dict[str, Any]]:
         body = self.model(gender)
         frames = [each.frame for each in seen]
         shown, worlds = self._presented(frames, body)
-        sizes = [self.size(frame) for frame in frames] if weighs(self.config, "measured_shape") else None
+        sizes = [self.size(frame) for frame in frames] if uses_terms(self.config, "measured_shape") else None
         model = ipt.BodyModel(body)
         problem = data_frames.problem_of(model, frames, join([each.detections for each in seen]), worlds, sizes)
         if shown is not None:
             problem = presented.present(problem, shown, self.config.moves_camera)
-        problem, variables = start.begin(problem, self.config.start)
+        problem, variables = start.initial_state(problem, self.config.start)
         found = fit(problem, variables, self.config)
-        for row, result in enumerate(results(found, self.config, variables)):
+        for row, result in enumerate(fit_results(found, self.config, variables)):
             contacts = len(shown[row].contact) if shown is not None else 0
             yield self._row(result, problem, worlds[row], seen[row], contacts)
 
     def _presented(
         self, frames: Sequence[Frames], body: BodyModel
-    ) -> tuple[list[presented.PresentedBody] | None, list[World]]:
+    ) -> tuple[list[presented.PresentedBody] | None, list[FitToWorld]]:
         """The presented pose of each frame, if the preset imitates one, and the worlds of the fits."""
-        whole = [World.of(frame) for frame in frames]
+        whole = [FitToWorld.of(frame) for frame in frames]
         shown = self._presented_to_all(body)
         if shown is not None:
             return [shown] * len(frames), [_on_floor(world, frame, shown.floor(body), self.config.moves_camera)
@@ -321,7 +321,9 @@ class DataFit(Resumable):
         height = float(np.ptp(resting[:, 1])) if self.height is None else self.height
         return height, DENSITY * volume if self.mass is None else self.mass
 
-    def _row(self, result: Result, problem: Problem, world: World, seen: Seen, contacts: int) -> dict[str, Any]:
+    def _row(
+        self, result: FitResult, problem: Problem, world: FitToWorld, seen: DetectedFrame, contacts: int
+    ) -> dict[str, Any]:
         body = problem.body.body
         variables = result.candidate.variables
         arrays = {**parameters(body, variables), "full_pose": full_pose(variables, body).numpy()}
@@ -381,10 +383,10 @@ class DataFit(Resumable):
         return record
 
 
-def _on_floor(world: World, frame: Frames, floor: float, stays: bool) -> World:
+def _on_floor(world: FitToWorld, frame: Frames, floor: float, stays: bool) -> FitToWorld:
     """The world moved up or down, so that a presented body that stays stands on the data set's floor."""
     height = world.floor(frame)
-    return world if height is None or not stays else World(world.turn, np.array([0.0, height - floor, 0.0]))
+    return world if height is None or not stays else FitToWorld(world.turn, np.array([0.0, height - floor, 0.0]))
 
 
 def _check_camera(frame: Frames, stays: bool) -> None:

@@ -1,4 +1,4 @@
-"""Frames of a data set as a fit knows them, and the way back: fits live in worlds with y up, data sets in their own.
+"""Frames of a data set in the fit's axes, and fits back in the data set's: a fit's world has y up.
 
 A data set's world is turned so that its ground's normal is y. Where the body stays in the presented frame (IPMAN-O)
 it is moved, too, so that the presented body has its root joint where the fit's parameters have it: R^b = I, t^b = 0.
@@ -22,9 +22,9 @@ from ipman_rs.evaluation.tables.models import FrameBodies
 
 from ..data.keypoints.detections import Detections
 from .camera import Camera
-from .detected import shared_names
+from .detection_problem import shared_names
 from .landmarks import Landmarks
-from .presented import PresentedBody, of_pose, touching
+from .presented import PresentedBody, presented_body, self_touching_vertices
 from .presented_files import y_up
 from .problem import Problem
 from .start import level_camera
@@ -37,14 +37,14 @@ OTHERWISE = ("neck", "head", "head_top", "pelvis", "thorax", "spine", "jaw")
 
 
 @dataclass(frozen=True)
-class World:
-    """The way from the fit's world to the data set's: X = Rᵀ (x + shift), R the turn (3, 3)."""
+class FitToWorld:
+    """Transformation from the fit's world to the data set's: X = Rᵀ (x + shift), R the rotation `turn` (3, 3)."""
 
     turn: Array
     shift: Array  # (3,) m
 
     @classmethod
-    def of(cls, frame: Frames) -> World:
+    def of(cls, frame: Frames) -> FitToWorld:
         """Of one frame, whose body is not moved. Without a ground up is the camera's."""
         normal = np.array([0.0, 1.0, 0.0])
         if frame.ground is not None:
@@ -104,7 +104,7 @@ def image_size(frame: Frames) -> Array | None:
     return None if frame.cameras is None else 2 * np.asarray(frame.cameras.intrinsics[0], float)[:2, 2]
 
 
-def presented_of(frame: Frames, own: FrameBodies, body: BodyModel) -> tuple[PresentedBody, World]:
+def presented_of(frame: Frames, own: FrameBodies, body: BodyModel) -> tuple[PresentedBody, FitToWorld]:
     """The recorded pose of one frame, presented to `body`, and the world in which its root joint is the body's.
 
     own: the data set's own body of that frame. If it is of the same model, the presented floor is the data set's, and
@@ -113,19 +113,19 @@ def presented_of(frame: Frames, own: FrameBodies, body: BodyModel) -> tuple[Pres
     if frame.pose is None or own.joints is None:
         raise ValueError(f"{frame.names[0]}: no recorded pose to present")
     same = frame.body == body.kind
-    whole = World.of(frame)
+    whole = FitToWorld.of(frame)
     pose = _on_joints(np.asarray(frame.pose, float), body, frame.body)[0]
     pose[0] = (Rotation.from_matrix(whole.turn) * Rotation.from_rotvec(pose[0])).as_rotvec()
     betas = np.asarray(frame.betas, float)[0, : body.num_betas] if same and frame.betas is not None else None
-    contact = touching(body, pose, betas)
+    contact = self_touching_vertices(body, pose, betas)
     name = str(frame.names[0])
     shift = whole.turn @ np.asarray(own.joints[0, 0], float) - body.J_template[0]
     floor = whole.floor(frame)
     if floor is not None and not same:
         lowest = float(np.asarray(body(pose).vertices)[:, 1].min())
         shift[1] = floor - lowest
-    found = of_pose(name, pose, body, contact, "mesh", None if floor is None else floor - float(shift[1]))
-    return found, World(whole.turn, shift)
+    found = presented_body(name, pose, body, contact, "mesh", None if floor is None else floor - float(shift[1]))
+    return found, FitToWorld(whole.turn, shift)
 
 
 def _on_joints(pose: Array, body: BodyModel, kind: str | None) -> Array:
@@ -138,7 +138,7 @@ def problem_of(
     body: ipt.BodyModel,
     frames: Sequence[Frames],
     seen: Detections,
-    worlds: Sequence[World],
+    worlds: Sequence[FitToWorld],
     sizes: Sequence[tuple[float, float]] | None,
 ) -> Problem:
     """The fit of people, one each of the frames. sizes: their height, m, and mass, kg, or None."""
@@ -169,7 +169,7 @@ def problem_of(
     )
 
 
-def _camera(frame: Frames, world: World, size: Array) -> tuple[Array, Array, Array, Array]:
+def _camera(frame: Frames, world: FitToWorld, size: Array) -> tuple[Array, Array, Array, Array]:
     """focal (2,), center (2,), rotation (3, 3) and translation (3,) in the fit's world."""
     if frame.cameras is None:
         level = np.asarray(level_camera())
@@ -183,7 +183,7 @@ def _camera(frame: Frames, world: World, size: Array) -> tuple[Array, Array, Arr
     return intrinsics[[0, 1], [0, 1]], intrinsics[:2, 2].copy(), rotation, np.nan_to_num(translation)
 
 
-def prediction(row: dict[str, Any], world: World, body: BodyModel) -> dict[str, Any]:
+def prediction(row: dict[str, Any], world: FitToWorld, body: BodyModel) -> dict[str, Any]:
     """A fitted body, row (`result.Result.arrays`), as `ipman evaluate` reads it: pose (J, 3), betas, transl (3,)."""
     betas = row["betas"][0]
     root = body.J_template[0] + body.J_shapedirs[0, :, : len(betas)] @ betas

@@ -17,7 +17,7 @@ from .candidate import Candidate
 from .config import Config, Stage
 from .objective import Objective
 from .problem import Problem
-from .solvers import SOLVERS, Look, Outcome, minimise
+from .solvers import SOLVERS, Evaluation, Outcome, minimise
 from .solvers.outcome import CONVERGED
 from .variables import Variables, pack, unpack
 
@@ -26,7 +26,7 @@ CHUNK = 64  # bodies side by side: beyond, nothing gets faster and the Jacobian 
 
 @dataclass(frozen=True)
 class StageReport:
-    """How a stage went, an entry a body: reason (`solvers.Outcome`), iterations, and the terms' weighted costs.
+    """How a stage went, one entry per body: reason (`solvers.Outcome`), iterations, and the terms' weighted costs.
 
     `variables` are those that it ended with. `trace` has the costs of each body's successive best points, start and end
     included, if they were asked for.
@@ -42,7 +42,7 @@ class StageReport:
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted bodies: their variables (rows a body) and how each stage went."""
+    """Fitted bodies: their variables (one row per body) and how each stage went."""
 
     problem: Problem
     variables: Variables
@@ -76,26 +76,26 @@ def fit(
     with one_thread():
         for stage in config.stages:
             if stage.find_ground and not known:
-                problem = on_the_ground(problem, variables)
-            problem = judged(problem, variables)
+                problem = with_ground_under_body(problem, variables)
+            problem = with_static_mask(problem, variables)
             variables, report = run_stage(problem, variables, stage, config.terms, progress, trace)
             reports.append(report)
     return Fit(problem, variables, reports)
 
 
-def on_the_ground(problem: Problem, variables: Variables) -> Problem:
+def with_ground_under_body(problem: Problem, variables: Variables) -> Problem:
     """The problem with a level ground under the lowest vertex of each body."""
     with torch.no_grad():
         return replace(problem, ground=ipt.Ground.under(Candidate(problem, variables).vertices))
 
 
-def judged(problem: Problem, variables: Variables) -> Problem:
-    """The problem with the judgement which bodies are static now; the same where no ground is known."""
+def with_static_mask(problem: Problem, variables: Variables) -> Problem:
+    """Copy of the problem with `static` recomputed from the current bodies; unchanged if the ground is unknown."""
     if problem.ground is None:
         return problem
     with torch.no_grad():
         vertices = Candidate(problem, variables).vertices
-        return replace(problem, static=static_gate.static(vertices, problem.body.template, problem.ground))
+        return replace(problem, static=static_gate.static_mask(vertices, problem.body.template, problem.ground))
 
 
 def run_stage(
@@ -133,7 +133,7 @@ class _Shrinking:
         self.objective = objective
         self.best: list[list[tuple[float, np.ndarray]]] = [[] for _ in self.bodies]
 
-    def __call__(self, bodies: Sequence[int], points: np.ndarray) -> list[Look]:
+    def __call__(self, bodies: Sequence[int], points: np.ndarray) -> list[Evaluation]:
         if 2 * len(bodies) <= len(self.bodies):
             self.bodies, self.objective = bodies, self.whole.rows(bodies)
         place = [self.bodies.index(body) for body in bodies]

@@ -15,7 +15,7 @@ Indices = NDArray[np.integer]
 
 
 class Geodesics:
-    """Which vertices of a template are more than `limit` metres apart; found once a vertex, when it is asked for."""
+    """Which vertices of a template are more than `limit` metres apart; computed once per vertex, on first use."""
 
     def __init__(self, template: BodyTemplate, limit: float):
         edges = np.concatenate([template.faces[:, [i, (i + 1) % 3]] for i in range(3)])

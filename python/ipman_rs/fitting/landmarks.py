@@ -41,7 +41,7 @@ class Landmarks:
         sites: Mapping[str, Point] | None = None,
     ):
         full, sites = body.body, sites or {}
-        self.names = known(full, sites) if names is None else tuple(names)
+        self.names = landmark_names(full, sites) if names is None else tuple(names)
         skin: dict[str, Site | Inner] = {
             name: Site(vertex) for name, vertex in skin_points(full).items() if name not in full.joint_names
         }
@@ -92,7 +92,7 @@ class Landmarks:
         return torch.cat([betas, betas.new_zeros(len(betas), self.num_betas - betas.shape[1]), expression], dim=1)
 
 
-def known(body: BodyModel, sites: Iterable[str] = ()) -> tuple[str, ...]:
+def landmark_names(body: BodyModel, sites: Iterable[str] = ()) -> tuple[str, ...]:
     """All names that a body has."""
     return tuple(dict.fromkeys([*body.joint_names, *MIDPOINTS, *skin_points(body), *sites]))
 

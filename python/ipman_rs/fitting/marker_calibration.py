@@ -1,4 +1,4 @@
-"""Where the markers of one person really are: moved on the body to where its fits see them on average."""
+"""Calibration of marker places: each marker is moved on the body to its mean place over fits of one person."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FARTHEST = 5  # spreads: a marker that would have to move more was mixed up
 STEPS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
-def calibrated(
+def calibrate_sites(
     body: ipt.BodyModel,
     sites: Mapping[str, Point],
     bodies: tuple[Tensor, Tensor, Tensor],
@@ -50,7 +50,7 @@ def calibrated(
 
 
 def certainty(site: Point) -> float:
-    """What a marker weighs against one whose place on the body is known to its radius: 1 / σ², at most 1."""
+    """A marker's weight relative to one whose place on the body is known to within its radius: 1 / σ², at most 1."""
     return 1.0 if isinstance(site, str) else min(1.0, (RADIUS / site.spread) ** 2)
 
 

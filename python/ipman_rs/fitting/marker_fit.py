@@ -18,6 +18,7 @@ from torch import Tensor
 import ipman_rs.torch as ipt
 from ipman_rs.data import judge
 from ipman_rs.data.check import Finding
+from ipman_rs.renamed import old_names
 
 from ..body.sites import FEWEST_POINTS
 from ..data import markers
@@ -28,28 +29,28 @@ from .camera import Camera
 from .config import Config, load
 from .fit import Fit
 from .landmarks import Landmarks
-from .marker_calibration import calibrated, certainty
+from .marker_calibration import calibrate_sites, certainty
 from .problem import Problem
 from .sequence import fit_sequence
-from .start import at_points
+from .start import start_at_points
 
-WEIGHED = 8  # bodies
-POSES = 24  # of the recording, spread over it, that say where the markers are
+WEIGHED = 8  # bodies whose mass is checked, about
+POSES = 24  # frames, evenly spaced over the recording, from which the markers' places are calibrated
 
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """What stays of somebody from one recording to the next: the shape (1, b), and where the markers are."""
+    """What recordings of one person share: the shape (1, b), and the places of the markers."""
 
     betas: Tensor
     sites: Mapping[str, markers.Point]
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
-    """The fit of T frames. `tracks` are their known markers (M), at these `sites` of the body; `unknown` are those that
-    nobody knows the place of, `unseen` those that are in the file and were never seen. `meanings`: of the tracks'
-    names."""
+class MarkerFit:
+    """The fit of T frames. `tracks` are the M markers with known places, the `sites` on the body; `unknown` are the
+    names of markers without a known place, `unseen` those of markers in the file that were never observed.
+    `meanings`: of the tracks' names."""
 
     fit: Fit
     tracks: markers.Tracks
@@ -95,7 +96,7 @@ def fit_tracks(
     person: Person | None = None,
     own: Mapping[str, Meaning | None] | None = None,
     progress: Callable[[str, int], None] | None = None,
-) -> Recorded:
+) -> MarkerFit:
     """Fit every `every`-th frame, by the preset `markers` unless another is given, on the laboratory's floor at y =
     `ground` m.
 
@@ -121,20 +122,22 @@ def fit_tracks(
         sites |= {name: site for name, site in person.sites.items() if name in sites}
         config = _shape_kept(config)
     else:
-        some = frames(tracks, np.unique(np.linspace(0, len(tracks) - 1, min(POSES, len(tracks))).round().astype(int)))
+        some = select_frames(
+            tracks, np.unique(np.linspace(0, len(tracks) - 1, min(POSES, len(tracks))).round().astype(int))
+        )
         betas, sites = _calibrated(body, some, sites, ground, config, calibrate, progress)
-    tracks = frames(tracks, np.arange(0, len(tracks), every))
+    tracks = select_frames(tracks, np.arange(0, len(tracks), every))
     problem = problem_of(body, tracks, sites, ground)
-    start = at_points(problem)
+    start = start_at_points(problem)
     if betas is not None:
         start["betas"] = betas.expand(len(tracks), -1).clone()
     rate = tracks.rate or 1.0
     found = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
-    return Recorded(found, tracks, sites, unknown, unseen, markers.meanings(tracks.names, own))
+    return MarkerFit(found, tracks, sites, unknown, unseen, markers.meanings(tracks.names, own))
 
 
-def judged_fit(recorded: Recorded) -> list[Finding]:
-    """What it says of the fit: the markers' mean distance from their places, and the person's mass."""
+def check_fit(recorded: MarkerFit) -> list[Finding]:
+    """Findings about the fit: the markers' mean distance from their places, and the person's mass."""
     with torch.no_grad():
         vertices = recorded.fit.candidate.vertices[:: max(1, len(recorded.tracks) // WEIGHED)]
         mass = np.asarray(ipt.mass_properties(vertices, recorded.fit.problem.body.template).mass)
@@ -162,12 +165,12 @@ def _calibrated(
     variables: dict[str, Tensor] | None = None
     for _ in range(times):
         problem = problem_of(body, tracks, sites, ground)
-        start = at_points(problem) if variables is None else variables
+        start = start_at_points(problem) if variables is None else variables
         found = fit_sequence(problem, start, config, smoothness=0, progress=progress)
         variables = dict(found.variables)
         bodies = found.candidate.full_pose, variables["betas"], variables["transl"]
         points, confidence = torch.from_numpy(tracks.points), torch.from_numpy(tracks.confidence)
-        sites = calibrated(body, sites, bodies, points, confidence)
+        sites = calibrate_sites(body, sites, bodies, points, confidence)
     return None if variables is None else variables["betas"][:1], sites
 
 
@@ -195,6 +198,9 @@ def problem_of(
     )
 
 
-def frames(tracks: markers.Tracks, index: NDArray[np.integer]) -> markers.Tracks:
+def select_frames(tracks: markers.Tracks, index: NDArray[np.integer]) -> markers.Tracks:
     """These frames of a recording."""
     return replace(tracks, points=tracks.points[index], confidence=tracks.confidence[index], times=tracks.times[index])
+
+
+__getattr__ = old_names(__name__, {"Recorded": "MarkerFit", "judged_fit": "check_fit"})

@@ -55,10 +55,10 @@ def boxes() -> Iterator[Callable[[str | os.PathLike[str], NDArray[np.uint8]], Bo
     ImportError without the extra. The function raises ValueError, with the name, for an image without a person.
     """
     with _model() as model:
-        yield lambda path, pixels: around(_detections(path, *_landmarks(model, path, pixels)).points[0])
+        yield lambda path, pixels: box_around(_detections(path, *_landmarks(model, path, pixels)).points[0])
 
 
-def around(points: Array) -> Box:
+def box_around(points: Array) -> Box:
     """The box of a body whose landmarks (N, 2) these are."""
     low, high = points.min(axis=0), points.max(axis=0)
     margin = AROUND * (high - low).max()

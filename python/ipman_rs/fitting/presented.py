@@ -87,7 +87,7 @@ def load(
             raise ValueError(
                 f"pose {name}: is a named pose, of which there is one: leave out --pose-frame and --pose-up"
             )
-        return of_pose(str(name), poses.pose_of(body, str(name)), body, given)
+        return presented_body(str(name), poses.pose_of(body, str(name)), body, given)
     path = Path(name)
     if path.suffix.lower() not in ENDINGS:
         if path.exists():
@@ -98,10 +98,10 @@ def load(
     found = presented_files.read(path, body, frame, up)
     contact_from = "file" if given is None else "given"
     known = found.contact if given is None else given
-    return of_pose(str(path), found.pose, body, known, contact_from, found.height, found.notes)
+    return presented_body(str(path), found.pose, body, known, contact_from, found.height, found.notes)
 
 
-def of_pose(
+def presented_body(
     source: str,
     pose: NDArray[np.floating],
     body: BodyModel,
@@ -112,14 +112,16 @@ def of_pose(
 ) -> PresentedBody:
     """A pose (J, 3) in a world with y up; contact is found on the mean body where it is not known."""
     if contact is None:
-        contact, contact_from = touching(body, pose), "mesh"
+        contact, contact_from = self_touching_vertices(body, pose), "mesh"
     notes = [*notes]
     if not len(contact):
         notes.append(f"pose {source}: nothing touches in it, so presented_contact is left out")
     return PresentedBody(source, np.asarray(pose, float), contact, contact_from, height, tuple(notes))
 
 
-def touching(body: BodyModel, pose: NDArray[np.floating], betas: Array | None = None) -> NDArray[np.int64]:
+def self_touching_vertices(
+    body: BodyModel, pose: NDArray[np.floating], betas: Array | None = None
+) -> NDArray[np.int64]:
     """The vertices that touch another part of the same body in a pose, found by the self-contact engine."""
     vertices = np.asarray(body(pose, betas).vertices, float)
     return np.flatnonzero(np.isfinite(ip.self_contact_distance(vertices, body.template, NEAR, GEODESIC)))

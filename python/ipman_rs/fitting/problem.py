@@ -1,4 +1,4 @@
-"""What is known before a fit: the body model, what was observed of each body, and where ground and camera are."""
+"""The input of a fit: the body model, the observations of each body, ground and camera."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ from torch import Tensor
 from ipman_rs.body import pose_arrays
 from ipman_rs.body.model import BodyModel
 from ipman_rs.jsonable import jsonable
+from ipman_rs.renamed import old_names
 
 from .candidate import Candidate
 from .config import Config
@@ -30,7 +31,7 @@ FAR = 99.0  # m from the camera: where the start gives up
 
 
 @dataclass(frozen=True)
-class Result:
+class FitResult:
     """One fitted body, a candidate of one row; its variables before the physics terms (None: no stage has any); and how
     each stage went, as plain values.
     """
@@ -118,12 +119,12 @@ class Result:
         return flags
 
 
-def results(fit: Fit, config: Config, start: Variables) -> list[Result]:
+def fit_results(fit: Fit, config: Config, start: Variables) -> list[FitResult]:
     """The bodies of a fit that began with `start`, one by one."""
     before = _before_physics(fit, config, start)
     converged = fit.converged
     return [
-        Result(
+        FitResult(
             Candidate(fit.problem.rows(torch.tensor([row])), _row(fit.variables, row)),
             None if before is None else _row(before, row),
             [_stage(stage, row) for stage in fit.stages],
@@ -164,3 +165,6 @@ def _row(variables: Variables, row: int) -> dict[str, Tensor]:
 
 def _array(value: Tensor) -> NDArray[Any]:
     return value.detach().numpy().copy()
+
+
+__getattr__ = old_names(__name__, {"Result": "FitResult", "results": "fit_results"})

@@ -6,7 +6,7 @@
 2. Every stage together. One Levenberg-Marquardt for the whole recording: own pose and place of every frame, one shape,
    and the smoothness, which ties each frame to the next two. Its Hessian is a band with a border (`solvers.arrow`), so
    an iteration is as long as the recording, and nothing is alternated. Presets of another solver are solved like this,
-   too. Some 0.4 MB a frame.
+   too. It takes about 0.4 MB per frame.
 
 The ground, where it is not known and a stage asks for it, lies level at the median over the frames of the lowest
 vertex: a person who jumps now and then does not move it.
@@ -27,10 +27,10 @@ from ipman_rs.checks import not_negative
 
 from ..torch.threads import one_thread
 from .config import Config, Stage
-from .fit import CHUNK, Fit, StageReport, judged, on_the_ground, run_stage
+from .fit import CHUNK, Fit, StageReport, run_stage, with_ground_under_body, with_static_mask
 from .objective import Objective
 from .problem import Problem
-from .solvers import Look, Options, minimise
+from .solvers import Evaluation, Options, minimise
 from .solvers.arrow import Arrow, solve
 from .solvers.levenberg import levenberg
 from .terms.smoothness import Smoothness
@@ -66,10 +66,10 @@ def fit_sequence(
         for number, stage in enumerate(config.stages):
             if stage.find_ground and not known:
                 problem = on_one_ground(problem, variables)
-            problem = judged(problem, variables)
+            problem = with_static_mask(problem, variables)
             if number == 0:
                 variables = warm_start(problem, variables, stage, config, rate, done, progress)
-            together = Together(problem, variables, stage, config, smooth)
+            together = SequenceObjective(problem, variables, stage, config, smooth)
             variables, report = together.solved(progress)
             reports.append(report)
     return Fit(problem, variables, reports)
@@ -77,7 +77,7 @@ def fit_sequence(
 
 def on_one_ground(problem: Problem, variables: Variables) -> Problem:
     """The problem with one level ground for all frames."""
-    each = on_the_ground(problem, variables).ground
+    each = with_ground_under_body(problem, variables).ground
     assert each is not None
     return replace(problem, ground=ipt.Ground(each.normal, each.height.nanmedian().expand(len(each.height))))
 
@@ -91,20 +91,20 @@ def warm_start(
     done: Tensor | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Tensor]:
-    """Every frame fitted by itself, beginning near a neighbour; what is shared is the same in all of them."""
+    """Fit every frame separately, starting from a neighbour's result; shared variables are equal in all frames."""
     frames = problem.num_bodies
     done = torch.zeros(frames, dtype=torch.bool) if done is None else done
     results = {name: value.clone() for name, value in variables.items()}
-    seed = int(done.int().argmax() if done.any() else seen(problem).argmax())
+    seed = int(done.int().argmax() if done.any() else observed_weight(problem).argmax())
     stage = replace(stage, solver="levenberg")
     own = tuple(name for name in stage.free if name not in SHARED)
 
     def fit_frames(index: Tensor, starts: Variables, free: tuple[str, ...]) -> None:
-        """From one start a frame, or from two, one half of the rows after the other."""
+        """From one start per frame; or from two, the second ones in the second half of the rows."""
         both = index.repeat(len(starts["pose"]) // len(index))
         found, report = run_stage(problem.rows(both), starts, replace(stage, free=free), config.terms)
         costs = np.nan_to_num(sum(report.terms.values()), nan=np.inf).reshape(-1, len(index))
-        costs[0, (seen(problem)[index] == 0).numpy()] = np.inf  # nothing speaks for the frame's own start
+        costs[0, (observed_weight(problem)[index] == 0).numpy()] = np.inf  # nothing speaks for the frame's own start
         winners = torch.from_numpy((len(costs) - 1 - costs[::-1].argmin(axis=0)) * len(index) + np.arange(len(index)))
         for name, value in found.items():
             results[name][index] = value[winners]
@@ -115,7 +115,7 @@ def warm_start(
     for name in SHARED:
         results[name][:] = results[name][seed].clone()
     ready = 1
-    for steps in rounds(seed, frames, max(1, round(KEY * rate))):
+    for steps in propagation_order(seed, frames, max(1, round(KEY * rate))):
         here, near = torch.tensor([step for step in steps if not done[step[0]]], dtype=torch.long).reshape(-1, 2).T
         if len(here) and own:
             starts = {name: torch.cat([value[here], value[near]]) for name, value in results.items()}
@@ -126,9 +126,10 @@ def warm_start(
     return results
 
 
-def rounds(seed: int, frames: int, stride: int) -> Iterator[list[tuple[int, int]]]:
-    """Frames to be fitted side by side, each with the frame whose result it begins from: every `stride`-th frame, one
-    after the other away from the seed, and then all the rest at once."""
+def propagation_order(seed: int, frames: int, stride: int) -> Iterator[list[tuple[int, int]]]:
+    """The order of the warm start: lists of frames that are fitted together, each with the frame it starts from.
+
+    First every `stride`-th frame, one after the other away from the seed, then all the others at once."""
     for direction in (1, -1):
         for frame in range(seed + direction * stride, frames if direction > 0 else -1, direction * stride):
             yield [(frame, frame - direction * stride)]
@@ -142,8 +143,8 @@ def rounds(seed: int, frames: int, stride: int) -> Iterator[list[tuple[int, int]
         yield rest
 
 
-def seen(problem: Problem) -> Tensor:
-    """(T,): how much of the body was observed in each frame."""
+def observed_weight(problem: Problem) -> Tensor:
+    """The summed confidence (T,) of the points observed in each frame."""
     total = torch.zeros(problem.num_bodies, dtype=torch.float64)
     for confidence in (problem.confidence, problem.confidence_3d):
         if confidence is not None:
@@ -151,7 +152,7 @@ def seen(problem: Problem) -> Tensor:
     return total
 
 
-class Together:
+class SequenceObjective:
     """The objective of a stage over a whole recording. A point is every frame's own numbers, then the shared ones.
 
     Frames that are not finite where the stage begins are left out: they follow their neighbours.
@@ -190,11 +191,11 @@ class Together:
         own = point[: self.frames * self.size].reshape(self.frames, self.size)
         return np.concatenate([own, np.tile(point[self.frames * self.size :], (self.frames, 1))], axis=1)
 
-    def looks(self, rows: np.ndarray) -> list[Look]:
+    def looks(self, rows: np.ndarray) -> list[Evaluation]:
         """Each frame by itself."""
         return [look for chunk, part in self.parts for look in part.models(rows[chunk.start : chunk.stop])]
 
-    def look(self, point: np.ndarray) -> Look:
+    def look(self, point: np.ndarray) -> Evaluation:
         """All frames, with the smoothness between them."""
         rows, own = self.rows(point), slice(None, self.size)
         looks = [look for look, sound in zip(self.looks(rows), self.sound, strict=True) if sound]
@@ -209,7 +210,7 @@ class Together:
         blocks[0] += hessian[:, own, own]
         arrow = Arrow(blocks, hessian[:, own, self.size :], hessian[:, self.size :, self.size :].sum(axis=0))
         whole = np.concatenate([gradient[:, own].ravel(), gradient[:, self.size :].sum(axis=0)])
-        return Look(value, whole, arrow)
+        return Evaluation(value, whole, arrow)
 
     def _add_smoothness(self, rows: np.ndarray, gradient: np.ndarray, hessian: np.ndarray, blocks: np.ndarray) -> float:
         """Its value; its gradient 2 J Q x, and 2 J Q Jᵀ: own numbers into `blocks`, the rest into `hessian`."""

@@ -21,10 +21,11 @@ import torch
 from torch import Tensor
 
 from ipman_rs.body.poses import NAMES, pose_of
+from ipman_rs.renamed import old_names
 
 from .camera import NEAREST
 from .config import Stage, search_of, search_options
-from .fit import on_the_ground, run_stage
+from .fit import run_stage, with_ground_under_body
 from .objective import Objective
 from .problem import Problem
 from .rotations import matrix, nearest, vector
@@ -48,15 +49,15 @@ DEEPEST = 100.0  # m
 TRIED = 8  # placed poses that are fitted for a few iterations
 
 
-def begin(problem: Problem, start: Mapping[str, Any]) -> tuple[Problem, dict[str, Tensor]]:
-    """Where a fit by a preset with this `start` begins: the problem, its ground known where the camera moves around the
-    body, and the variables. ValueError for an unknown option."""
+def initial_state(problem: Problem, start: Mapping[str, Any]) -> tuple[Problem, dict[str, Tensor]]:
+    """Problem and variables with which a fit begins, by a preset's `start`. If the camera moves around the body, the
+    returned problem has a ground. ValueError for an unknown option."""
     how, given = search_of(start), search_options(start)
     if how == "points":
-        return problem, at_points(problem)
+        return problem, start_at_points(problem)
     if how == "camera":
         if problem.ground is None:
-            problem = on_the_ground(problem, neutral(problem))
+            problem = with_ground_under_body(problem, neutral(problem))
         return problem, camera_around(problem, **given)
     return problem, (mean_before_camera if how == "mean" else before_camera)(problem, **given)
 
@@ -131,7 +132,7 @@ def camera_around(problem: Problem, yaws: int = 12, iterations: int = 12) -> dic
     return _best(problem, [neutral(problem)], yaws, free, iterations, moves_camera=True)
 
 
-def at_points(problem: Problem) -> dict[str, Tensor]:
+def start_at_points(problem: Problem) -> dict[str, Tensor]:
     """Variables with the mean body on its points in the world: in that named pose of `ipman_rs.body.poses` which comes
     nearest when it is moved and turned as a whole (Kabsch). Points that are not finite count as not seen."""
     if problem.points_3d is None:
@@ -272,3 +273,6 @@ def _roll(problem: Problem) -> Tensor:
     roll = torch.atan2(up[:, 0], -up[:, 1])
     known = _seen(problem)[:, ends].all(dim=1)
     return torch.where(known, (roll / (math.pi / 2)).round() * (math.pi / 2), 0.0)
+
+
+__getattr__ = old_names(__name__, {"begin": "initial_state", "at_points": "start_at_points"})

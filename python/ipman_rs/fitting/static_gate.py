@@ -1,4 +1,4 @@
-"""Which bodies stand still enough for balance and ground to mean anything: a jumping or tipping one is left alone."""
+"""Bodies in static contact, to which the balance and ground terms apply; jumping or tipping ones are exempt."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ REACH = 0.10  # m: a body whose lowest point is higher than this above the groun
 LEAN = 0.15  # m: a body whose centre of mass is further than this outside its base of support is falling
 
 
-def static(
+def static_mask(
     vertices: Tensor,
     template: BodyTemplate,
     ground: ipt.Ground,

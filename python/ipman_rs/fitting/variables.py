@@ -1,4 +1,4 @@
-"""What a fit may move: named blocks of numbers, a row a body, and the vector of the free ones that a solver sees.
+"""The variables of a fit: named blocks with one row per body, and the vector of the free ones for the solver.
 
 orient (B, 3)          the root's rotation vector, in the world
 pose (B, P, 3)         rotation vectors of the joints of body and hands, each relative to its parent

@@ -1,4 +1,4 @@
-"""The paper's figures, made again from any data: a picture as PNG and SVG, and the numbers in it.
+"""The paper's figures, reproduced from any data: a picture as PNG and SVG, and the numbers in it.
 
 from ipman_rs import paper_figures
 from ipman_rs.paper_figures import pull_gradient

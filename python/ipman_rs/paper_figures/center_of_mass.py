@@ -12,7 +12,7 @@ import ipman_rs as ip
 from ipman_rs import view
 from ipman_rs.quantities import Method
 from ipman_rs.view import cells, colors
-from ipman_rs.view.picture import camera_on
+from ipman_rs.view.picture import camera_around
 
 from .files import PaperFigure
 from .style import SERIES, WORDS, new_figure, show_pixels
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ipman_rs.study.camera import Camera
+    from ipman_rs.study.camera import ViewCamera
     from ipman_rs.view import Study
 
 Array = NDArray[np.floating]
@@ -103,7 +103,7 @@ def _apart(first: Array, second: Array, ground: ip.Ground) -> float:
 def _draw(study: Study, points: dict[Method, Array], binary: Array, numbers: dict[str, Any]) -> Figure:
     figure = new_figure(9.4, 6.2)
     places = figure.subplot_mosaic([["body", "ground"], ["body", "near"]], width_ratios=(1, 1.1))
-    camera = camera_on([study.vertices[0]], study, 62.0, 6.0, cells.box_of(CELL))
+    camera = camera_around([study.vertices[0]], study, 62.0, 6.0, cells.box_of(CELL))
     show_pixels(places["body"], _body_under(study, camera))
     places["body"].set_title(
         study.name, loc="left", size=WORDS + 2, weight="bold", color=colors.INK, parse_math=False
@@ -117,13 +117,15 @@ def _draw(study: Study, points: dict[Method, Array], binary: Array, numbers: dic
     return figure
 
 
-def _body_under(study: Study, camera: Camera) -> NDArray[np.uint8]:
+def _body_under(study: Study, camera: ViewCamera) -> NDArray[np.uint8]:
     """The body on its floor, pale enough that the marks inside it show."""
-    pixels = cells.scene(study, camera, CELL, lambda height: np.full((len(height), 3), colors.rgb("#e3e0dc")), False)
+    pixels = cells.scene_cell(
+        study, camera, CELL, lambda height: np.full((len(height), 3), colors.rgb("#e3e0dc")), False
+    )
     return (0.45 * 255 + 0.55 * pixels).astype(np.uint8)
 
 
-def _mark_body(axes: Axes, camera: Camera, study: Study, points: dict[Method, Array], binary: Array) -> None:
+def _mark_body(axes: Axes, camera: ViewCamera, study: Study, points: dict[Method, Array], binary: Array) -> None:
     scale = 2  # of the picture's pixels to the cell's
     com = points["pcom"]
     line = scale * camera.pixels(np.stack([com, study.ground.project(com)]))[0]

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.study.camera import Camera
+from ipman_rs.study.camera import ViewCamera
 from ipman_rs.view import Study, cells, colors
-from ipman_rs.view.picture import Box, camera_on
+from ipman_rs.view.picture import Box, camera_around
 
 from .estimated_people import Estimated, shared_names, studies
 from .files import PaperFigure
@@ -56,7 +56,7 @@ def comparison(
         table += [{"person": name, "method": title, **values} for title, values in about.items()]
         progress(number + 1)
     numbers = {"preset": preset, "methods": [title for title, _ in methods], "people": rows}
-    lines = [[name, title, words(about)] for name, each in rows.items() for title, about in each.items()]
+    lines = [[name, title, caption(about)] for name, each in rows.items() for title, about in each.items()]
     return PaperFigure("compare", figure, numbers, table=table, summary_table=(["person", "method", "stands"], lines))
 
 
@@ -113,20 +113,20 @@ def _draw_row(
     top = HEAD + number * (HEIGHT + LINE)
     first = next(iter(bodies.values()))
     box = _around(list(bodies.values()))
-    _place(figure, columns[0], top, cells.in_photo(first, box, CELL, body=False))
+    _place(figure, columns[0], top, cells.photo_cell(first, box, CELL, body=False))
     _write(figure, columns[0] + WIDTH / 2, top + HEIGHT + 0.4 * LINE, first.name, WORDS, colors.INK)
     for method, (title, study) in enumerate(bodies.items()):
         at = columns[1 + method * len(VIEWS) :]
-        _place(figure, at[0], top, cells.in_photo(study, box, CELL))
-        _place(figure, at[1], top, cells.scene(study, _from_side(study), CELL))
+        _place(figure, at[0], top, cells.photo_cell(study, box, CELL))
+        _place(figure, at[1], top, cells.scene_cell(study, _from_side(study), CELL))
         _place(figure, at[2], top, cells.floor_map(study, CELL))
         middle = at[0] + (len(VIEWS) * (WIDTH + GAP) - GAP) / 2
         good = colors.COP if about[title]["bose"] else "#c0392b"
-        _write(figure, middle, top + HEIGHT + 0.4 * LINE, words(about[title]), WORDS - 0.5, good)
+        _write(figure, middle, top + HEIGHT + 0.4 * LINE, caption(about[title]), WORDS - 0.5, good)
 
 
-def words(about: dict[str, Any]) -> str:
-    """One line of the figures of a body, in mm."""
+def caption(about: dict[str, Any]) -> str:
+    """One line of a body's measured quantities, in mm."""
     parts = [f"CoM–CoP {1e3 * about['com_cop_m']:.0f} mm"]
     if about["margin_m"] is None:
         parts += ["no contact"]
@@ -158,8 +158,8 @@ def _around(bodies: Sequence[Study]) -> Box:
     )
 
 
-def _from_side(study: Study) -> Camera:
-    return camera_on([np.asarray(study.vertices[0], np.float64)], study, 90.0, 4.0, cells.box_of(CELL))
+def _from_side(study: Study) -> ViewCamera:
+    return camera_around([np.asarray(study.vertices[0], np.float64)], study, 90.0, 4.0, cells.box_of(CELL))
 
 
 def _place(figure: Figure, left: float, top: float, pixels: Array) -> None:

@@ -35,15 +35,15 @@ class ImageWarning(UserWarning):
 
 @dataclass(frozen=True)
 class FittedFolder:
-    """The outputs of `ipman fit` or `ipman predict`, a folder a person. `photos`: where their photos are, if not where
-    they were; `body`: the model's file, unless it is an embedded one."""
+    """The outputs of `ipman fit` or `ipman predict`, one folder per person. `photos`: the folder of their photos,
+    if they were moved; `body`: the model's file, unless it is an embedded one."""
 
     path: Path
     photos: Path | None = None
     body: str | None = None
 
     def names(self) -> list[str]:
-        """Of the people, in the order of their folders. ValueError if there is nobody."""
+        """Names of the people, in the order of their folders. ValueError if there are none."""
         found = [record.parent.name for record in sorted(self.path.glob(f"*/{RECORD}"))] if self.path.is_dir() else []
         if not found and (self.path / PREDICTIONS).is_file():
             raise ValueError(

@@ -1,6 +1,6 @@
-"""What a figure leaves in a folder: NAME.png and NAME.svg, its numbers in NAME.json, and what they are made of.
+"""The files of a figure: NAME.png and NAME.svg, its numbers in NAME.json, and the data behind them.
 
-The same figure is written to the same bytes, and a file appears under its name when it is whole.
+The same figure is written to the same bytes, and a file gets its name when it is complete.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from ipman_rs.files import cell, write_whole
 from ipman_rs.jsonable import jsonable
-from ipman_rs.view.picture import settle
+from ipman_rs.view.picture import fix_layout
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,7 +45,7 @@ class PaperFigure:
 def write(figure: PaperFigure, folder: Path) -> list[Path]:
     """Writes the files of a figure, the picture first; their paths. OSError where the folder cannot be written."""
     folder.mkdir(parents=True, exist_ok=True)
-    settle(figure.picture, DPI)
+    fix_layout(figure.picture, DPI)
     contents = {"png": _picture(figure, "png"), "svg": _picture(figure, "svg")}
     record = json.dumps(
         jsonable({"figure": figure.name, **figure.numbers}), allow_nan=False, ensure_ascii=False, indent=1

@@ -18,7 +18,7 @@ from ipman_rs.data.frames import DataSet
 from ipman_rs.evaluation.tables.job import Source
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.files.errors import FileError
-from ipman_rs.study.from_file import Request, odd_sizes, on_ground, with_sizes
+from ipman_rs.study.from_file import Request, add_unit_warning, collect_unit_warnings, on_ground
 
 AS_IT_IS = Request()
 
@@ -87,7 +87,7 @@ def one_body(path: Path, frame: int = 0, request: Request = AS_IT_IS) -> Body:
         IndexError: it has no such frame.
     """
     try:
-        with odd_sizes() as sizes:
+        with collect_unit_warnings() as sizes:
             recording, template, ground, _ = on_ground(path, request)
     except (ValueError, TypeError) as error:
         raise FileError(path, str(error)) from error
@@ -95,4 +95,4 @@ def one_body(path: Path, frame: int = 0, request: Request = AS_IT_IS) -> Body:
     if frame >= count:
         raise IndexError(f"{path} has {count} frames, from 0; there is no frame {frame}")
     name = path.stem if count == 1 else f"{path.stem}, frame {frame}"
-    return Body(recording.vertices[frame], template, ground, name, with_sizes(recording.flags, sizes))
+    return Body(recording.vertices[frame], template, ground, name, add_unit_warning(recording.flags, sizes))

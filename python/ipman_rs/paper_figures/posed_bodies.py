@@ -1,4 +1,4 @@
-"""Posed bodies of a data set on their ground, a piece of the frames at a time."""
+"""Posed bodies of a data set on their ground, read piece by piece."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PIECE = 256  # frames
 Progress = Callable[[int], None]
 
 
-class Posed(NamedTuple):
+class PosedFrames(NamedTuple):
     """Some frames, their vertices (F, V, 3) m in finite numbers, the model whose faces these have, and their ground."""
 
     frames: Frames
@@ -29,7 +29,7 @@ class Posed(NamedTuple):
 
 def posed_bodies(
     name: str, data: DataSet, models: Models, rows: NDArray[np.integer], progress: Progress = lambda done: None
-) -> Iterator[Posed]:
+) -> Iterator[PosedFrames]:
     """The bodies of these frames of the data set `name`, those without a finite body left out.
 
     `progress` is called with the number of frames done. ValueError, naming the data set, where it has no ground, no
@@ -47,7 +47,7 @@ def posed_bodies(
         if len(kept):
             frames = frames[kept]
             assert frames.ground is not None
-            yield Posed(frames, bodies.vertices[kept], bodies.model, frames.ground)
+            yield PosedFrames(frames, bodies.vertices[kept], bodies.model, frames.ground)
         progress(done)
 
 

@@ -1,4 +1,4 @@
-"""The t-SNE of body poses of one or several data sets: near each other are poses that are alike.
+"""The t-SNE of body poses of one or several data sets: similar poses lie near each other.
 
 A pose is the rotation matrices of the 21 joints of the body that the SMPL family shares; where a body faces, its shape,
 hands and face do not count. Needs scikit-learn (the extra figures).
@@ -67,9 +67,9 @@ def of_data_set(name: str, data: DataSet, most: int = MOST, progress: Progress =
 def of_built_people(people: int, progress: Progress = lambda done: None) -> list[Poses]:
     """Poses of built people at rest, those of each family (standing, lunge, ...) by themselves: the "balanced" scenes
     of `ipman benchmark fit` from seed 0."""
-    from ipman_rs.synthetic.at_rest import draw_scenes
+    from ipman_rs.synthetic.at_rest import draw_people
 
-    scenes = draw_scenes(people, 0, progress=progress)
+    scenes = draw_people(people, 0, progress=progress)
     families: dict[str, list[int]] = {}
     for number, scene in enumerate(scenes):
         families.setdefault(scene.family, []).append(number)

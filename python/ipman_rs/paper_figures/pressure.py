@@ -20,7 +20,7 @@ from ipman_rs.data.frames import DataSet, PressureMaps
 from ipman_rs.evaluation import moyo, pressure_map
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.view import cells, colors
-from ipman_rs.view.picture import camera_on
+from ipman_rs.view.picture import camera_around
 
 from .files import PaperFigure
 from .posed_bodies import posed_bodies
@@ -38,7 +38,7 @@ PRESSED, FAINT = 0.1, 0.02  # of the largest: what presses, and what is left whi
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
+class MatBody:
     """One body (V, 3) m on a mat: what the mat measured there, `measured.values` (H, W), with its centre of pressure
     (3,) m, and the measured centre of mass (3,), NaN without one."""
 
@@ -51,7 +51,7 @@ class Pressed:
     mass: Array
 
 
-def of_data_set(name: str, data: DataSet, frame: str | int | None = None, models: Models | None = None) -> Pressed:
+def of_data_set(name: str, data: DataSet, frame: str | int | None = None, models: Models | None = None) -> MatBody:
     """A frame of a data set with a mat: of that name, of that number, or the one that the mat carries most.
 
     ValueError, naming the data set, without such a frame or without pressure maps; and as `posed_bodies`.
@@ -70,7 +70,7 @@ def of_data_set(name: str, data: DataSet, frame: str | int | None = None, models
     mass = np.full(3, np.nan) if some.center_of_mass is None else some.center_of_mass[0]
     map_ = PressureMaps(measured.values[0], measured.origin, measured.e1, measured.e2, measured.cell)
     vertices = np.asarray(posed.vertices[0], np.float64)
-    return Pressed(str(some.names[0]), vertices, posed.model, ground, map_, some.center_of_pressure[0], mass)
+    return MatBody(str(some.names[0]), vertices, posed.model, ground, map_, some.center_of_pressure[0], mass)
 
 
 def _row(name: str, data: DataSet, frame: str | int | None) -> int:
@@ -100,7 +100,7 @@ def _heaviest(name: str, data: DataSet) -> int:
     return best
 
 
-def pressure(pressed: Pressed, preset: str = "paper-r") -> PaperFigure:
+def pressure(pressed: MatBody, preset: str = "paper-r") -> PaperFigure:
     """The body with its pressure, its map on the mat's cells, and the measured map."""
     constants = ip.presets.get(preset)
     template = pressed.model.template
@@ -138,8 +138,8 @@ def pressure(pressed: Pressed, preset: str = "paper-r") -> PaperFigure:
     figure = new_figure(7.6, 4.0)
     wide = float(np.clip(np.ptp(columns) / np.ptp(rows), 0.35, 1.0))
     body, left, right = figure.subplots(1, 3, width_ratios=(CELL[0] / CELL[1], wide, wide))
-    camera = camera_on([pressed.vertices], study, 40.0, 14.0, cells.box_of(CELL))
-    show_pixels(body, cells.scene(study, camera, CELL))
+    camera = camera_around([pressed.vertices], study, 40.0, 14.0, cells.box_of(CELL))
+    show_pixels(body, cells.scene_cell(study, camera, CELL))
     for axes, key, points in (
         (left, "estimated", (mass, center)),
         (right, "measured", (pressed.mass, pressed.center)),
@@ -160,7 +160,7 @@ def pressure(pressed: Pressed, preset: str = "paper-r") -> PaperFigure:
     return PaperFigure("pressure", figure, numbers, maps, summary=[summary])
 
 
-def _estimated(pressed: Pressed, samples: Array, preset: Any) -> Array:
+def _estimated(pressed: MatBody, samples: Array, preset: Any) -> Array:
     """The protocol's map (H, W) of the body's samples, from 0 to 1."""
     rho = np.asarray(ip.pressure(pressed.vertices, pressed.model.template, pressed.ground, preset.alpha, preset.gamma))
     counts = np.asarray(pressure_map(samples, np.ones(len(rho)), pressed.measured))

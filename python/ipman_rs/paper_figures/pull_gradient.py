@@ -16,7 +16,7 @@ from ipman_rs import quantities, view
 from ipman_rs.arrays import Bodies
 from ipman_rs.checks import positive
 from ipman_rs.view import cells, colors
-from ipman_rs.view.picture import camera_on
+from ipman_rs.view.picture import camera_around
 
 from .files import PaperFigure
 from .style import SERIES, WORDS, new_figure, plot_style, show_pixels
@@ -159,8 +159,8 @@ def _moved_body(name: str, lift: float, paint: Any) -> Array:
     body = ip.load_body(name)
     vertices = ip.body.posed(body, POSE) + np.array([0.0, lift, 0.0])
     study = view.study(POSE, vertices, body.template, ip.Ground.y_up())
-    camera = camera_on([study.vertices[0]], study, 50.0, 8.0, cells.box_of(CELL))
-    return cells.scene(study, camera, CELL, paint, markers=False)
+    camera = camera_around([study.vertices[0]], study, 50.0, 8.0, cells.box_of(CELL))
+    return cells.scene_cell(study, camera, CELL, paint, markers=False)
 
 
 def _draw_bars(figure: Any, places: tuple[Axes, Axes], tops: tuple[float, float]) -> None:

@@ -79,10 +79,10 @@ def of_data_set(
 def of_built_people(people: int, preset: str = "paper-r", progress: Progress = lambda done: None) -> Losses:
     """L_stability of built people at rest, whose exact centre of mass lies over what they stand on: the "balanced"
     scenes of `ipman benchmark fit` from seed 0. Truth here, not an estimate."""
-    from ipman_rs.synthetic.at_rest import draw_scenes
+    from ipman_rs.synthetic.at_rest import draw_people
 
     constants = ip.presets.get(preset)
-    scenes = draw_scenes(people, 0, progress=progress)
+    scenes = draw_people(people, 0, progress=progress)
     found = [_losses(scene.vertices[None], scene.template, ip.Ground.y_up(), constants) for scene in scenes]
     names = np.array([f"{number:05d}/{scene.name}" for number, scene in enumerate(scenes)])
     values, touching = (np.concatenate(column) for column in zip(*found, strict=True))

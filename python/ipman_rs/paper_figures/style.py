@@ -1,4 +1,4 @@
-"""How the figures look: white paper, small sans-serif words, one colour for each series."""
+"""How the figures look: white paper, small sans-serif text, one colour for each series."""
 
 from __future__ import annotations
 

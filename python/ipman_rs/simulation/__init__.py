@@ -1,11 +1,12 @@
-"""Stiff bodies: how firmly they stand (`tip_test`), and what becomes of them when they are let go (`simulate`).
+"""Rigid bodies: how firmly they stand (`tip_test`), and whether they fall when they are dropped (`simulate`).
 
 `compare` says which of two methods has the more stable bodies.
 """
 
 from __future__ import annotations
 
-from .comparison import Comparison, Means, compare
+from ..renamed import old_names
+from .comparison import Means, MethodComparison, compare
 from .fall import ENGINES, VERDICT, Simulation, simulate
 from .tipping import FALLEN, TipTest, tip_test
 
@@ -13,7 +14,7 @@ __all__ = [
     "ENGINES",
     "FALLEN",
     "VERDICT",
-    "Comparison",
+    "MethodComparison",
     "Means",
     "Simulation",
     "TipTest",
@@ -21,3 +22,5 @@ __all__ = [
     "simulate",
     "tip_test",
 ]
+
+__getattr__ = old_names(__name__, {"Comparison": "MethodComparison"})

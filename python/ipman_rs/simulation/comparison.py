@@ -35,7 +35,7 @@ class Means(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Comparison:
+class MethodComparison:
     """bodies: how many were simulated by both methods; left_out: how many were not. times: (T,) s.
 
     stable: the share that stands, None where the simulations end before 2 s. displacement: T figures in metres.
@@ -50,7 +50,7 @@ class Comparison:
 
 def compare(
     first: Simulation, second: Simulation, level: float = 0.95, resamples: int = 10_000, seed: int = 0
-) -> Comparison:
+) -> MethodComparison:
     """Compare two methods body by body: row i of both simulations is the same person in the same frame.
 
     A body that one of the two has not simulated (in the air, not finite) is left out for both. Bodies are drawn as if
@@ -77,7 +77,7 @@ def compare(
     if first.has_verdict:
         stable = means(*((~run.fell()).reshape(-1).astype(float) for run in (first, second)))
     displacement = tuple(means(moved[0][:, k], moved[1][:, k]) for k in range(len(first.times)))
-    return Comparison(int(known.sum()), int((~known).sum()), first.times, stable, displacement)
+    return MethodComparison(int(known.sum()), int((~known).sum()), first.times, stable, displacement)
 
 
 def _means(first: NDArray[np.float64], second: NDArray[np.float64], level: float, resamples: int, seed: int) -> Means:

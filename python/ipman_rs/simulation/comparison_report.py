@@ -13,10 +13,10 @@ from ..evaluation.statistics.bootstrap import Interval
 from ..files import atomic_write
 from ..files.errors import FileError
 from ..jsonable import jsonable
-from ..view.picture import settle
-from . import VERDICT, Comparison, Means, Simulation, compare
+from ..view.picture import fix_layout
+from . import VERDICT, Means, MethodComparison, Simulation, compare
 from .comparison import MORE_STABLE_IN_THE_PAPER
-from .inputs import Bodies
+from .inputs import GroundedBodies
 from .report import Fall
 
 NAME = "comparison"
@@ -24,7 +24,7 @@ PNG_DPI = 130
 LONGEST = 48  # characters of a file's name in the picture
 
 
-def compare_falls(first: Fall, second: Fall) -> tuple[Comparison, Simulation, Simulation]:
+def compare_falls(first: Fall, second: Fall) -> tuple[MethodComparison, Simulation, Simulation]:
     """The comparison, and the simulations of the bodies that both have, row by row.
 
     Bodies are paired by their names where both files name them, else in their order. Raises FileError.
@@ -40,7 +40,7 @@ def compare_falls(first: Fall, second: Fall) -> tuple[Comparison, Simulation, Si
     return replace(found, left_out=found.left_out + alone), one, other
 
 
-def pairs(first: Bodies | Fall, second: Bodies | Fall) -> tuple[list[int], list[int], int]:
+def pairs(first: GroundedBodies | Fall, second: GroundedBodies | Fall) -> tuple[list[int], list[int], int]:
     """The rows of either, and how many bodies only one of the two has. Raises FileError where they cannot be paired."""
     if first.names is None or second.names is None:
         if first.count != second.count:
@@ -64,7 +64,7 @@ def _rows(run: Simulation, rows: Sequence[int]) -> Simulation:
     return Simulation(**{name: value if name in for_all else value[list(rows)] for name, value in columns.items()})
 
 
-def comparison_record(found: Comparison, first: Fall, second: Fall) -> dict[str, Any]:
+def comparison_record(found: MethodComparison, first: Fall, second: Fall) -> dict[str, Any]:
     """Plain values for JSON: metres, shares; null where there is no verdict or no interval."""
 
     def means(value: Means) -> dict[str, Any]:
@@ -94,7 +94,7 @@ def _percent(ratio: Interval) -> list[float]:
     return [100 * (value - 1) for value in ratio]
 
 
-def comparison_table(found: Comparison) -> tuple[list[str], list[list[str]]]:
+def comparison_table(found: MethodComparison) -> tuple[list[str], list[list[str]]]:
     """Head and lines."""
     head = ["", "A", "B", "A − B", "A / B"]
     if found.stable is None:
@@ -117,7 +117,7 @@ def _shown(interval: Interval, form: str, unit: str = "") -> str:
     return f"{mean}{unit}" if (low, high) == ("–", "–") else f"{mean} [{low}, {high}]{unit}"
 
 
-def comparison_lines(found: Comparison, first: Fall, second: Fall) -> list[str]:
+def comparison_lines(found: MethodComparison, first: Fall, second: Fall) -> list[str]:
     """What stands under the table."""
     left_out = f", {found.left_out} left out: not in both, or not simulated" if found.left_out else ""
     lines = [
@@ -157,7 +157,7 @@ def write_comparison(one: Simulation, other: Simulation, paths: tuple[Path, Path
     key = figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", fontsize=8, frameon=False)
     for text in key.get_texts():
         text.set_parse_math(False)
-    settle(figure, PNG_DPI)
+    fix_layout(figure, PNG_DPI)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": NAME}):
         with atomic_write(output / f"{NAME}.svg") as file:
             figure.savefig(file, format="svg", metadata={"Date": None})

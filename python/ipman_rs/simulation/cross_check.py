@@ -1,4 +1,4 @@
-"""Other engines than the built-in one, for comparison: what they are given, in axes of their own."""
+"""Simulation by other engines, for comparison with the built-in one; they get the bodies in axes of their own."""
 
 from __future__ import annotations
 

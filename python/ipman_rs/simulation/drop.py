@@ -1,4 +1,4 @@
-"""One body that is let go, as every engine takes it, and the same with z up for engines with axes of their own."""
+"""The input of an engine: one body to be dropped, and the same with z up for engines with axes of their own."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The test of a pose by simulation: stiff bodies are put on their ground and let go.
+"""The drop test: rigid bodies are placed on their ground and simulated under gravity.
 
-A stiff body touches a plane through its convex hull alone. Mass, centre of mass and inertia are the exact ones of the
+A rigid body touches a plane only with its convex hull. Mass, centre of mass and inertia are the exact ones of the
 mesh, never those of the hull. `shape="vhacd"` is the paper's mode, which decomposes the body into convex hulls first;
 that moves its soles by up to a voxel, so it is put on the lowest point of these hulls.
 """

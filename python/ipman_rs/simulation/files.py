@@ -12,7 +12,7 @@ from typing import Any
 from ..files.errors import FileError
 from ..progress import Progress, silent
 from ..study.from_file import Request
-from . import Comparison, Simulation
+from . import MethodComparison, Simulation
 from .comparison_report import (
     compare_falls,
     comparison_lines,
@@ -21,8 +21,8 @@ from .comparison_report import (
     pairs,
     write_comparison,
 )
-from .inputs import Bodies, read_bodies
-from .report import Fall, fall, write_falls
+from .inputs import GroundedBodies, read_bodies
+from .report import Fall, run_falls, write_falls
 
 AS_IT_IS = Request()
 OPTIONS = {
@@ -39,7 +39,7 @@ class Falls:
     falls: list[Fall] = field(default_factory=list)
     failures: list[FileError] = field(default_factory=list)
     flags: list[tuple[Path, Sequence[str]]] = field(default_factory=list)
-    compared: tuple[Comparison, Simulation, Simulation] | None = None  # of the first with the second
+    compared: tuple[MethodComparison, Simulation, Simulation] | None = None  # of the first with the second
 
     def record(self) -> str:
         """All numbers as JSON."""
@@ -78,7 +78,7 @@ class Falls:
         except FileError as error:
             self.failures.append(error)
 
-    def _read(self, path: Path, request: Request, progress: Progress) -> Bodies:
+    def _read(self, path: Path, request: Request, progress: Progress) -> GroundedBodies:
         bodies = read_bodies(path, request, progress)
         self.flags.append((path, bodies.flags))
         return bodies
@@ -102,7 +102,7 @@ def simulate_files(
     for path in paths:
         with result._reported():
             bodies = result._read(path, request, progress)
-            result.falls.append(fall(bodies, films, **{**OPTIONS, **options}, progress=progress))
+            result.falls.append(run_falls(bodies, films, **{**OPTIONS, **options}, progress=progress))
     return result
 
 
@@ -117,7 +117,7 @@ def compare_files(
     """Let the same people's bodies by two methods go, and compare them; nothing is simulated where they cannot be
     paired, which is among the failures. Arguments as of `simulate_files`; raises as it does."""
     result = Falls()
-    both: list[Bodies] = []
+    both: list[GroundedBodies] = []
     for each in (path, other):
         with result._reported():
             both.append(result._read(each, request, progress))
@@ -125,6 +125,6 @@ def compare_files(
         if not result.failures:
             pairs(*both)
             options = {**OPTIONS, **options}
-            result.falls += [fall(bodies, films, **options, progress=progress) for bodies in both]
+            result.falls += [run_falls(bodies, films, **options, progress=progress) for bodies in both]
             result.compared = compare_falls(*result.falls)
     return result

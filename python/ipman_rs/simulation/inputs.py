@@ -1,4 +1,4 @@
-"""The bodies that `ipman simulate` lets go: a file as `ipman analyze` reads it, predictions, or a folder of fits.
+"""The bodies that `ipman simulate` drops: a file as `ipman analyze` reads it, predictions, or a folder of fits.
 
 Predictions and fits bring a ground of their own; `--up` or `--ground` take its place.
 """
@@ -20,16 +20,16 @@ from ..files.errors import FileError
 from ..fitting.jobs.outputs import RECORD
 from ..io.recording import Recording
 from ..progress import Progress, silent
-from ..study.from_file import Request, odd_sizes, on_ground, with_sizes
+from ..study.from_file import Request, add_unit_warning, collect_unit_warnings, on_ground
 
 _BESIDE = ("names", "body", "model", "ground", "ground_normal", "ground_height")  # arrays beside the parameters
 PREDICTIONS = "predictions.npz"  # what `ipman predict --data` and `ipman fit --data` leave in their folder
 
 
 @dataclass(frozen=True)
-class Bodies:
+class GroundedBodies:
     """T bodies of a file on a ground, which is one for all or one for each. names: (T,) where they have any; flags:
-    what is odd about them."""
+    warnings about them."""
 
     path: Path
     recording: Recording
@@ -44,10 +44,10 @@ class Bodies:
         return len(self.recording.vertices)
 
 
-def read_bodies(path: Path, request: Request, progress: Progress = silent) -> Bodies:
-    """The bodies of a file or folder; what is odd about them stands in `flags`. Raises FileError."""
+def read_bodies(path: Path, request: Request, progress: Progress = silent) -> GroundedBodies:
+    """The bodies of a file or folder; warnings about them are in `flags`. Raises FileError."""
     try:
-        with odd_sizes() as sizes:
+        with collect_unit_warnings() as sizes:
             if path.is_dir() and not (path / PREDICTIONS).is_file():
                 found = _fits(path, request, progress)
             else:
@@ -56,10 +56,10 @@ def read_bodies(path: Path, request: Request, progress: Progress = silent) -> Bo
         raise FileError(path, str(error)) from error
     except MemoryError as error:
         raise FileError(path, "needs more memory than there is; simulate fewer frames at once") from error
-    return replace(found, flags=with_sizes(found.flags, sizes))
+    return replace(found, flags=add_unit_warning(found.flags, sizes))
 
 
-def _file(path: Path, request: Request, progress: Progress) -> Bodies:
+def _file(path: Path, request: Request, progress: Progress) -> GroundedBodies:
     arrays = _arrays(path) if path.suffix.lower() == ".npz" and path.is_file() and path.stat().st_size else {}
     request = _with_model(path, request, arrays)
     own = _own_ground(path, arrays, request.units) if request.up is None and request.ground is None else None
@@ -70,7 +70,7 @@ def _file(path: Path, request: Request, progress: Progress) -> Bodies:
     if "names" in arrays and arrays["names"].shape != (count,):
         raise FileError(path, f"names have shape {arrays['names'].shape}; expected one for each of {count} bodies")
     names = tuple(arrays["names"].astype(str).tolist()) if "names" in arrays else None
-    return Bodies(path, recording, template, ground, names, notes, recording.flags)
+    return GroundedBodies(path, recording, template, ground, names, notes, recording.flags)
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
@@ -83,7 +83,7 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def _with_model(path: Path, request: Request, arrays: dict[str, np.ndarray]) -> Request:
-    """With the body that the file names. One whose files are not included must be named by the user."""
+    """The request with the body model that the file names. Of one that is not included the user must name the file."""
     named = next((str(arrays[key]) for key in ("body", "model") if key in arrays), None)
     if request.model is not None or named is None:
         return request
@@ -110,7 +110,7 @@ def _own_ground(path: Path, arrays: dict[str, np.ndarray], metres: float) -> ip.
         raise FileError(path, str(error)) from error
 
 
-def _fits(folder: Path, request: Request, progress: Progress) -> Bodies:
+def _fits(folder: Path, request: Request, progress: Progress) -> GroundedBodies:
     """The bodies of a folder of `ipman fit`, in the order of their names."""
     items = [record.parent for record in sorted(folder.glob(f"*/{RECORD}"))]
     if not items:
@@ -130,7 +130,7 @@ def _fits(folder: Path, request: Request, progress: Progress) -> Bodies:
     normals = [np.broadcast_to(one.ground.normal, (count, 3)) for one, count in zip(each, counts, strict=True)]
     heights = [np.broadcast_to(one.ground.height, (count,)) for one, count in zip(each, counts, strict=True)]
     vertices = np.concatenate([np.asarray(one.recording.vertices[:]) for one in each])
-    return Bodies(
+    return GroundedBodies(
         folder,
         replace(first.recording, path=folder, vertices=vertices, seconds=None),
         first.template,

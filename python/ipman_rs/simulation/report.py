@@ -1,4 +1,4 @@
-"""The bodies of one file, tested and let go: the table, the records and the filmstrips of `ipman simulate`."""
+"""Tip test and simulated falls of the bodies of one file: table, records and filmstrips of `ipman simulate`."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from ..jsonable import jsonable
 from ..progress import Progress, silent
 from ..status import Status, status_names
 from ..study import Study, study
-from ..study.study import evenly, marked
+from ..study.study import evenly_spaced_frames, flagged_name
 from ..view.filmstrip import draw_filmstrip
 from . import FALLEN, VERDICT, Simulation, TipTest, simulate, tip_test
-from .inputs import Bodies
+from .inputs import GroundedBodies
 
 FRAMES = 6  # of a filmstrip
 
@@ -29,8 +29,8 @@ _UNKNOWN = Status.NON_FINITE | Status.NO_VOLUME | Status.NO_CONTACT | Status.NOT
 
 
 @dataclass(frozen=True)
-class Film:
-    """A fall in pictures: the frame of the file, poses (T, V, 3) and the seconds of each."""
+class FallFrames:
+    """The frames of one fall's filmstrip: the frame of the file, poses (T, V, 3) and the seconds of each."""
 
     frame: int
     study: Study
@@ -39,16 +39,16 @@ class Film:
 
 @dataclass(frozen=True)
 class Fall:
-    """The tip test of each of the T bodies of a file, what became of them (None where that was not asked for), films.
+    """The tip tests of the T bodies of a file, their simulation (None if not requested), and the filmstrips' frames.
 
-    names: of the bodies, where the file names them. flags: what is odd about them.
+    names: of the bodies, where the file names them. flags: warnings about them.
     """
 
     path: Path
     tip: TipTest
     run: Simulation | None
     notes: Sequence[str]
-    films: Sequence[Film]
+    films: Sequence[FallFrames]
     names: tuple[str, ...] | None = None
     flags: tuple[str, ...] = ()
 
@@ -97,13 +97,13 @@ class Fall:
         columns, stands, status = self._columns(), self.stands(), self.status()
         for frame in range(self.count):
             own = f" {frame}" if self.names is None else f" {self.names[frame]}"
-            name = marked(self.path.name + ("" if self.count == 1 else own), self.flags)
+            name = flagged_name(self.path.name + ("" if self.count == 1 else own), self.flags)
             unknown = status_names(status[frame] & _UNKNOWN)
             verdict = None if stands is None else ("yes" if stands[frame] else "no")
             yield name, [_number(value) for value in columns[:, frame]], ", ".join(unknown).lower() or verdict
 
     def summary(self) -> tuple[str, list[str], str | None]:
-        """Medians of those that are known."""
+        """Medians of the finite values."""
         known = (self.status() & _UNKNOWN) == 0
         if not known.any():
             return self._title(), ["–"] * len(self.titles()), None
@@ -114,11 +114,11 @@ class Fall:
         return self._title(), cells, share
 
     def _title(self) -> str:
-        return marked(f"{self.path.name} ({self.count} frames)", self.flags)
+        return flagged_name(f"{self.path.name} ({self.count} frames)", self.flags)
 
     def record(self) -> dict[str, Any]:
         """Plain numbers for JSON; of more than 10,000 frames evenly spaced ones."""
-        frames = evenly(self.count)
+        frames = evenly_spaced_frames(self.count)
         stands, status = self.stands(), self.status()
         known = (status & _UNKNOWN) == 0
         tip = {field.name: getattr(self.tip, field.name) for field in fields(TipTest) if field.name != "status"}
@@ -163,8 +163,8 @@ def _number(value: float) -> str:
     return f"{value:.2f}" if abs(value) < 10 else f"{value:.1f}" if abs(value) < 1000 else f"{value:.0f}"
 
 
-def fall(
-    bodies: Bodies,
+def run_falls(
+    bodies: GroundedBodies,
     films: int,
     engine: str,
     shape: str,
@@ -229,14 +229,16 @@ def _to_draw(result: Fall, most: int) -> list[int]:
     return sorted(set(known[np.linspace(0, len(known) - 1, most).round().astype(int)].tolist()))
 
 
-def _film(result: Fall, body: np.ndarray, frame: int, template: Any, ground: Any, options: dict[str, Any]) -> Film:
-    """The fall once more, looked at in even steps."""
+def _film(
+    result: Fall, body: np.ndarray, frame: int, template: Any, ground: Any, options: dict[str, Any]
+) -> FallFrames:
+    """The fall simulated once more, with outputs in even steps."""
     assert result.run is not None
     seconds = np.linspace(0.0, result.run.times[-1], FRAMES)
     run = simulate(body, template, ground, tuple(seconds), **options)
     labels = [f"{time:.2f} s" for time in run.times]
     name = result.path.stem if result.count == 1 else f"{result.path.stem} {frame}"
-    return Film(frame, study(name, run.posed(body), template, ground, labels=labels), tuple(run.times.tolist()))
+    return FallFrames(frame, study(name, run.posed(body), template, ground, labels=labels), tuple(run.times.tolist()))
 
 
 def write_falls(falls: Sequence[Fall], output: Path, record: str, progress: Progress = silent) -> None:

@@ -1,4 +1,4 @@
-"""Posed bodies as stiff solids, as the core's rows have them."""
+"""Posed bodies as rigid solids, in the core's layout."""
 
 from __future__ import annotations
 

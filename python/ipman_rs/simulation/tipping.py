@@ -1,4 +1,4 @@
-"""The tip test: how firmly a stiff body stands, without a simulation; microseconds a body.
+"""The tip test: how firmly a rigid body stands, without a simulation, in microseconds per body.
 
 The body stands on the hull of its vertices that are nearly as low as its lowest one. Over an edge of that hull, with
 the centre of mass at height h and s inside, it must be lifted by E = m g (√(h² + s²) − h) to tip over, and the angular

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from .camera import Camera, camera_of
+from ..renamed import old_names
+from .camera import ViewCamera, camera_of
 from .study import Fitted, Study, study
 
-__all__ = ["Camera", "Fitted", "Study", "camera_of", "study"]
+__all__ = ["Fitted", "Study", "ViewCamera", "camera_of", "study"]
+
+__getattr__ = old_names(__name__, {"Camera": "ViewCamera"})

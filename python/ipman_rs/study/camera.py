@@ -8,7 +8,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Camera:
+class ViewCamera:
     """Eye (3,), the axes right, up and back as rows (3, 3), focal length (or those of x and y) and centre in pixels."""
 
     eye: np.ndarray
@@ -40,7 +40,7 @@ def look_at(
     turn: float = 35.0,
     tilt: float = 16.0,
     field: float = 26.0,
-) -> Camera:
+) -> ViewCamera:
     """The camera that just fits ``points`` (N, 3) into the pixel ``box`` (left, top, right, bottom).
 
     ``turn`` degrees around the up axis from the body's front, ``tilt`` degrees above the horizon, vertical field of
@@ -66,11 +66,11 @@ def look_at(
         eye[k] = (plus - minus) / 2
         reach[k] = (plus + minus) / 2 / half[k]
     eye[2] = max(reach.max(), local[:, 2].max() + 1e-3)
-    return Camera(eye @ axes, axes, focal, ((left + end) / 2, (top + bottom) / 2))
+    return ViewCamera(eye @ axes, axes, focal, ((left + end) / 2, (top + bottom) / 2))
 
 
-def camera_of(rotation: np.ndarray, translation: np.ndarray, focal: np.ndarray, center: np.ndarray) -> Camera:
+def camera_of(rotation: np.ndarray, translation: np.ndarray, focal: np.ndarray, center: np.ndarray) -> ViewCamera:
     """The picture's camera of extrinsics R, t (x right, y down, z forward) and pixels."""
     axes = rotation * np.array([[1.0], [-1.0], [-1.0]])
     (fx, fy), (cx, cy) = focal, center
-    return Camera(-rotation.T @ translation, axes, (float(fx), float(fy)), (float(cx), float(cy)))
+    return ViewCamera(-rotation.T @ translation, axes, (float(fx), float(fy)), (float(cx), float(cy)))

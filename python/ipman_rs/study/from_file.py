@@ -28,7 +28,7 @@ from .study import Study, study
 
 Arrays = Mapping[str, np.ndarray]
 
-SAMPLED_VERTICES = 800_000  # of the bodies that are judged: 65 of the embedded one, a fraction of a second
+SAMPLED_VERTICES = 800_000  # of the bodies that are checked: 65 of the embedded one, a fraction of a second
 WEIGHED = 16  # bodies
 LISTED = 12  # names of arrays
 
@@ -54,26 +54,26 @@ _DEFAULT = Request()
 def analyze_file(
     path: Path, request: Request = _DEFAULT, progress: Progress = silent, arrays: Arrays | None = None
 ) -> Study:
-    """The study of the bodies in one file; what is odd about them stands in its flags.
+    """The study of the bodies in one file; warnings about them are in its flags.
 
     arrays: what an .npz file holds, by a caller that has just written it; then the file is not read.
 
     Raises:
         FileError: the file cannot be read, or what it holds cannot be a person (`Request.force` lets it in).
     """
-    with odd_sizes() as found:
+    with collect_unit_warnings() as found:
         try:
             analysed = _analyzed(path, request, progress, arrays)
         except (ValueError, TypeError) as error:
             raise FileError(path, str(error)) from error
         except MemoryError as error:
             raise FileError(path, "needs more memory than there is; analyse fewer frames at once") from error
-    return replace(analysed, flags=with_sizes(analysed.flags, found))
+    return replace(analysed, flags=add_unit_warning(analysed.flags, found))
 
 
 @contextmanager
-def odd_sizes() -> Iterator[list[str]]:
-    """What was said of bodies too large or too small for metres, instead of warnings."""
+def collect_unit_warnings() -> Iterator[list[str]]:
+    """Collects the `UnitsWarning`s about bodies too large or too small for metres as text, instead of warning."""
     said: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("ignore")
@@ -82,8 +82,8 @@ def odd_sizes() -> Iterator[list[str]]:
     said += [str(warning.message) for warning in caught]
 
 
-def with_sizes(flags: Sequence[str], sizes: Sequence[str]) -> tuple[str, ...]:
-    """The flags, with the first of the odd sizes where nothing is said of sizes yet."""
+def add_unit_warning(flags: Sequence[str], sizes: Sequence[str]) -> tuple[str, ...]:
+    """The flags, with the first unit warning unless a flag already concerns the vertices."""
     said = any(flag.startswith("vertices:") for flag in flags)
     return (*flags, *([] if said else sizes[:1]))
 
@@ -109,7 +109,7 @@ def on_ground(
     progress: Progress = silent,
     arrays: Arrays | None = None,
 ) -> tuple[Recording, Any, ip.Ground, list[str]]:
-    """The bodies of a file, judged, their template and ground, and what was assumed. Raises FileError.
+    """The bodies of a file, checked, their template and ground, and what was assumed. Raises FileError.
 
     own: the ground that the file itself gives. read_elsewhere: arrays of the file that the caller reads. arrays: as for
     `analyze_file`.

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .camera import Camera
+from .camera import ViewCamera
 
 # Frames of a long sequence that are drawn and whose pressure samples are stored.
 MAX_KEY_FRAMES = 48
@@ -32,7 +32,7 @@ class Fitted:
     `before` a study of one frame; `record` is shown in `report.json`.
     """
 
-    camera: Camera
+    camera: ViewCamera
     size: tuple[float, float]
     seen: np.ndarray
     projected: np.ndarray
@@ -105,7 +105,7 @@ class Study:
 
     def excerpt(self) -> Study:
         """The study of the listed frames: itself, if it is not long."""
-        frames = listed(self.numbers, self.key_frames)
+        frames = listed_frames(self.numbers, self.key_frames)
         if len(frames) == self.num_frames:
             return self
         return replace(
@@ -199,7 +199,7 @@ class _Table:
         self.num_frames, self.done = num_frames, 0
         self.numbers: dict[str, np.ndarray] = {}
         self.outlines: dict[int, np.ndarray] = {}
-        self._evenly = set(evenly(num_frames).tolist())
+        self._evenly = set(evenly_spaced_frames(num_frames).tolist())
 
     def add(self, part: Any) -> None:
         rows = slice(self.done, self.done + len(part.status))
@@ -235,17 +235,17 @@ def _outline(body: np.ndarray, template: Any, ground: Any, preset: str) -> np.nd
     return ip.analyze(body, template, ground, preset, with_pressure=False).base_of_support.polygon
 
 
-def evenly(num_frames: int) -> np.ndarray:
-    """All frames of a sequence that is not long, else evenly spaced ones, first and last included."""
+def evenly_spaced_frames(num_frames: int) -> np.ndarray:
+    """All frames of a short sequence, else evenly spaced ones, first and last included."""
     if num_frames <= MAX_LISTED_FRAMES:
         return np.arange(num_frames)
     return np.unique(np.linspace(0, num_frames - 1, MAX_LISTED_FRAMES).round().astype(np.int64))
 
 
-def listed(numbers: dict[str, np.ndarray], keys: np.ndarray) -> np.ndarray:
+def listed_frames(numbers: dict[str, np.ndarray], keys: np.ndarray) -> np.ndarray:
     """The frames that report.json and the page list: evenly spaced ones, the drawn and the pictured ones."""
     num_frames = len(numbers["status"])
-    chosen = evenly(num_frames)
+    chosen = evenly_spaced_frames(num_frames)
     return chosen if len(chosen) == num_frames else np.union1d(np.union1d(chosen, keys), _pictured(numbers))
 
 
@@ -266,6 +266,6 @@ def key_frames(num_frames: int, num_vertices: int) -> np.ndarray:
     return np.unique(np.linspace(0, num_frames - 1, most).round().astype(np.int64))
 
 
-def marked(name: str, flags: Sequence[str]) -> str:
-    """A name in a table, with a sign where something is odd; what it is stands below."""
+def flagged_name(name: str, flags: Sequence[str]) -> str:
+    """A name in a table, marked with ! if there are flags, which are listed below the table."""
     return f"{name} !" if flags else name

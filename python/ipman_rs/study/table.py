@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..files.errors import one_line
-from .study import Study, marked
+from .study import Study, flagged_name
 
 STUDIES = ("kg", "CoM–CoP mm", "margin mm", "BoS cm²", "contacts", "balance", "stable")
 FITS = ("item", "converged", "iterations", "error px", "error %", "CoM–CoP mm", "margin mm", "look")
@@ -33,7 +33,7 @@ def _rows(study: Study) -> Iterator[Row]:
 def _row(study: Study, frames: int | slice) -> Row:
     value = {key: np.atleast_1d(column[frames]) for key, column in study.numbers.items() if column.ndim == 1}
     single = isinstance(frames, int)
-    name = marked(study.label(frames) if single else f"{study.name} ({study.num_frames} frames)", study.flags)
+    name = flagged_name(study.label(frames) if single else f"{study.name} ({study.num_frames} frames)", study.flags)
     stable = value["bose"].astype(bool)
     if single:
         verdict = "yes" if stable[0] else ("no" if value["has_contact"][0] else "no contact")

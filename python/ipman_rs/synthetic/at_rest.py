@@ -1,8 +1,8 @@
 """People at rest on the floor y = 0, and the same people tipped over or in the air.
 
 A named pose (`ipman_rs.body.poses`) is perturbed joint by joint, and the stiff body is laid on the floor: of the facets
-of its convex hull over which its exact centre of mass lies, it rests on the one that needs the least tilt. Who would
-have to tilt too far, or does not stand by the samples within 1 cm of the floor, is drawn again.
+of its convex hull over which its exact centre of mass lies, it rests on the one that needs the least tilt. A
+body that would have to tilt too far, or is not supported by its samples within 1 cm of the floor, is drawn again.
 """
 
 from __future__ import annotations
@@ -41,8 +41,9 @@ TIPPED, RAISED = (15.0, 30.0), (0.15, 0.40)  # degrees, m
 
 
 @dataclasses.dataclass(frozen=True)
-class Scene:
-    """A posed person: body and template, full_pose (24, 3), transl (3,), and so vertices (V, 3) and joints (24, 3)."""
+class PosedPerson:
+    """A posed person: body model and template, full_pose (24, 3), transl (3,), and from these vertices (V, 3) and
+    joints (24, 3)."""
 
     person: BodyModel
     template: ip.BodyTemplate
@@ -60,9 +61,9 @@ class Scene:
         return np.asarray(self.person(self.full_pose, transl=self.transl).joints)
 
 
-def draw_scenes(
+def draw_people(
     count: int, seed: int, kind: str = "balanced", progress: Callable[[int], None] | None = None
-) -> list[Scene]:
+) -> list[PosedPerson]:
     """`count` people, the families in turn. The same seed draws the same people in the same poses for every kind:
     "balanced", "tipped" (standing families turned 15° to 30° about a level axis) or "jumping" (raised by 15 to 40 cm).
     """
@@ -71,27 +72,27 @@ def draw_scenes(
         draw = np.random.default_rng([seed, index])
         family = list(FAMILIES)[index % len(FAMILIES)] if kind == "balanced" else ("standing", "crouch")[index % 2]
         scene = at_rest(family, draw)
-        scenes.append(disturbed(scene, kind, draw))
+        scenes.append(disturb(scene, kind, draw))
         if progress is not None:
             progress(index + 1)
     return scenes
 
 
-def at_rest(family: str, draw: Draw) -> Scene:
+def at_rest(family: str, draw: Draw) -> PosedPerson:
     """A new person in one of the poses of a family. RuntimeError if none of many tries stands."""
     body = person(draw)
     names = FAMILIES[family]
     template = ip.BodyTemplate(body().vertices, body.faces, load_body("anny").face_parts, body.part_names)
     name = names[draw.integers(len(names))]
     for _ in range(TRIES):
-        pose = perturbed(poses.pose_of(body, name), body, draw)
+        pose = perturb(poses.pose_of(body, name), body, draw)
         settled = settle(pose, body, template)
         if settled is not None:
-            return Scene(body, template, family, name, *settled)
+            return PosedPerson(body, template, family, name, *settled)
     raise RuntimeError(f"{name}: none of {TRIES} tries came to rest within {FARTHEST_TILT:g} degrees")
 
 
-def perturbed(pose: Array, body: BodyModel, draw: Draw, spreads: tuple[float, float, float] = SPREADS) -> Array:
+def perturb(pose: Array, body: BodyModel, draw: Draw, spreads: tuple[float, float, float] = SPREADS) -> Array:
     most, legs, root = spreads
     spread = np.full(body.num_joints, most)
     for index, name in enumerate(body.joint_names):
@@ -105,7 +106,7 @@ def settle(pose: Array, body: Callable[[Array], BodyOutput], template: ip.BodyTe
     """The pose tilted onto the floor with its translation, or None if it would tip over. body: of a pose."""
     vertices = np.asarray(body(pose).vertices)
     com = np.asarray(ip.center_of_mass(vertices, template, "exact"))
-    tilt = to_rest(vertices, com)
+    tilt = rest_rotation(vertices, com)
     if tilt is None:
         return None
     pose = pose.copy()
@@ -116,7 +117,7 @@ def settle(pose: Array, body: Callable[[Array], BodyOutput], template: ip.BodyTe
     return (pose, transl) if margin >= 0 else None
 
 
-def to_rest(vertices: Array, com: Array) -> Rotation | None:
+def rest_rotation(vertices: Array, com: Array) -> Rotation | None:
     """The smallest turn that makes a facet of the hull under the centre of mass level, if it is small."""
     hull = ConvexHull(vertices)
     normals = hull.equations[:, :3]
@@ -125,18 +126,18 @@ def to_rest(vertices: Array, com: Array) -> Rotation | None:
     for facet in np.argsort(tilts):
         if tilts[facet] > FARTHEST_TILT:
             return None
-        if over(com, vertices[hull.simplices[facet]], normals[facet]):
+        if lies_over(com, vertices[hull.simplices[facet]], normals[facet]):
             return Rotation.align_vectors(down, normals[facet])[0]
     return None
 
 
-def over(point: Array, triangle: Array, normal: Array) -> bool:
+def lies_over(point: Array, triangle: Array, normal: Array) -> bool:
     """Whether a point lies over a triangle, seen along its normal."""
     sides = [normal @ np.cross(triangle[(i + 1) % 3] - triangle[i], point - triangle[i]) for i in range(3)]
     return bool(min(sides) >= 0 or max(sides) <= 0)
 
 
-def disturbed(scene: Scene, kind: str, draw: Draw) -> Scene:
+def disturb(scene: PosedPerson, kind: str, draw: Draw) -> PosedPerson:
     if kind == "jumping":
         return dataclasses.replace(scene, transl=scene.transl + [0.0, draw.uniform(*RAISED), 0.0])
     if kind == "tipped":

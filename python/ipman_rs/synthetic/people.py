@@ -35,10 +35,10 @@ PASSES, POWERS = 8, (0.7, 1.5)
 
 
 def person(draw: Draw) -> BodyModel:
-    """A body without betas of its own."""
+    """A copy of the body model of fixed shape, without betas."""
     model = load_body("anny")
     betas = (BETAS * draw.standard_normal(model.num_betas)).clip(-LARGEST_BETA, LARGEST_BETA)
-    vertices, joints = reshaped(model, betas, draw)
+    vertices, joints = reshape(model, betas, draw)
     shift = CENTRES * draw.standard_normal(joints.shape)
     shift[model.joint_names.index("pelvis")] = 0.0
     return dataclasses.replace(
@@ -48,16 +48,16 @@ def person(draw: Draw) -> BodyModel:
         shapedirs=np.zeros((model.num_vertices, 3, 0)),
         J_template=joints + shift,
         J_shapedirs=np.zeros((model.num_joints, 3, 0)),
-        weights=reweighted(model, draw),
+        weights=smooth_weights(model, draw),
     )
 
 
-def reshaped(model: BodyModel, betas: Array, draw: Draw) -> tuple[Array, Array]:
+def reshape(model: BodyModel, betas: Array, draw: Draw) -> tuple[Array, Array]:
     """Vertices (V, 3) and joints (J, 3) of the resting mesh."""
     vertices = model.v_template + model.shapedirs @ betas
     joints = model.J_template + model.J_shapedirs @ betas
     ends = main_children(model)
-    length, girth, bulge = factors(model, draw)
+    length, girth, bulge = bone_factors(model, draw)
     moved, along = joints.copy(), bones(joints, ends)
 
     def stretched(points: Array, joint: int, bulged: bool) -> Array:
@@ -92,7 +92,7 @@ def bones(joints: Array, ends: list[int]) -> Array:
     return joints[tips] - joints[starts]
 
 
-def factors(model: BodyModel, draw: Draw) -> tuple[Array, Array, Array]:
+def bone_factors(model: BodyModel, draw: Draw) -> tuple[Array, Array, Array]:
     """s, g and b (J,) of every bone."""
     kinds = [name.partition("_")[2] or name for name in model.joint_names]
     drawn = {kind: draw.standard_normal(3) for kind in dict.fromkeys(kinds)}
@@ -102,9 +102,9 @@ def factors(model: BodyModel, draw: Draw) -> tuple[Array, Array, Array]:
     return np.exp(spread * numbers[:, 0] + own[0]), np.exp(GIRTH * numbers[:, 1] + own[1]), BULGE * numbers[:, 2]
 
 
-def reweighted(model: BodyModel, draw: Draw) -> Array:
+def smooth_weights(model: BodyModel, draw: Draw) -> Array:
     """Skinning weights (V, J)."""
-    neighbours = neighbourhood(model)
+    neighbours = neighbour_mean(model)
     weights = model.weights
     for _ in range(draw.integers(PASSES + 1)):
         weights = neighbours @ weights
@@ -112,7 +112,7 @@ def reweighted(model: BodyModel, draw: Draw) -> Array:
     return weights / np.sum(weights, axis=1, keepdims=True)
 
 
-def neighbourhood(model: BodyModel) -> csr_array:
+def neighbour_mean(model: BodyModel) -> csr_array:
     """(V, V) sparse: the mean over a vertex and its neighbours."""
     edges = np.concatenate([model.faces[:, [i, (i + 1) % 3]] for i in range(3)])
     edges = np.concatenate([edges, edges[:, ::-1], np.tile(np.arange(model.num_vertices), (2, 1)).T])

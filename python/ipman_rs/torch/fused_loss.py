@@ -13,7 +13,7 @@ from torch import Tensor
 from torch._C._functorch import is_functorch_wrapped_tensor
 from torch.autograd import Function, forward_ad
 
-from ipman_rs import BodyTemplate, _core
+from ipman_rs import BodyTemplate
 from ipman_rs.quantities import Quantity
 
 from .arrays import memory
@@ -95,7 +95,8 @@ class WeightedTotal(Function):
 class Terms(Function):
     """vertices (B, V, 3) -> terms (K,), reduced, or (B, K).
 
-    The forward keeps the Jacobian, five numbers per vertex, from which a backward with any upstream gradient follows.
+    The forward keeps the Jacobian, from which a backward with any upstream gradient follows. It has three numbers per
+    vertex for each term, and one for each whose gradient is along the ground's normal, as those of pull and push are.
     """
 
     @staticmethod
@@ -114,7 +115,8 @@ class Terms(Function):
         if _is_differentiated(d_terms):
             return _vjp(ctx, vertices, torch.from_numpy(ctx.shares)[:, None] * d_terms), None, None, None
         follow_torch()
-        gradient = _core.terms_backward(ctx.jacobian, ctx.shares, memory(d_terms), ctx.ground[0])
+        handle = ctx.call.quantity.of(ctx.call.template)
+        gradient = handle.terms_backward(ctx.jacobian, ctx.shares, memory(d_terms), ctx.ground[0])
         return torch.from_numpy(gradient), None, None, None
 
 

@@ -1,4 +1,4 @@
-"""Stability, pull and push as one module: reduced, weighted, with invalid and broken bodies left out."""
+"""The terms of a preset as one module: reduced, weighted, with invalid and broken bodies left out."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from ipman_rs import BodyTemplate, presets, quantities
 from ipman_rs import Ground as NumpyGround
 from ipman_rs.checks import body_template, choice, not_negative
+from ipman_rs.presets import Preset
 from ipman_rs.quantities import Curve, Method, Points, Wrap
 
 from . import fused_loss
@@ -23,7 +24,8 @@ from .reduction import Pool, Reduction, mask
 class IntuitivePhysicsLoss(nn.Module):
     """The paper's loss terms (Eqs. 4, 6 and 7) over a batch of bodies on a ground.
 
-    preset: a name of ipman_rs.presets; "balanced" has "balance" in place of "stability".
+    preset: a name of ipman_rs.presets, or a Preset. The loss has the terms that it weighs: "stability", "pull" and
+        "push"; those of "balanced" are "balance", "pull" and "push".
     reduction: "mean" over the counted bodies, "sum", or "none" (one number a body, 0 for one that does not count).
     weights: {term: λ}; a term left out keeps its weight from the preset.
     points: where the ground terms are taken, "samples" or "vertices"; curve: "tanh_squared" or "tanh_of_square".
@@ -41,7 +43,7 @@ class IntuitivePhysicsLoss(nn.Module):
     def __init__(
         self,
         template: BodyTemplate,
-        preset: str = "paper-r",
+        preset: str | Preset = "paper-r",
         reduction: Reduction = "mean",
         weights: Mapping[str, float] | None = None,
         points: Points = "samples",
@@ -50,24 +52,23 @@ class IntuitivePhysicsLoss(nn.Module):
         wrap: Wrap = "log",
     ) -> None:
         super().__init__()
-        numbers = presets.get(preset)
+        numbers = preset if isinstance(preset, Preset) else presets.get(preset)
         self._quantity = quantities.physics_terms(numbers, method, points, curve, wrap)
-        self.terms = ("balance" if numbers.stability == "balance" else "stability", "pull", "push")
+        self.terms = quantities.numbers_of(quantities.terms_of(numbers))
+        self._quantity.of(body_template(template))  # which checks the options
 
-        body_template(template)
         if weights is not None and not isinstance(weights, Mapping):
             raise TypeError(f"weights: expected numbers by the names of terms, got {type(weights).__name__}")
         given = dict(weights or {})
         unknown = sorted(set(given) - set(self.terms), key=str)
         if unknown:
-            raise ValueError(
-                f"weights: preset {preset!r} has the terms {', '.join(self.terms)}, got {', '.join(map(str, unknown))}"
-            )
+            known = f"preset {numbers.name!r} has the terms {', '.join(self.terms)}"
+            raise ValueError(f"weights: {known}, got {', '.join(map(str, unknown))}")
         self.weights = {
             term: not_negative(f"weights: {term}", given.get(term, numbers.weights[term])) for term in self.terms
         }
         self.template = template
-        self.preset = preset
+        self.preset = numbers.name
         choice("reduction", reduction, Reduction)
         self.reduction: Reduction = reduction
 

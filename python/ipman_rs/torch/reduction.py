@@ -1,6 +1,6 @@
 """The reduction of a batch's loss terms, in torch operations, for every path but `fused_loss`.
 
-There the core does the same in the pass of the terms: `Pool` in rust/core/src/weighted.rs.
+There the core does the same in the pass of the terms: `Pool` in rust/core/src/reduction.rs.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ class Augmentation:
 
 
 @dataclass(frozen=True)
-class Augmenting:
+class AugmentConfig:
     """How strongly images are changed; the defaults are SPIN's.
 
     flip: probability. degrees, scale: standard deviations, cut at twice them; only `turned` of the images are turned at
@@ -82,7 +82,7 @@ def to_crop(box: Sequence[float], change: Augmentation) -> Array:
     return np.column_stack([linear, -linear @ [x + width / 2, y + height / 2]])
 
 
-def cut(image: Image.Image, box: Sequence[float], change: Augmentation, size: int) -> Pixels:
+def augmented_crop(image: Image.Image, box: Sequence[float], change: Augmentation, size: int) -> Pixels:
     """The augmented crop (size, size, 3), in the image's colours; black beyond the image."""
     whole = to_crop(box, change)
     shrink = max(1, int(2 / np.linalg.norm(whole[:, 0]) / size))  # image pixels under one of the crop
@@ -108,10 +108,10 @@ def normalised(pixels: Tensor, gains: Tensor) -> Tensor:
 def crop(image: Image.Image, box: Sequence[float], change: Augmentation, size: int) -> Tensor:
     """The augmented crop (3, size, size) as a network takes it."""
     gains = torch.tensor([change.gains], dtype=torch.float64)
-    return normalised(torch.from_numpy(cut(image, box, change, size))[None], gains)[0]
+    return normalised(torch.from_numpy(augmented_crop(image, box, change, size))[None], gains)[0]
 
 
-def follow(
+def augment_labels(
     labels: Mapping[str, Tensor], whole: Array, change: Augmentation, keypoints: Sequence[str], joints: Sequence[str]
 ) -> dict[str, Tensor]:
     """Labels of one person for the augmented crop: fields of `Batch`, less inputs.

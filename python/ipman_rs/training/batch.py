@@ -1,4 +1,4 @@
-"""What a training step is told: inputs, and labels of which any may be missing."""
+"""One training batch: inputs and labels; any label may be missing."""
 
 from __future__ import annotations
 

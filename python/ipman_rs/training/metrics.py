@@ -1,6 +1,6 @@
-"""The figures of estimated bodies in the world against true ones, an entry a body; metres where nothing is said.
+"""Metrics of estimated bodies in the world against true ones, one entry per body; in metres unless stated otherwise.
 
-NaN where there is no truth: errors and tilt need labelled parameters, what concerns the ground needs the world.
+NaN without ground truth: errors and tilt need labelled parameters, ground metrics need the world.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True, eq=False)
-class Figures:
+class PoseMetrics:
     """Errors: pelvis on pelvis. bose: the paper's, its centre of mass within the base of support at 10 cm, the hips
     where the true ones are. strict: the strict BoSE (`evaluation.bose`), but of the exact centre of mass. lowest: of
     the vertices above the floor. tilt: radians between true and estimated "up", seen from the pelvis."""
@@ -43,14 +43,14 @@ class Figures:
         np.savez_compressed(file, **vars(self))
 
     @classmethod
-    def load(cls, path: Path) -> Figures:
+    def load(cls, path: Path) -> PoseMetrics:
         with np.load(path, allow_pickle=False) as stored:
             return cls(**{field.name: stored[field.name] for field in dataclasses.fields(cls)})
 
 
 @torch.no_grad()
-def figures(estimate: Estimate, truth: Batch, posing: Posing) -> Figures:
-    """Of estimates for inputs that were not augmented, whose labels are true."""
+def pose_metrics(estimate: Estimate, truth: Batch, posing: Posing) -> PoseMetrics:
+    """Metrics of estimates for inputs that were not augmented and have true labels."""
     estimate, truth = _on_cpu(estimate), truth.to("cpu")
     posing = posing.to("cpu")
     known = Estimate(_columns(truth.pose), truth.betas, estimate.camera)
@@ -61,7 +61,7 @@ def figures(estimate: Estimate, truth: Batch, posing: Posing) -> Figures:
     strict = bose(vertices, template, ground, bose_mode="strict", method="exact")
     errors = body_errors(vertices, joints, true_vertices, true_joints)
     body, world = truth.has_body.numpy(), truth.has_world.numpy()
-    return Figures(
+    return PoseMetrics(
         mpjpe=np.where(body, errors.mpjpe.numpy(), np.nan),
         pa_mpjpe=np.where(body, errors.pa_mpjpe.numpy(), np.nan),
         pve=np.where(body, errors.pve.numpy(), np.nan),
@@ -98,8 +98,8 @@ COLUMNS = {
 }  # fmt: skip
 
 
-def columns(figures: Figures) -> dict[str, Array]:
-    """The figures as tables show them, an entry a body: millimetres, degrees, and shares as 0 or 100 %."""
+def columns(figures: PoseMetrics) -> dict[str, Array]:
+    """The metrics in the units of the tables, one entry per body: millimetres, degrees, and shares as 0 or 100 %."""
     return {
         "MPJPE": 1e3 * figures.mpjpe,
         "PA-MPJPE": 1e3 * figures.pa_mpjpe,

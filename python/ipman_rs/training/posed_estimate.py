@@ -1,4 +1,4 @@
-"""Estimates as bodies: surface, joints and the keypoints that images have labels of."""
+"""Estimates as posed bodies: surface, joints, and the keypoints for which images have labels."""
 
 from __future__ import annotations
 

@@ -23,12 +23,12 @@ from ipman_rs.data import DataSet
 from .augment import ROOM, Augmentation, crop, to_crop
 from .batch import Batch
 from .model import HMR
-from .model.build import made
+from .model.build import build_model
 from .model.keypoint_encoder import KEYPOINTS
 from .model.trained_weights import read_trained
 from .posed_estimate import HIPS, REGRESSED_HIPS, Posing, check_regressor
 from .sources import BadSample, Images
-from .trainer.config import Config, config
+from .trainer.config import Config, config_of
 
 Array = NDArray[np.floating]
 
@@ -49,7 +49,7 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Trained:
+class TrainedModel:
     """A regressor of images, its configuration, and its body."""
 
     model: HMR
@@ -57,14 +57,14 @@ class Trained:
     posing: Posing
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Trained:
+    def load(cls, path: str | os.PathLike[str]) -> TrainedModel:
         """A checkpoint of `ipman train`. ValueError, naming the file, for another file or a regressor of keypoints."""
         told, weights = read_trained(path)
-        settings = config(told)
+        settings = config_of(told)
         if settings.model.backbone == "keypoints":
             raise ValueError(f"{path}: this regressor sees keypoints, not images")
         posing = Posing(ipt.BodyModel(settings.body), KEYPOINTS)
-        model = made(settings, posing.body.body, start=False)
+        model = build_model(settings, posing.body.body, start=False)
         model.load_state_dict(weights)
         return cls(model.eval(), settings, posing)
 

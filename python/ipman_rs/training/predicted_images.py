@@ -22,7 +22,7 @@ from ipman_rs.io import write_mesh
 from ipman_rs.progress import Progress, silent
 from ipman_rs.study import Fitted, Study, camera_of, study
 
-from .predict import Trained as Trained
+from .predict import TrainedModel as TrainedModel
 
 Box = tuple[float, float, float, float]  # x, y, width, height in pixels
 BoxOf = Callable[[Path, NDArray[np.uint8]], Box]  # of an image's path and pixels (h, w, 3)
@@ -36,7 +36,7 @@ def whole_image(path: Path, pixels: NDArray[np.uint8]) -> Box:
 
 
 def predict_images(
-    trained: Trained,
+    trained: TrainedModel,
     paths: Sequence[Path],
     output: Path,
     box_of: BoxOf = whole_image,
@@ -72,7 +72,7 @@ def predict_images(
 
 
 def predict_data_set(
-    trained: Trained,
+    trained: TrainedModel,
     name: str,
     path: Path,
     output: Path,
@@ -86,7 +86,7 @@ def predict_data_set(
 
     Args:
         images: the folder in which the paths of the data set's images begin.
-        regressor: SPIN's J_regressor_extra.npy; None: the one that the training was told. See `Trained.of_data_set`.
+        regressor: SPIN's J_regressor_extra.npy; None: that of the training. See `TrainedModel.of_data_set`.
 
     Raises:
         ValueError: the data set cannot be read, no image is left, or the regressor does not fit.
@@ -106,7 +106,7 @@ def predict_data_set(
 
 
 def _predict_image(
-    trained: Trained, path: Path, box_of: BoxOf, output: Path, pictured: bool, focal: float | None, pitch: float
+    trained: TrainedModel, path: Path, box_of: BoxOf, output: Path, pictured: bool, focal: float | None, pitch: float
 ) -> Study:
     """The analysed body of one image, whose files are written. FileError if it cannot be read or has an empty box."""
     try:

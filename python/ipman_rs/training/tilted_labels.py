@@ -1,8 +1,9 @@
-"""Labels whose gravity leans, as pseudo labels' does; images, cameras and ground stay true.
+"""Labels of bodies that are tilted, like those of pseudo labels; images, cameras and ground stay true.
 
 A lean of d degrees turns the labelled body, parameters and joints, about a level axis through its pelvis by d ± 5/8 d
-degrees (standard deviation, not below 0), drawn once an image. The lean is towards the camera: depth is what fits to
-images get wrong, and a regressor learns what all its labels have in common. Or it is any way, which averages out.
+degrees (standard deviation, not below 0), drawn once per image. The lean is towards the camera, because fits to
+images err in depth, and a regressor learns the error that all its labels share; or in any direction, which averages
+out.
 """
 
 from __future__ import annotations
@@ -18,25 +19,25 @@ from torch import Tensor
 from ipman_rs.body import rotations
 
 from .batch import Batch
-from .world import seen_from
+from .world import world_to_camera
 
 Array = NDArray[np.floating]
-Lean = Literal["camera", "any"]
+TiltAxis = Literal["camera", "any"]
 
 SPREAD = 5 / 8  # of the mean angle
 
 
-def leaning(batch: Batch, degrees: float, seed: int, lean: Lean = "camera") -> Batch:
-    """The batch with leaning labels. Image k of all leans have the same numbers drawn; 0 degrees change nothing."""
+def tilt_labels(batch: Batch, degrees: float, seed: int, lean: TiltAxis = "camera") -> Batch:
+    """The batch with tilted labels. Image k draws the same numbers for every angle; 0 degrees change nothing."""
     if degrees == 0:
         return batch
-    seen = seen_from(batch).double()
+    seen = world_to_camera(batch).double()
     up = batch.up.double()
     turn = seen @ torch.from_numpy(_turns(seen.numpy(), up.numpy(), degrees, lean, seed)) @ seen.transpose(1, 2)
     return dataclasses.replace(batch, pose=_turned_root(batch.pose, turn), joints=_turned(batch.joints, turn))
 
 
-def _turns(seen: Array, up: Array, degrees: float, lean: Lean, seed: int) -> Array:
+def _turns(seen: Array, up: Array, degrees: float, lean: TiltAxis, seed: int) -> Array:
     """(n, 3, 3) turns about level axes of the world, for cameras (n, 3, 3)."""
     draw = np.random.default_rng(seed)
     heading = draw.uniform(0, 2 * np.pi, len(seen))

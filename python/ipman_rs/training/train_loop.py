@@ -1,4 +1,4 @@
-"""A training run in a loop of twenty lines: what is compared gets the same batches in the same order."""
+"""A training loop for ablations: all compared runs see identical batches in the same order."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LARGEST = 5000.0
 
 
 @dataclass(frozen=True)
-class Drill:
+class TrainingPlan:
     """steps of Adam on batches of `size`; the rate falls from `rate` to a tenth of it along half a cosine."""
 
     steps: int
@@ -27,10 +27,12 @@ class Drill:
     size: int = 64
 
 
-def drill(model: nn.Module, loss: Callable[[Batch], Tensor], data: Batch, noisy: Noisy, plan: Drill, seed: int) -> None:
-    """Train in place. Which images a step draws, and their noise, depend on the seed and the step alone."""
+def run_plan(
+    model: nn.Module, loss: Callable[[Batch], Tensor], data: Batch, noisy: Noisy, plan: TrainingPlan, seed: int
+) -> None:
+    """Train the model in place. A step's images and their noise depend only on the seed and the step."""
     optimizer = torch.optim.Adam(model.parameters(), lr=plan.rate)
-    schedule = falling(optimizer, plan.rate, plan.steps)
+    schedule = cosine_decay(optimizer, plan.rate, plan.steps)
     generator = torch.Generator().manual_seed(seed)
     model.train()
     for _ in range(plan.steps):
@@ -50,13 +52,15 @@ def clip_gradient(model: nn.Module, largest: float) -> None:
         model.zero_grad(set_to_none=True)
 
 
-def falling(optimizer: torch.optim.Optimizer, rate: float, steps: int) -> torch.optim.lr_scheduler.CosineAnnealingLR:
+def cosine_decay(
+    optimizer: torch.optim.Optimizer, rate: float, steps: int
+) -> torch.optim.lr_scheduler.CosineAnnealingLR:
     """From `rate` to a tenth of it along half a cosine, in `steps`."""
     return torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps, eta_min=rate / 10)
 
 
 @torch.no_grad()
-def estimated(model: HMR, inputs: Tensor) -> Estimate:
+def estimate_all(model: HMR, inputs: Tensor) -> Estimate:
     """Estimates of all inputs."""
     model.eval()
     parts = [model(part) for part in inputs.split(AT_ONCE)]

@@ -1,8 +1,8 @@
 """Estimated bodies in the world, where the ground is known.
 
-The orientation follows from the camera, R_w = Rᵀ R_c. Where the body stands cannot be told from a crop to within
-centimetres, so, as in the authors' code, the middle of its hips is put where the true one is: "on the ground" then
-judges the legs and the tilt, not the depth. (The paper instead has t_w = −t_c + t_cw.)
+The orientation follows from the camera, R_w = Rᵀ R_c. A crop does not determine to within centimetres where the
+body stands, so, as in the authors' code, the middle of its hips is placed at the true one: the ground terms then
+depend on the legs and the tilt, not on the depth. (The paper instead has t_w = −t_c + t_cw.)
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def to_world(points: Tensor, hips: Tensor, batch: Batch) -> Tensor:
     return turned + (side * batch.hips)[:, None]
 
 
-def seen_from(batch: Batch) -> Tensor:
+def world_to_camera(batch: Batch) -> Tensor:
     """World to camera (B, 3, 3) of the augmented images: of the mirrored world where they are flipped."""
     count = len(batch)
     origin = batch.camera.new_zeros(count, 3)

@@ -1,4 +1,4 @@
-"""Small pictures without words, for the cells of a figure: pixels (height, width, 3) uint8."""
+"""Small pictures without text, for the cells of a figure: pixels (height, width, 3) uint8."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..study.camera import Camera
+from ..study.camera import ViewCamera
 from . import colors
 from .fitted import in_front
 from .floor import draw_map
-from .picture import Box, Paint, draw_body, draw_markers, draw_scene, heat_top, new_page
+from .picture import Box, Paint, draw_body, draw_markers, draw_scene, new_page, pressure_scale_top
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,8 +28,8 @@ def box_of(size: tuple[int, int]) -> Box:
     return _MARGIN * width, _MARGIN * height, (1 - _MARGIN) * width, (1 - _MARGIN) * height
 
 
-def scene(
-    study: Study, camera: Camera, size: tuple[int, int], paint: Paint | None = None, markers: bool = True
+def scene_cell(
+    study: Study, camera: ViewCamera, size: tuple[int, int], paint: Paint | None = None, markers: bool = True
 ) -> np.ndarray:
     """The first frame's body on its floor. `paint`: as in `draw_body`; `markers`: CoM, its plumb line, and CoP."""
     figure, axes = new_page(*size)
@@ -46,7 +46,7 @@ def floor_map(study: Study, size: tuple[int, int]) -> np.ndarray:
     return _pixels(figure)
 
 
-def in_photo(study: Study, box: Box, size: tuple[int, int], body: bool = True) -> np.ndarray:
+def photo_cell(study: Study, box: Box, size: tuple[int, int], body: bool = True) -> np.ndarray:
     """A box (left, top, right, bottom) of pixels of a fitted body's photo, or of white paper with the detected points,
     with the body or without."""
     fitted = study.fitted
@@ -66,7 +66,9 @@ def in_photo(study: Study, box: Box, size: tuple[int, int], body: bool = True) -
     cx, cy = fitted.camera.center
     camera = replace(fitted.camera, focal=(fx, fy), center=((cx - left) * scale, (cy - top) * scale))
     if body and in_front(camera, vertices):
-        draw_body(axes, camera, study, vertices, heat_top(study), size, 0.8 if fitted.photo is not None else 1.0)
+        draw_body(
+            axes, camera, study, vertices, pressure_scale_top(study), size, 0.8 if fitted.photo is not None else 1.0
+        )
     axes.set(xlim=(0, size[0]), ylim=(size[1], 0))
     return _pixels(figure)
 

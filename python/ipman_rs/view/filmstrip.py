@@ -1,4 +1,4 @@
-"""A filmstrip: one body at several times side by side, seen from the side to which it does not fall."""
+"""A filmstrip: one body at several times side by side, seen across the direction of its fall."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from ..study.camera import Camera, front_of, look_at
+from ..study.camera import ViewCamera, front_of, look_at
 from . import colors
 from .geometry import floor_lines, grid_step
 from .picture import draw_body, new_page, save
@@ -47,7 +47,7 @@ def draw_filmstrip(study: Study, path: Path | IO[bytes]) -> None:
     save(figure, path)
 
 
-def _camera(study: Study, bodies: np.ndarray) -> Camera:
+def _camera(study: Study, bodies: np.ndarray) -> ViewCamera:
     points = np.concatenate([bodies.reshape(-1, 3), study.ground.project(bodies.reshape(-1, 3))])
     up = np.asarray(study.ground.normal, dtype=np.float64)
     centers = study.numbers["center_of_mass_exact"]
@@ -67,7 +67,7 @@ def turn_across(motion: np.ndarray, up: np.ndarray, otherwise: float = 35.0) -> 
     return float(otherwise + min(choices, key=abs))
 
 
-def _draw_floor(axes: Axes, camera: Camera, study: Study, bodies: np.ndarray) -> None:
+def _draw_floor(axes: Axes, camera: ViewCamera, study: Study, bodies: np.ndarray) -> None:
     from matplotlib.collections import LineCollection
 
     low, high = bodies.min(axis=(0, 1)), bodies.max(axis=(0, 1))
@@ -79,7 +79,7 @@ def _draw_floor(axes: Axes, camera: Camera, study: Study, bodies: np.ndarray) ->
     axes.add_collection(LineCollection(list(camera.pixels(lines)[0]), colors=rgba, linewidths=1.0, zorder=1))
 
 
-def _draw_centre(axes: Axes, camera: Camera, study: Study, frame: int) -> None:
+def _draw_centre(axes: Axes, camera: ViewCamera, study: Study, frame: int) -> None:
     centre = study.numbers["center_of_mass_exact"][frame]
     (head, foot), _ = camera.pixels(np.stack([centre, study.ground.project(centre)]))
     axes.plot(*np.stack([head, foot]).T, color=colors.COM, linewidth=2.0, zorder=5)

@@ -13,9 +13,9 @@ import numpy as np
 from ipman_rs.files import atomic_write
 from ipman_rs.study import Fitted
 
-from ..study.camera import Camera
+from ..study.camera import ViewCamera
 from . import colors
-from .picture import camera_on, draw_body, draw_picture, heat_top, new_page, save
+from .picture import camera_around, draw_body, draw_picture, new_page, pressure_scale_top, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,12 +36,12 @@ def draw_fitted(study: Study, folder: Path) -> Iterator[str]:
     yield "overlay.png"
     bodies = [study.vertices[0]] if fitted.before is None else [fitted.before.vertices[0], study.vertices[0]]
     bodies = [np.asarray(body, dtype=np.float64) for body in bodies]
-    camera = camera_on(bodies, study, turn=90.0, tilt=4.0)
+    camera = camera_around(bodies, study, turn=90.0, tilt=4.0)
     after = study if fitted.before is None else replace(study, name="After the physics terms")
     draw_picture(after, 0, folder / "side.png", camera)
     yield "side.png"
     if fitted.before is not None:
-        write_beside(fitted.before, folder / "side.png", camera, folder / "before_after.png")
+        write_side_by_side(fitted.before, folder / "side.png", camera, folder / "before_after.png")
         yield "before_after.png"
 
 
@@ -68,7 +68,7 @@ def draw_overlay(study: Study, path: Path) -> None:
     camera = replace(fitted.camera, focal=(fx, fy), center=(cx, cy))
     if in_front(camera, body):
         opacity = 0.72 if fitted.photo is not None else 1.0
-        draw_body(axes, camera, study, body, heat_top(study), (width, height), opacity)
+        draw_body(axes, camera, study, body, pressure_scale_top(study), (width, height), opacity)
     _draw_points(axes, fitted, scale)
     axes.set(xlim=(0, width), ylim=(height, 0))
     if strip:
@@ -76,7 +76,7 @@ def draw_overlay(study: Study, path: Path) -> None:
     save(figure, path)
 
 
-def in_front(camera: Camera, body: np.ndarray) -> bool:
+def in_front(camera: ViewCamera, body: np.ndarray) -> bool:
     depth = (camera.eye - body) @ camera.axes[2]
     return bool(np.isfinite(body).all() and (depth > 1e-3).all())
 
@@ -106,7 +106,7 @@ def _write_strip(page: Axes, fitted: Fitted, top: int, width: int) -> None:
         page.text(width - 24, y, text, size=13, color=colors.MUTED, va="center", ha="right")
 
 
-def write_beside(before: Study, after: Path, camera: Camera, path: Path) -> None:
+def write_side_by_side(before: Study, after: Path, camera: ViewCamera, path: Path) -> None:
     """The picture `after` with another body, seen by the same camera, on its left."""
     from matplotlib.image import imread, imsave
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import colors
 from .geometry import grid_step, nearest_on_outline, pressure_at
-from .picture import WIDTH, heat_top, new_page, save, signed, words, write_legend
+from .picture import WIDTH, frame_caption, new_page, pressure_scale_top, save, signed, write_legend
 from .raster import faces_viewer, rasterize
 
 if TYPE_CHECKING:
@@ -25,14 +25,14 @@ _MAP = (0.05, 0.11, 0.90, 0.76)
 def draw_floor_view(study: Study, frame: int, path: Path) -> None:
     """Write the PNG of one frame's ground seen from above."""
     figure, page = new_page(WIDTH, HEIGHT)
-    title, line = words(study, frame)
+    title, line = frame_caption(study, frame)
     page.text(60, 60, title, size=23, color=colors.INK, va="center", weight="bold", parse_math=False)
     page.text(60, 104, f"seen from above   ·   {line}", size=14, color=colors.MUTED, va="center", parse_math=False)
     body = np.asarray(study.vertices[frame], dtype=np.float64)
     if np.isfinite(body).all():
         axes = figure.add_axes(_MAP)
         draw_map(axes, study, frame)
-    write_legend(figure, study, heat_top(study))
+    write_legend(figure, study, pressure_scale_top(study))
     save(figure, path)
 
 
@@ -99,7 +99,7 @@ def _draw_contacts(axes: Axes, study: Study, body: np.ndarray) -> None:
     contact = height < reach if study.preset.contact == "released" else np.abs(height) < reach
     rho = pressure_at(height, study.preset.alpha, study.preset.gamma)
     order = np.flatnonzero(contact)[np.argsort(rho[contact])]
-    tint = colors.heat(rho[order], heat_top(study))
+    tint = colors.heat(rho[order], pressure_scale_top(study))
     # Dots of 6 mm, so that neighbouring samples of a sole join to a surface.
     (left, right), box = axes.get_xlim(), axes.get_window_extent()
     size = 0.006 / (right - left) * box.width * 72 / 100

@@ -17,7 +17,7 @@ from ipman_rs.status import status_names
 
 from ..study.study import Study
 from . import colors
-from .picture import heat_top
+from .picture import pressure_scale_top
 from .timeline import SERIES
 
 # Columns that the page shows for every frame.
@@ -91,7 +91,7 @@ def _body(study: Study, folder: Path | None) -> dict[str, Any]:
         "preset": study.preset.name,
         "alpha": study.preset.alpha,
         "gamma": study.preset.gamma,
-        "top": heat_top(study),
+        "top": pressure_scale_top(study),
         "parts": list(study.template.part_names),
         "labels": [study.label(frame) for frame in range(study.num_frames)],
         "named": bool(study.labels),

@@ -12,7 +12,7 @@ import numpy as np
 from ipman_rs.files import atomic_write
 
 from ..body.normals import vertex_normals
-from ..study.camera import Camera, look_at
+from ..study.camera import ViewCamera, look_at
 from . import colors
 from .geometry import floor_lines, grid_step, pressure_at
 from .raster import faces_viewer, rasterize, shrink
@@ -34,13 +34,13 @@ _SAMPLES = 2
 _TOP = 3.0
 
 
-def draw_picture(study: Study, frame: int, path: Path | IO[bytes], camera: Camera | None = None) -> None:
+def draw_picture(study: Study, frame: int, path: Path | IO[bytes], camera: ViewCamera | None = None) -> None:
     """Write the perspective PNG of one frame, seen from its front right if `camera` does not say otherwise."""
     figure, axes = new_page(WIDTH, HEIGHT)
     body = np.asarray(study.vertices[frame], dtype=np.float64)
-    top = heat_top(study)
+    top = pressure_scale_top(study)
     if np.isfinite(body).all():
-        camera = camera or camera_on([body], study)
+        camera = camera or camera_around([body], study)
         draw_scene(axes, camera, study, frame, (WIDTH, HEIGHT))
         draw_markers(axes, camera, study, frame)
     else:
@@ -51,18 +51,18 @@ def draw_picture(study: Study, frame: int, path: Path | IO[bytes], camera: Camer
 
 
 def draw_scene(
-    axes: Axes, camera: Camera, study: Study, frame: int, size: tuple[int, int], paint: Paint | None = None
+    axes: Axes, camera: ViewCamera, study: Study, frame: int, size: tuple[int, int], paint: Paint | None = None
 ) -> None:
     """One frame's floor, base of support and body on axes of `size` pixels. `paint`: as in `draw_body`."""
     body = np.asarray(study.vertices[frame], dtype=np.float64)
     _draw_floor(axes, camera, study, body, study.ground.project(body), size)
     _draw_support(axes, camera, study.polygons[frame])
-    draw_body(axes, camera, study, body, heat_top(study), size, paint=paint)
+    draw_body(axes, camera, study, body, pressure_scale_top(study), size, paint=paint)
 
 
-def camera_on(
+def camera_around(
     bodies: Sequence[np.ndarray], study: Study, turn: float = 35.0, tilt: float = 16.0, box: Box = _BOX
-) -> Camera:
+) -> ViewCamera:
     """A camera that sees these bodies (V, 3) and their shadows in a box of pixels; turn and tilt as in `look_at`."""
     points = np.concatenate([part for body in bodies for part in (body, study.ground.project(body))])
     return look_at(points, np.asarray(study.ground.normal, dtype=np.float64), box, turn, tilt)
@@ -79,7 +79,7 @@ def save(figure: Figure, path: Path | IO[bytes]) -> None:
             figure.savefig(file, dpi=100, format="png")
 
 
-def heat_top(study: Study) -> float:
+def pressure_scale_top(study: Study) -> float:
     """Top of the pressure scale: 1 where nothing is below the ground, else the deepest point's, 3 at most."""
     lowest = study.numbers["lowest"]
     deepest = np.nanmin(lowest) if np.isfinite(lowest).any() else 0.0
@@ -98,7 +98,7 @@ def new_page(width: int, height: int) -> tuple[Figure, Axes]:
 
 
 def _draw_floor(
-    axes: Axes, camera: Camera, study: Study, body: np.ndarray, shadow: np.ndarray, size: tuple[int, int]
+    axes: Axes, camera: ViewCamera, study: Study, body: np.ndarray, shadow: np.ndarray, size: tuple[int, int]
 ) -> None:
     from matplotlib.collections import LineCollection
 
@@ -118,7 +118,9 @@ def _draw_floor(
     axes.set(xlim=(0, width), ylim=(height, 0))
 
 
-def _shadow(camera: Camera, study: Study, body: np.ndarray, shadow: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+def _shadow(
+    camera: ViewCamera, study: Study, body: np.ndarray, shadow: np.ndarray, size: tuple[int, int]
+) -> np.ndarray:
     """Darkness of the floor's pixels at half size: the lower the skin above them, the darker."""
     from scipy.ndimage import gaussian_filter
 
@@ -132,7 +134,7 @@ def _shadow(camera: Camera, study: Study, body: np.ndarray, shadow: np.ndarray, 
     return gaussian_filter(near, 3.0) + gaussian_filter(far, 11.0)
 
 
-def _draw_support(axes: Axes, camera: Camera, polygon: np.ndarray) -> None:
+def _draw_support(axes: Axes, camera: ViewCamera, polygon: np.ndarray) -> None:
     if len(polygon) == 0:
         return
     points, _ = camera.pixels(polygon)
@@ -142,7 +144,7 @@ def _draw_support(axes: Axes, camera: Camera, polygon: np.ndarray) -> None:
 
 def draw_body(
     axes: Axes,
-    camera: Camera,
+    camera: ViewCamera,
     study: Study,
     body: np.ndarray,
     top: float,
@@ -196,7 +198,7 @@ def _light(albedo: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return np.clip(linear, 0.0, 1.0) ** (1 / 2.2) * (1.0 - 0.25 * rim)[:, None]
 
 
-def draw_markers(axes: Axes, camera: Camera, study: Study, frame: int) -> None:
+def draw_markers(axes: Axes, camera: ViewCamera, study: Study, frame: int) -> None:
     """CoM with its plumb line, CoP and the outline of the support again, faintly, over the body."""
     com, cop = study.numbers["center_of_mass"][frame], study.numbers["center_of_pressure"][frame]
     polygon = study.polygons[frame]
@@ -223,13 +225,13 @@ def _dot(axes: Axes, at: np.ndarray, color: str, size: float) -> None:
 
 
 def _write_title(axes: Axes, study: Study, frame: int) -> None:
-    title, line = words(study, frame)
+    title, line = frame_caption(study, frame)
     axes.text(60, 70, title, size=25, color=colors.INK, va="center", weight="bold", parse_math=False)
     axes.text(60, 116, line, size=15, color=colors.MUTED, va="center", parse_math=False)
 
 
-def words(study: Study, frame: int) -> tuple[str, str]:
-    """Title and one line of figures of a frame."""
+def frame_caption(study: Study, frame: int) -> tuple[str, str]:
+    """Title of a frame and one line of its measured quantities."""
     value = {key: column[frame] for key, column in study.numbers.items()}
     title = study.name if study.num_frames == 1 else f"{study.name} · {study.label(frame)}"
     if not np.isfinite(value["mass"]):
@@ -276,9 +278,9 @@ def write_legend(figure: Figure, study: Study, top: float) -> None:
     axes.set(xlim=(0, WIDTH), ylim=(height, 0))
 
 
-def settle(picture: Figure, dpi: float) -> None:
-    """Lays a figure out for a picture of that dpi, and ends that. The solver of matplotlib's layout is not the same in
-    the last digit each time, and an SVG names its clips after all digits."""
+def fix_layout(picture: Figure, dpi: float) -> None:
+    """Lay a figure out for a picture of that dpi, and freeze the layout: matplotlib's solver differs in the last digit
+    between calls, and an SVG names its clips after all digits."""
     if picture.get_layout_engine() is None:
         return
     picture.set_dpi(dpi)

@@ -25,7 +25,7 @@ UNITS = {
 
 
 def report_record(studies: Sequence[Study], failures: Sequence[tuple[str, str]] = ()) -> dict[str, Any]:
-    """Everything in `report.json`. What is not finite (no contact, a body of NaN) is null."""
+    """Everything in `report.json`. Non-finite numbers (no contact, a body of NaN) are null."""
     import ipman_rs as ip
 
     return {

@@ -1,4 +1,4 @@
-"""The figures of a sequence over time, as one PNG."""
+"""The quantities of a sequence over time, as one PNG."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use ipman::losses::balance::{BalanceCost, Wrap};
 use ipman::losses::ground::{GroundLoss, Tanh};
 use ipman::losses::stability::StabilityLoss;
-use ipman::losses::terms::StabilityTerms;
+use ipman::losses::terms::Terms;
 use ipman::mass::{CenterOfMass, Method};
 use ipman::mass_properties::MassProperties;
 use ipman::number::Data;
@@ -118,7 +118,7 @@ fn quantities(criterion: &mut Criterion) {
     bench(criterion, "ground", &ground());
     let balance = BalanceCost { method: Method::Pcom, wrap: Wrap::Log, curve: CURVE, sigma: 0.02 };
     bench(criterion, "balance", &balance);
-    bench(criterion, "terms", &StabilityTerms { stability: stability(), ground: ground() });
+    bench(criterion, "terms", &Terms(vec![stability().into(), ground().into()]));
     closing(criterion);
     hulls(criterion);
 }

@@ -5,6 +5,7 @@ use crate::error::{Error, Result, status};
 use crate::losses::balance::{BalanceCost, Wrap};
 use crate::losses::ground::{GroundLoss, Tanh};
 use crate::losses::stability::distance_on_ground;
+use crate::losses::term::{ByHeights, Shared, Term};
 use crate::mass::{Centre, Method};
 use crate::mass_properties::MassProperties;
 use crate::memory;
@@ -119,23 +120,23 @@ impl Analysis {
     /// The error names the constant that is out of range.
     pub fn check(&self, template: &Template) -> Result<()> {
         self.pressure.check(template)?;
-        self.ground.check(template)?;
+        Term::check(&self.ground, template)?;
         self.contact.check()?;
-        self.balance.check(template)?;
+        Term::check(&self.balance, template)?;
         self.mass.check(template)
     }
 
     /// Writes the row and returns the polygon of each lane.
     pub fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Vec<Polygon> {
-        let heights = posed.heights();
-        out[at::LOWEST] = posed::lowest(&heights);
-        let samples = self.pass_over_samples(posed, &heights, &mut out[at::PULL..at::BALANCE]);
+        let shared = Shared::new(posed);
+        out[at::LOWEST] = posed::lowest(&shared.heights);
+        let samples = self.pass_over_samples(&shared, &mut out[at::PULL..at::BALANCE]);
         out[at::PRESSURE_SUM] = samples.pressure_sum;
         out[at::PRESSURE_MAX] = samples.pressure_max;
 
         let parts = part_moments(&posed.template.closing, posed.points);
         let exact = Centre::<R>::exact(&parts);
-        let centre = self.method.forward(posed);
+        let centre = shared.centre(self.method);
         match centre.signed_volumes() {
             Some(volumes) => {
                 for (out, volume) in out[at::PART_VOLUMES..].iter_mut().zip(volumes) {
@@ -148,8 +149,8 @@ impl Analysis {
         posed.write_world(centre.point, &mut out[at::CENTER_OF_MASS..][..3]);
         posed.write_world(exact.point, &mut out[at::CENTER_OF_MASS_EXACT..][..3]);
         posed.write_world(samples.cop.point, &mut out[at::CENTER_OF_PRESSURE..][..3]);
-        out[at::STABILITY] = R::narrow(distance_on_ground(posed, &centre, &samples.cop).0);
-        let supports = BaseOfSupport::new(posed, &self.contact, &centre);
+        out[at::STABILITY] = R::narrow(distance_on_ground(posed, centre, &samples.cop).0);
+        let supports = BaseOfSupport::new(posed, &self.contact, centre);
         self.balance.forward_about(posed, centre, &mut out[at::BALANCE..][..1]);
         let number = |of: &dyn Fn(usize) -> f64| R::narrow(R::Wide::from_lanes(|lane| Real::of(of(lane))));
         out[at::NUM_CONTACTS] = number(&|lane| supports[lane].num_contacts as f64);
@@ -165,23 +166,24 @@ impl Analysis {
     }
 
     /// Pressure and ground losses.
-    fn pass_over_samples<R: Real>(&self, posed: &PosedBody<R>, heights: &[R], ground: &mut [R]) -> SampleResults<R> {
-        let mut loads = LoadSums::new(self.pressure, posed.template, heights);
-        let mut sums = self.ground.sums();
+    fn pass_over_samples<R: Real>(&self, shared: &Shared<R>, ground: &mut [R]) -> SampleResults<R> {
+        let (template, unasked) = (shared.template(), &mut ByHeights::Unasked);
+        let mut loads = LoadSums::new(self.pressure, template, &shared.heights);
+        let mut sums = self.ground.begin(shared, &[R::zero(); 2], unasked);
         let mut lowest = R::of(1e30);
         let mut row = [R::zero(); CHUNK];
-        for chunk in Points::Samples.chunks(posed.template) {
-            chunk.gather(heights, &mut row);
+        for chunk in Points::Samples.chunks(template) {
+            chunk.gather(&shared.heights, &mut row);
             loads.add(&chunk, &row);
-            sums.add(&chunk, &row);
+            self.ground.add(&mut sums, &chunk, &row, unasked);
             lowest = lowest.at_most(posed::lowest(&row[..chunk.len()]));
         }
-        sums.finish(posed.template, ground);
+        self.ground.finish(shared, sums, ground);
         SampleResults {
             pressure_sum: R::narrow(loads.total_pressure()),
             // ρ decreases with height, so the lowest sample has the largest.
             pressure_max: self.pressure.curve.density(lowest, R::zero()),
-            cop: loads.finish(posed),
+            cop: loads.finish(shared.posed),
         }
     }
 }

@@ -26,6 +26,8 @@ pub enum Method {
 }
 
 impl Method {
+    pub const COUNT: usize = Method::Exact as usize + 1;
+
     pub fn named(name: &str) -> Result<Self> {
         match name {
             "pcom" => Ok(Method::Pcom),

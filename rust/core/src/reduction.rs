@@ -1,9 +1,9 @@
 //! Reduction of a training step's terms over a batch, in one pass: their weighted total with its gradient, or each term
 //! with the Jacobian that its backward needs.
 
-use crate::batch::Batch;
+use crate::batch::{Batch, Evaluate};
 use crate::error::{Error, Result, unknown_choice};
-use crate::losses::terms::{NUM_TERMS, Terms};
+use crate::losses::terms::Terms;
 use crate::memory;
 use crate::number::Data;
 use crate::quantity::Quantity;
@@ -49,14 +49,14 @@ pub struct Pooled {
 impl Pool<'_> {
     /// The weighted total Σ λ · term with `weights` λ (one number, or one per body without reduction), and the terms.
     /// Writes the gradient of the total (of the sum of totals without reduction) by the vertices, B·V·3 numbers.
-    pub fn weighted<T: Data, Q: Quantity>(
+    pub fn weighted<T: Data>(
         &self,
         batch: &Batch<T>,
-        quantity: &Q,
+        quantity: &dyn Evaluate<T>,
         weights: &[f64],
         gradient: &mut [T],
     ) -> Result<(Vec<f64>, Pooled)> {
-        let (bodies, size) = (batch.len(), quantity.num_outputs(batch.template()));
+        let (bodies, size) = (batch.len(), quantity.size(batch.template()));
         if size != weights.len() {
             let expected = format!("{size} numbers, one per term");
             return Err(Error::Argument { name: "weights", expected, got: weights.len().to_string() });
@@ -69,7 +69,7 @@ impl Pool<'_> {
         let part = |i: usize| if self.valid(i / size) { T::of(weights[i % size] * provisional) } else { T::zero() };
         let buffers = || Ok((memory::collect((0..bodies * size).map(part)), memory::filled(T::zero(), bodies * size)));
         let (d_out, mut values) = memory::guarded(buffers)?;
-        batch.value_and_vjp_into(quantity, &d_out, &mut values, gradient)?;
+        quantity.value_and_vjp_into(batch, &d_out, &mut values, gradient)?;
 
         // Bodies whose term is NaN are known only now. The mean was taken over them, too: rescale its gradient.
         let (pooled, share) = self.pool(&values, size)?;
@@ -83,10 +83,10 @@ impl Pool<'_> {
     }
 
     /// The terms. Writes the Jacobian of [`Batch::value_and_jacobian_into`].
-    pub fn terms<T: Data, Q: Terms>(&self, batch: &Batch<T>, quantity: &Q, jacobian: &mut [T]) -> Result<Pooled> {
-        let size = quantity.num_outputs(batch.template());
+    pub fn terms<T: Data>(&self, batch: &Batch<T>, terms: &Terms, jacobian: &mut [T]) -> Result<Pooled> {
+        let size = terms.num_outputs(batch.template());
         let mut values = memory::guarded(|| Ok(memory::filled(T::zero(), batch.len() * size)))?;
-        batch.value_and_jacobian_into(quantity, &mut values, jacobian)?;
+        batch.value_and_jacobian_into(terms, &mut values, jacobian)?;
         Ok(self.pool(&values, size)?.0)
     }
 
@@ -124,9 +124,11 @@ impl Pool<'_> {
     }
 }
 
-/// The backward of [`Pool::terms`] from its Jacobian and shares: the gradient by the vertices, B·V·3 numbers. `d_terms`
-/// is the upstream gradient of the batch's terms, or of each body's; `normals` are the ground's, one or B.
+/// The backward of [`Pool::terms`] from its Jacobian and shares: the gradient by the vertices, B·V·3 numbers. `widths` are
+/// the terms', `d_terms` is the upstream gradient of the batch's terms, or of each body's; `normals` are the ground's, one
+/// or B.
 pub fn terms_backward<T: Data>(
+    widths: &[usize],
     jacobian: &[T],
     shares: &[T],
     d_terms: &[T],
@@ -138,25 +140,55 @@ pub fn terms_backward<T: Data>(
         return Ok(());
     }
     let row = gradient.len() / shares.len();
-    let bodies = jacobian.chunks_exact(row / 3 * 5).zip(gradient.chunks_exact_mut(row)).enumerate();
+    let bodies = jacobian.chunks_exact(row / 3 * widths.iter().sum::<usize>());
+    let bodies = bodies.zip(gradient.chunks_exact_mut(row)).enumerate();
     let bodies = memory::guarded(|| Ok(memory::collect(bodies)))?;
     threads::each(bodies, true, interrupted, &|(body, (jacobian, gradient))| {
         if shares[body].value() == 0.0 {
             return gradient.fill(T::zero());
         }
         // A single row applies to all bodies.
-        let d_terms = d_terms.as_chunks::<NUM_TERMS>().0;
-        let [first, pull, push] = d_terms[body % d_terms.len()].map(|d_term| shares[body] * d_term);
-        let normal = normals[body % normals.len()];
-        let (d_first, d_ground) = jacobian.split_at(row);
-        let (d_pull, d_push) = d_ground.split_at(row / 3);
-        for (d_point, ((d_first, &d_pull), &d_push)) in
-            gradient.as_chunks_mut::<3>().0.iter_mut().zip(d_first.as_chunks::<3>().0.iter().zip(d_pull).zip(d_push))
-        {
-            let along = pull * d_pull + push * d_push;
-            for k in 0..3 {
-                d_point[k] = first * d_first[k] + along * normal[k];
+        let rows = d_terms.len() / widths.len();
+        let d_terms = &d_terms[body % rows * widths.len()..][..widths.len()];
+        let (mut by_points, mut by_heights, mut rest) = (Vec::new(), Vec::new(), jacobian);
+        for (&d_term, &width) in d_terms.iter().zip(widths) {
+            let (own, others) = rest.split_at(row / 3 * width);
+            if width == 1 { &mut by_heights } else { &mut by_points }.push((shares[body] * d_term, own));
+            rest = others;
+        }
+        add_up(&by_points, &by_heights, normals[body % normals.len()], gradient);
+    })
+}
+
+/// Vertices of a body that are put together at once, so that a part of the gradient stays in the cache.
+const VERTICES: usize = 256;
+
+/// Writes Σ factor · gradient by the points + (Σ factor · gradient by the heights) · normal.
+fn add_up<T: Data>(by_points: &[(T, &[T])], by_heights: &[(T, &[T])], normal: [T; 3], gradient: &mut [T]) {
+    let mut along = [T::zero(); VERTICES];
+    for (block, gradient) in gradient.chunks_mut(3 * VERTICES).enumerate() {
+        let along = &mut along[..gradient.len() / 3];
+        weighted_sum(by_heights, VERTICES * block, along);
+        weighted_sum(by_points, 3 * VERTICES * block, gradient);
+        if !by_heights.is_empty() {
+            for (d_point, &along) in gradient.as_chunks_mut::<3>().0.iter_mut().zip(&*along) {
+                for k in 0..3 {
+                    d_point[k] = d_point[k] + along * normal[k];
+                }
             }
         }
-    })
+    }
+}
+
+/// Writes Σ factor · numbers, from `start` on. The first product is not added to 0, for 0 + −0 would be +0.
+fn weighted_sum<T: Data>(parts: &[(T, &[T])], start: usize, out: &mut [T]) {
+    let Some((&(factor, numbers), rest)) = parts.split_first() else { return out.fill(T::zero()) };
+    for (out, &number) in out.iter_mut().zip(&numbers[start..]) {
+        *out = factor * number;
+    }
+    for &(factor, numbers) in rest {
+        for (out, &number) in out.iter_mut().zip(&numbers[start..]) {
+            *out = *out + factor * number;
+        }
+    }
 }

@@ -1,13 +1,13 @@
 //! The list of all quantities by name.
 
 use crate::error::{Error, Result};
-use crate::losses::balance::{BalanceCost, Wrap};
-use crate::losses::ground::{GroundLoss, Tanh};
+use crate::losses::balance::BalanceCost;
+use crate::losses::ground::GroundLoss;
 use crate::losses::stability::StabilityLoss;
-use crate::losses::terms::{BalanceTerms, StabilityTerms, Terms};
+use crate::losses::term::Named;
+use crate::losses::terms::Terms;
 use crate::mass::{CenterOfMass, Method};
 use crate::mass_properties::MassProperties;
-use crate::points::Points;
 use crate::pressure::{CenterOfPressure, Pressure, PressureCurve};
 use crate::quantity::Quantity;
 use crate::sample_surface::SampleSurface;
@@ -34,13 +34,16 @@ pub fn named<V: Visitor>(template: &Template, name: &str, options: &[f64], visit
             let contact = Contact { rule: ContactRule::named(rule)?, threshold };
             visitor.visit(SupportMargin { contact, method: Method::named(m)? })
         }
-        (["stability_loss", m], o @ [_, _, _]) => visitor.visit(stability(m, o)?),
-        (["ground_loss", points, tanh], o @ [_, _, _, _]) => visitor.visit(ground(points, tanh, o)?),
-        (["balance_cost", wrap, m], o @ [_, _, _]) => visitor.visit(balance(wrap, m, o)?),
-        (["terms", "stability", m, points, tanh], o @ [_, _, _, _, _, _, _]) => visitor
-            .visit_terms(StabilityTerms { stability: stability(m, &o[..3])?, ground: ground(points, tanh, &o[3..])? }),
-        (["terms", "balance", wrap, m, points, tanh], o @ [_, _, _, _, _, _, _]) => visitor
-            .visit_terms(BalanceTerms { balance: balance(wrap, m, &o[..3])?, ground: ground(points, tanh, &o[3..])? }),
+        (["stability_loss", modes @ ..], o) if is_described::<StabilityLoss>(modes, o) => {
+            visitor.visit(StabilityLoss::named(modes, o)?)
+        }
+        (["ground_loss", modes @ ..], o) if is_described::<GroundLoss>(modes, o) => {
+            visitor.visit(GroundLoss::named(modes, o)?)
+        }
+        (["balance_cost", modes @ ..], o) if is_described::<BalanceCost>(modes, o) => {
+            visitor.visit(BalanceCost::named(modes, o)?)
+        }
+        (["terms", words @ ..], o) => visitor.visit_terms(Terms::named(words, o)?),
         _ => return Err(unknown()),
     })
 }
@@ -51,27 +54,15 @@ pub trait Visitor {
     fn visit<Q: Quantity>(self, quantity: Q) -> Self::Output;
 
     /// For visitors that treat the terms of a loss differently.
-    fn visit_terms<Q: Terms>(self, quantity: Q) -> Self::Output
+    fn visit_terms(self, terms: Terms) -> Self::Output
     where
         Self: Sized,
     {
-        self.visit(quantity)
+        self.visit(terms)
     }
 }
 
-fn stability(method: &str, options: &[f64]) -> Result<StabilityLoss> {
-    let &[alpha, gamma, epsilon] = options else { unreachable!("the caller matched three options") };
-    let pressure = CenterOfPressure { curve: PressureCurve { alpha, gamma }, epsilon };
-    Ok(StabilityLoss { method: Method::named(method)?, pressure })
-}
-
-fn ground(points: &str, tanh: &str, options: &[f64]) -> Result<GroundLoss> {
-    let &[alpha1, alpha2, beta1, beta2] = options else { unreachable!("the caller matched four options") };
-    Ok(GroundLoss { points: Points::named(points)?, tanh: Tanh::named(tanh)?, alpha1, alpha2, beta1, beta2 })
-}
-
-fn balance(wrap: &str, method: &str, options: &[f64]) -> Result<BalanceCost> {
-    let &[alpha, gamma, sigma] = options else { unreachable!("the caller matched three options") };
-    let curve = PressureCurve { alpha, gamma };
-    Ok(BalanceCost { method: Method::named(method)?, wrap: Wrap::named(wrap)?, curve, sigma })
+/// Whether a loss takes so many modes and options.
+fn is_described<T: Named>(modes: &[&str], options: &[f64]) -> bool {
+    modes.len() == T::DESCRIPTION.modes.len() && options.len() == T::DESCRIPTION.options.len()
 }

@@ -6,7 +6,7 @@ use ipman::ground::Ground;
 use ipman::losses::balance::{BalanceCost, Wrap};
 use ipman::losses::ground::{GroundLoss, Tanh};
 use ipman::losses::stability::StabilityLoss;
-use ipman::losses::terms::StabilityTerms;
+use ipman::losses::terms::Terms;
 use ipman::mass::Method;
 use ipman::mass_properties::MassProperties;
 use ipman::number::simd_level::Level;
@@ -16,19 +16,18 @@ use ipman::reduction::{Pool, Reduction};
 use ipman::support::{Contact, ContactRule, SupportMargin};
 use ipman::{Batch, Error, Template};
 
-fn terms() -> StabilityTerms {
-    let curve = PressureCurve { alpha: 100.0, gamma: 10.0 };
-    StabilityTerms {
-        stability: StabilityLoss { method: Method::Pcom, pressure: CenterOfPressure { curve, epsilon: 0.0 } },
-        ground: GroundLoss {
-            points: Points::Samples,
-            tanh: Tanh::Squared,
-            alpha1: 1.0,
-            alpha2: 0.15,
-            beta1: 10.0,
-            beta2: 0.15,
-        },
-    }
+fn stability(gamma: f64) -> StabilityLoss {
+    let curve = PressureCurve { alpha: 100.0, gamma };
+    StabilityLoss { method: Method::Pcom, pressure: CenterOfPressure { curve, epsilon: 0.0 } }
+}
+
+fn ground(beta2: f64) -> GroundLoss {
+    let (alpha1, alpha2, beta1) = (1.0, 0.15, 10.0);
+    GroundLoss { points: Points::Samples, tanh: Tanh::Squared, alpha1, alpha2, beta1, beta2 }
+}
+
+fn terms() -> Terms {
+    Terms(vec![stability(10.0).into(), ground(0.15).into()])
 }
 
 /// `count` bodies that lean more and more.
@@ -188,13 +187,11 @@ fn options_and_weights_out_of_range_are_named() {
         other => panic!("{other:?}"),
     };
     for gamma in [-1.0, f64::NAN, f64::INFINITY] {
-        let mut quantity = terms();
-        quantity.stability.pressure.curve.gamma = gamma;
+        let quantity = Terms(vec![stability(gamma).into(), ground(0.15).into()]);
         assert_eq!(named(batch.value(&quantity).err()), "gamma");
         assert_eq!(named(batch.vjp(&quantity, &[1.0; 3]).err()), "gamma");
     }
-    let mut quantity = terms();
-    quantity.ground.beta2 = 0.0;
+    let quantity = Terms(vec![stability(10.0).into(), ground(0.0).into()]);
     assert_eq!(named(batch.value(&quantity).err()), "beta2");
     let contact = Contact { rule: ContactRule::Paper, threshold: f64::NAN };
     assert_eq!(named(batch.status(&contact).err()), "threshold");

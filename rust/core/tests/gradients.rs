@@ -25,7 +25,7 @@ impl<T: Data> Visitor for Run<'_, T> {
             Verb::Value => self.0.value(&quantity),
             Verb::Vjp(d_out) => self.0.vjp(&quantity, d_out),
             Verb::Jvp(d_vertices) => self.0.jvp(&quantity, d_vertices),
-            Verb::Hvp(d_out, d_vertices) => self.0.vjp_jvp(&quantity, d_out, d_vertices),
+            Verb::Hvp(d_out, d_vertices) => self.0.hvp(&quantity, d_out, d_vertices),
         }
         .unwrap()
     }

@@ -33,16 +33,27 @@ mod _core {
     use crate::template::Template;
     #[pymodule_export]
     use crate::threads::{follow_threads, get_num_threads, set_num_threads, simd_level, simd_levels};
-    #[pymodule_export]
-    use crate::weighted::terms_backward;
 
+    use ipman::losses::AnyTerm;
     use pyo3::prelude::*;
-    use pyo3::types::IntoPyDict;
+    use pyo3::types::{IntoPyDict, PyDict, PyTuple};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("ANALYSIS_COLUMNS", ipman::analysis::COLUMNS.into_py_dict(module.py())?)?;
+        module.add("GRAVITY", ipman::solid::GRAVITY)?;
+        module.add("TERMS", terms(module.py())?)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+
+    /// (numbers, modes, options) of each term by its name.
+    fn terms(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+        let terms = PyDict::new(py);
+        for term in AnyTerm::DESCRIPTIONS {
+            let names = |names: &[&str]| PyTuple::new(py, names);
+            terms.set_item(term.name, (names(term.numbers)?, names(term.modes)?, names(term.options)?))?;
+        }
+        Ok(terms)
     }
 }
 

@@ -6,10 +6,10 @@ use crate::error::python_error;
 use crate::template::Template;
 use crate::weighted::{self, Counted};
 use ipman::Batch;
+use ipman::batch::Evaluate;
 use ipman::losses::terms::Terms;
 use ipman::number::Data;
 use ipman::quantity;
-use ipman::reduction::{Pool, Pooled};
 use ipman::registry::{Visitor, named};
 use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn};
@@ -18,62 +18,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use std::sync::Arc;
 
-/// A quantity in the precision `T`. The core's trait has generic methods, so a quantity whose type is known only at run
-/// time needs this one.
-pub trait Evaluate<T>: Send + Sync {
-    fn value(&self, batch: &Batch<T>, out: &mut [T]) -> ipman::Result<()>;
-    fn vjp(&self, batch: &Batch<T>, d_out: &[T], d_vertices: &mut [T]) -> ipman::Result<()>;
-    fn jvp(&self, batch: &Batch<T>, d_vertices: &[T], out: &mut [T]) -> ipman::Result<()>;
-    fn hvp(&self, batch: &Batch<T>, d_out: &[T], d_vertices: &[T], out: &mut [T]) -> ipman::Result<()>;
-    fn value_and_vjp(&self, batch: &Batch<T>, d_out: &[T], out: &mut [T], d_vertices: &mut [T]) -> ipman::Result<()>;
-    fn weighted(&self, batch: &Batch<T>, pool: &Pool, weights: &[f64], d_vertices: &mut [T]) -> Weighted;
-}
-
-/// The totals, and the terms that they are made of.
-type Weighted = ipman::Result<(Vec<f64>, Pooled)>;
-
-impl<T: Data, Q: quantity::Quantity> Evaluate<T> for Q {
-    fn value(&self, batch: &Batch<T>, out: &mut [T]) -> ipman::Result<()> {
-        batch.value_into(self, out)
-    }
-
-    fn vjp(&self, batch: &Batch<T>, d_out: &[T], d_vertices: &mut [T]) -> ipman::Result<()> {
-        batch.vjp_into(self, d_out, d_vertices)
-    }
-
-    fn jvp(&self, batch: &Batch<T>, d_vertices: &[T], out: &mut [T]) -> ipman::Result<()> {
-        batch.jvp_into(self, d_vertices, out)
-    }
-
-    fn hvp(&self, batch: &Batch<T>, d_out: &[T], d_vertices: &[T], out: &mut [T]) -> ipman::Result<()> {
-        batch.vjp_jvp_into(self, d_out, d_vertices, out)
-    }
-
-    fn value_and_vjp(&self, batch: &Batch<T>, d_out: &[T], out: &mut [T], d_vertices: &mut [T]) -> ipman::Result<()> {
-        batch.value_and_vjp_into(self, d_out, out, d_vertices)
-    }
-
-    fn weighted(&self, batch: &Batch<T>, pool: &Pool, weights: &[f64], d_vertices: &mut [T]) -> Weighted {
-        pool.weighted(batch, self, weights, d_vertices)
-    }
-}
-
-/// Loss terms in the precision `T`, which have a Jacobian besides.
-pub trait EvaluateTerms<T>: Send + Sync {
-    fn terms(&self, batch: &Batch<T>, pool: &Pool, jacobian: &mut [T]) -> ipman::Result<Pooled>;
-}
-
-impl<T: Data, Q: Terms> EvaluateTerms<T> for Q {
-    fn terms(&self, batch: &Batch<T>, pool: &Pool, jacobian: &mut [T]) -> ipman::Result<Pooled> {
-        pool.terms(batch, self, jacobian)
-    }
-}
-
+/// A quantity in either precision.
 trait InBoth: Evaluate<f32> + Evaluate<f64> {}
 impl<Q: Evaluate<f32> + Evaluate<f64>> InBoth for Q {}
-
-trait TermsInBoth: EvaluateTerms<f32> + EvaluateTerms<f64> {}
-impl<Q: EvaluateTerms<f32> + EvaluateTerms<f64>> TermsInBoth for Q {}
 
 /// A quantity of one template. Its name and its options are read and checked here, once.
 #[pyclass(frozen, module = "ipman_rs._core")]
@@ -82,21 +29,18 @@ pub struct Quantity {
     num_outputs: usize,
     quantity: Arc<dyn InBoth>,
     /// The same object, if it is loss terms.
-    terms: Option<Arc<dyn TermsInBoth>>,
+    terms: Option<Arc<Terms>>,
 }
 
 /// Makes the object of a quantity.
 struct Checked<'a, 'py>(&'a Bound<'py, Template>);
 
 impl Checked<'_, '_> {
-    fn handle<Q: quantity::Quantity>(
-        self,
-        quantity: Arc<Q>,
-        terms: Option<Arc<dyn TermsInBoth>>,
-    ) -> ipman::Result<Quantity> {
+    fn handle<Q: quantity::Quantity>(self, quantity: Arc<Q>, terms: Option<Arc<Terms>>) -> ipman::Result<Quantity> {
         let template = &self.0.get().inner;
         quantity.check(template)?;
-        Ok(Quantity { template: self.0.clone().unbind(), num_outputs: quantity.num_outputs(template), quantity, terms })
+        let num_outputs = quantity.num_outputs(template);
+        Ok(Quantity { template: self.0.clone().unbind(), num_outputs, quantity, terms })
     }
 }
 
@@ -107,9 +51,9 @@ impl Visitor for Checked<'_, '_> {
         self.handle(Arc::new(quantity), None)
     }
 
-    fn visit_terms<Q: Terms>(self, quantity: Q) -> Self::Output {
-        let quantity = Arc::new(quantity);
-        self.handle(quantity.clone(), Some(quantity))
+    fn visit_terms(self, terms: Terms) -> Self::Output {
+        let terms = Arc::new(terms);
+        self.handle(terms.clone(), Some(terms))
     }
 }
 
@@ -153,7 +97,7 @@ impl Quantity {
     /// The quantity of each body: vertices (B, V, 3) -> (B, K).
     fn value<'py>(&self, vertices: Vertices<'py>, normal: Normals<'py>, height: Heights<'py>) -> Reply<'py> {
         in_precision!(self, vertices, normal, height, |over| {
-            let (values, ()) = over.filled(&over.rows(), |quantity, batch, out| quantity.value(batch, out))?;
+            let (values, ()) = over.filled(&over.rows(), |quantity, batch, out| quantity.value_into(batch, out))?;
             Ok(values.into_any())
         })
     }
@@ -170,7 +114,7 @@ impl Quantity {
             let d_out = over.d_out(&d_out)?;
             let d_out = d_out.as_slice()?;
             let (gradient, ()) =
-                over.filled(over.vertices.shape(), |quantity, batch, out| quantity.vjp(batch, d_out, out))?;
+                over.filled(over.vertices.shape(), |quantity, batch, out| quantity.vjp_into(batch, d_out, out))?;
             Ok(gradient.into_any())
         })
     }
@@ -187,7 +131,7 @@ impl Quantity {
             let d_vertices = over.d_vertices(&d_vertices)?;
             let d_vertices = d_vertices.as_slice()?;
             let (slopes, ()) =
-                over.filled(&over.rows(), |quantity, batch, out| quantity.jvp(batch, d_vertices, out))?;
+                over.filled(&over.rows(), |quantity, batch, out| quantity.jvp_into(batch, d_vertices, out))?;
             Ok(slopes.into_any())
         })
     }
@@ -204,8 +148,9 @@ impl Quantity {
         in_precision!(self, vertices, normal, height, |over| {
             let (d_out, d_vertices) = (over.d_out(&d_out)?, over.d_vertices(&d_vertices)?);
             let (d_out, d_vertices) = (d_out.as_slice()?, d_vertices.as_slice()?);
-            let (product, ()) =
-                over.filled(over.vertices.shape(), |quantity, batch, out| quantity.hvp(batch, d_out, d_vertices, out))?;
+            let (product, ()) = over.filled(over.vertices.shape(), |quantity, batch, out| {
+                quantity.hvp_into(batch, d_out, d_vertices, out)
+            })?;
             Ok(product.into_any())
         })
     }
@@ -225,7 +170,7 @@ impl Quantity {
             let mut written = values.readwrite();
             let out = written.as_slice_mut()?;
             let (gradient, ()) = over.filled(over.vertices.shape(), |quantity, batch, d_vertices| {
-                quantity.value_and_vjp(batch, d_out, out, d_vertices)
+                quantity.value_and_vjp_into(batch, d_out, out, d_vertices)
             })?;
             (values, gradient).into_pyobject(over.py())
         })
@@ -246,8 +191,8 @@ impl Quantity {
         in_precision!(self, vertices, normal, height, |over| weighted::weighted(&over, &weights, &counted))
     }
 
-    /// (terms, shares, jacobian) of loss terms: the first two as in `weighted`; for each body the gradient of the first
-    /// term by the vertices, V·3 numbers, then those of pull and of push by the vertices' heights: (B, 5·V).
+    /// (terms, shares, jacobian) of loss terms: the first two as in `weighted`; for each body the gradients of its
+    /// numbers one after the other, V·3 numbers by the vertices, or V by their heights: (B, J).
     fn terms<'py>(
         &self,
         vertices: Vertices<'py>,
@@ -257,8 +202,26 @@ impl Quantity {
         reduction: &str,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let counted = Counted::new(valid, reduction)?;
-        let terms = self.terms.as_deref().ok_or_else(|| PyValueError::new_err("quantity: expected loss terms"))?;
+        let terms = self.loss_terms()?;
         in_precision!(self, vertices, normal, height, |over| weighted::terms(&over, terms, &counted))
+    }
+
+    /// The gradient (B, V, 3) of what `terms` gave, for its terms' upstream d_terms, (K,) or (B, K).
+    fn terms_backward<'py>(
+        &self,
+        jacobian: Bound<'py, PyAny>,
+        shares: Bound<'py, PyAny>,
+        d_terms: Bound<'py, PyAny>,
+        normal: Normals<'py>,
+    ) -> Reply<'py> {
+        let widths = self.loss_terms()?.widths();
+        weighted::terms_backward(&widths, jacobian, shares, d_terms, &normal)
+    }
+}
+
+impl Quantity {
+    fn loss_terms(&self) -> PyResult<&Terms> {
+        self.terms.as_deref().ok_or_else(|| PyValueError::new_err("quantity: expected loss terms"))
     }
 }
 
@@ -273,6 +236,10 @@ pub struct Over<'a, 'py, T: Element> {
 impl<'py, T: Data + Element> Over<'_, 'py, T> {
     pub fn py(&self) -> Python<'py> {
         self.vertices.py()
+    }
+
+    pub fn template(&self) -> &ipman::Template {
+        &self.of.template.get().inner
     }
 
     /// The shape of the values.

@@ -2,11 +2,11 @@
 
 use crate::array::{flat, triples, unwritten, written};
 use crate::error::{detached, python_error};
-use crate::quantity::{EvaluateTerms, Over};
-use ipman::losses::terms::NUM_TERMS;
+use crate::quantity::Over;
+use ipman::losses::terms::Terms;
 use ipman::memory;
 use ipman::number::Data;
-use ipman::reduction::{Pool, Pooled, Reduction, terms_backward as gradient_of_terms};
+use ipman::reduction::{self, Pool, Pooled, Reduction};
 use numpy::{
     Element, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,
@@ -51,7 +51,7 @@ pub fn weighted<'py, T: Data + Element>(
     let pool = &counted.pool(bodies)?;
     let shape = over.vertices.shape();
     let (gradient, (totals, pooled)) =
-        over.filled(shape, |quantity, batch, gradient| quantity.weighted(batch, pool, weights, gradient))?;
+        over.filled(shape, |quantity, batch, gradient| pool.weighted(batch, quantity, weights, gradient))?;
     let batch = counted.batch(bodies);
     let terms = rounded::<T>(py, &[&batch[..], &[weights.len()]].concat(), pooled.terms)?;
     let shares = rounded::<T>(py, &[bodies], pooled.shares)?;
@@ -61,15 +61,16 @@ pub fn weighted<'py, T: Data + Element>(
 /// (terms, shares, jacobian) of `Quantity.terms`.
 pub fn terms<'py, T: Data + Element>(
     over: &Over<'_, 'py, T>,
-    terms: &dyn EvaluateTerms<T>,
+    terms: &Terms,
     counted: &Counted<'py>,
 ) -> PyResult<Bound<'py, PyTuple>> {
     let (py, bodies) = (over.py(), over.vertices.shape()[0]);
     let pool = &counted.pool(bodies)?;
-    let shape = [bodies, 5 * over.vertices.shape()[1]];
-    let (jacobian, Pooled { terms, shares }) =
-        over.filled(&shape, |_, batch, jacobian| terms.terms(batch, pool, jacobian))?;
-    let terms = rounded::<T>(py, &[&counted.batch(bodies)[..], &[NUM_TERMS]].concat(), terms)?;
+    let (jacobian, pooled) = over.filled(&[bodies, terms.jacobian_row(over.template())], |_, batch, jacobian| {
+        pool.terms(batch, terms, jacobian)
+    })?;
+    let Pooled { terms: values, shares } = pooled;
+    let terms = rounded::<T>(py, &[&counted.batch(bodies)[..], &[terms.widths().len()]].concat(), values)?;
     (terms, rounded::<T>(py, &[bodies], shares)?, jacobian).into_pyobject(py)
 }
 
@@ -82,41 +83,43 @@ fn rounded<'py, T: Data + Element>(
     written(py, shape, numbers.into_iter().map(T::of))
 }
 
-/// A backward of `terms`: the gradient (B, V, 3) of terms put together by their upstream d_terms, (K,) or (B, K).
-#[pyfunction]
+/// The backward of `Quantity.terms`.
 pub fn terms_backward<'py>(
-    py: Python<'py>,
+    widths: &[usize],
     jacobian: Bound<'py, PyAny>,
     shares: Bound<'py, PyAny>,
     d_terms: Bound<'py, PyAny>,
-    normal: PyReadonlyArray2<'py, f64>,
+    normal: &PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
     if jacobian.cast::<PyArray2<f32>>().is_ok() {
-        return put_together::<f32>(py, jacobian.extract()?, shares.extract()?, d_terms.extract()?, &normal);
+        return gradient::<f32>(widths, jacobian.extract()?, shares.extract()?, d_terms.extract()?, normal);
     }
-    put_together::<f64>(py, jacobian.extract()?, shares.extract()?, d_terms.extract()?, &normal)
+    gradient::<f64>(widths, jacobian.extract()?, shares.extract()?, d_terms.extract()?, normal)
 }
 
-fn put_together<'py, T: Data + Element>(
-    py: Python<'py>,
+fn gradient<'py, T: Data + Element>(
+    widths: &[usize],
     jacobian: PyReadonlyArray2<'py, T>,
     shares: PyReadonlyArray1<'py, T>,
     d_terms: PyReadonlyArrayDyn<'py, T>,
     normal: &PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (bodies, vertices) = (jacobian.shape()[0], jacobian.shape()[1] / 5);
+    let py = jacobian.py();
+    let (bodies, count) = (jacobian.shape()[0], widths.len());
+    let vertices = jacobian.shape()[1] / widths.iter().sum::<usize>();
     let normals = triples(normal, "normal")?.iter().map(|normal| normal.map(T::of));
     let normals = memory::guarded(|| Ok(memory::collect(normals))).map_err(python_error)?;
     let d_terms = flat(&d_terms, "d_terms")?;
     let one_or_all = |count| count == 1 || count == bodies;
-    if shares.len() != bodies || !one_or_all(normals.len()) || ![NUM_TERMS, NUM_TERMS * bodies].contains(&d_terms.len())
-    {
+    if shares.len() != bodies || !one_or_all(normals.len()) || ![count, count * bodies].contains(&d_terms.len()) {
         let got = format!("{} shares, {} normals and {} d_terms", shares.len(), normals.len(), d_terms.len());
         return Err(PyValueError::new_err(format!("jacobian: of {bodies} bodies, but there are {got}")));
     }
     let gradient = unwritten::<T>(py, &[bodies, vertices, 3])?;
     let mut filled = gradient.readwrite();
     let (filled, jacobian, shares) = (filled.as_slice_mut()?, jacobian.as_slice()?, shares.as_slice()?);
-    detached(py, |interrupted| gradient_of_terms(jacobian, shares, d_terms, &normals, filled, interrupted))?;
+    detached(py, |interrupted| {
+        reduction::terms_backward(widths, jacobian, shares, d_terms, &normals, filled, interrupted)
+    })?;
     Ok(gradient.into_any())
 }

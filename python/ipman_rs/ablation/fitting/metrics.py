@@ -1,4 +1,4 @@
-"""The figures of fitted bodies against what is true of the people, an entry a body; metres where nothing is said."""
+"""Metrics of fitted bodies against the true people, one entry per body; in metres unless stated otherwise."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.floating]
 
 
 @dataclasses.dataclass(frozen=True)
-class Figures:
+class FitMetrics:
     """aligned errors: pelvis on pelvis. lowest: of the vertices above the floor. margins: of the exact centre of mass
     inside the base of support of samples within 10 and 3 cm of the floor. size: of the body in its zero pose over the
     true one."""
@@ -36,7 +36,7 @@ class Figures:
     converged: Array
 
 
-def figures(fit: Fit, task: Task, truth: Truth) -> Figures:
+def fit_metrics(fit: Fit, task: Task, truth: Truth) -> FitMetrics:
     """Where the camera is known, errors are those in the world. Where it is not, aligned errors are in the axes of the
     cameras, and those in the world are after the turn about the vertical and the shift along the floor that fit best,
     heights being those above the floor."""
@@ -59,7 +59,7 @@ def figures(fit: Fit, task: Task, truth: Truth) -> Figures:
         world = along_floor(on_floor, truth.surface)
     else:
         world = surface.numpy()
-    return Figures(
+    return FitMetrics(
         *body_errors(*seen),
         pve(world, truth.surface),
         margins[0],
@@ -89,7 +89,7 @@ def along_floor(points: Array, target: Array) -> Array:
     return moved
 
 
-def snapped(fit: Fit) -> Fit:
+def snap_to_floor(fit: Fit) -> Fit:
     """The bodies moved vertically until their lowest vertices lie on the floor: what a floor alone explains."""
     with torch.no_grad():
         candidate = Candidate(fit.problem, fit.variables)
@@ -99,4 +99,4 @@ def snapped(fit: Fit) -> Fit:
     return dataclasses.replace(fit, variables={**fit.variables, "transl": transl})
 
 
-__all__ = ["Figures", "along_floor", "figures", "snapped"]
+__all__ = ["FitMetrics", "along_floor", "fit_metrics", "snap_to_floor"]

@@ -1,9 +1,9 @@
-"""What a fit is told of people: points in an image, and
+"""The observations that a fit gets of a person: points in an image, and
 
 calibrated   the camera and the floor in the world; no pose (IPMAN-O*)
 regressed    as calibrated, but fits begin where a network's estimate might be, and not at a search over yaws
-presented    a pose that the person imitates, true but for some degrees a number, with its floor; height and mass; the
-             camera and its focal length are unknown (IPMAN-O)
+presented    a pose that the person imitates, true up to noise of some degrees per number, with its floor; height and
+             mass; the camera and its focal length are unknown (IPMAN-O)
 
 Points are those that MediaPipe has, moved by 1 % of the person's height in the image (standard deviation of each
 coordinate), one in thirty by 5 %, and one in ten not seen.
@@ -25,8 +25,8 @@ from ipman_rs.body import load_body
 from ...data.keypoints import mediapipe
 from ...fitting import start
 from ...fitting.camera import Camera
-from ...fitting.landmarks import Landmarks, known
-from ...fitting.presented import touching
+from ...fitting.landmarks import Landmarks, landmark_names
+from ...fitting.presented import self_touching_vertices
 from ...fitting.problem import Presented, Problem
 from .truth import FITTED, Truth
 
@@ -48,17 +48,17 @@ class Task:
     camera: Camera
 
 
-def calibrated(truth: Truth, seed: int) -> Task:
+def calibrated_task(truth: Truth, seed: int) -> Task:
     draw = np.random.default_rng([seed, 1])
     camera = cameras(truth, draw)
     problem = _seen(truth, camera, draw)
     return Task(problem, start.before_camera(problem), camera)
 
 
-def regressed(truth: Truth, seed: int) -> Task:
+def regressed_task(truth: Truth, seed: int) -> Task:
     """Starts: the true pose but for a noise, the mean shape, the pelvis seen where it is but at a wrong distance."""
     draw = np.random.default_rng([seed, 3])
-    task = calibrated(truth, seed)
+    task = calibrated_task(truth, seed)
     pose = torch.from_numpy(truth.pose + math.radians(REGRESSED) * draw.standard_normal(truth.pose.shape))
     away = torch.from_numpy(np.exp(DEPTH * draw.standard_normal(len(truth))))
     camera = task.camera
@@ -69,7 +69,7 @@ def regressed(truth: Truth, seed: int) -> Task:
     return Task(task.problem, starts, camera)
 
 
-def presented(truth: Truth, seed: int, noise: float) -> Task:
+def presented_task(truth: Truth, seed: int, noise: float) -> Task:
     """noise: degrees."""
     draw = np.random.default_rng([seed, 2])
     camera = cameras(truth, draw)
@@ -99,12 +99,12 @@ def _touching(pose: Array) -> Tensor:
     body = load_body(FITTED)
     contact = torch.zeros(len(pose), body.num_vertices, dtype=torch.bool)
     for row, each in enumerate(pose):
-        contact[row, torch.from_numpy(touching(body, each))] = True
+        contact[row, torch.from_numpy(self_touching_vertices(body, each))] = True
     return contact
 
 
 def cameras(truth: Truth, draw: np.random.Generator) -> Camera:
-    """One a person, from anywhere around, looking at the middle of the body."""
+    """One camera per person, at any azimuth, looking at the middle of the body."""
     count = len(truth)
     middle = (truth.surface.max(axis=1) + truth.surface.min(axis=1)) / 2
     heading, distance = draw.uniform(0, 2 * np.pi, count), draw.uniform(*DISTANCE, count)
@@ -130,7 +130,7 @@ def _looking(towards: Array, roll: Array) -> Array:
 def _seen(truth: Truth, camera: Camera, draw: np.random.Generator) -> Problem:
     """The problem with a given camera and the floor y = 0."""
     body = ipt.BodyModel(FITTED)
-    there = known(load_body(FITTED))
+    there = landmark_names(load_body(FITTED))
     names = tuple(name for name in mediapipe.NAMES if name in there)
     points = camera.project(torch.from_numpy(truth.landmarks[:, [there.index(name) for name in names]])).numpy()
     size = np.ptp(points[..., 1], axis=1).clip(min=np.ptp(points[..., 0], axis=1))
@@ -156,4 +156,4 @@ def _under(pose: Array, above: Array) -> ipt.Ground:
     return ipt.Ground(torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(len(pose), 3), torch.from_numpy(level))
 
 
-__all__ = ["Task", "calibrated", "presented", "regressed"]
+__all__ = ["Task", "calibrated_task", "presented_task", "regressed_task"]

@@ -19,12 +19,12 @@ from ipman_rs.files.page_templates import environment
 from ipman_rs.jsonable import jsonable
 
 from ...synthetic import at_rest
-from .metrics import Figures
-from .run import Benchmark, Block, Result
-from .truth import Truth, floors
+from .metrics import FitMetrics
+from .run import Benchmark, Block, VariantResult
+from .truth import Truth, error_floors
 
 Array = NDArray[np.floating]
-Found = Sequence[tuple[Block, Truth, Sequence[Result]]]
+Found = Sequence[tuple[Block, Truth, Sequence[VariantResult]]]
 
 NAME = "fitting_benchmark"
 # Differences of these have intervals, with so many digits; the tables and the plot show the second line's.
@@ -57,7 +57,7 @@ def write(found: Found, run: Benchmark) -> Path:
     record = jsonable(
         {
             "run": {**asdict(run), "folder": None},
-            "floors": floors(found[0][1]),
+            "floors": error_floors(found[0][1]),
             "blocks": [_record(*block) for block in found],
         }
     )
@@ -84,8 +84,8 @@ def page(record: dict[str, Any]) -> str:
     )  # fmt: skip
 
 
-def columns(figures: Figures, baseline: Figures) -> dict[str, Array]:
-    """The figures as tables show them, an entry a body: millimetres, and shares as 0 or 100 %."""
+def columns(figures: FitMetrics, baseline: FitMetrics) -> dict[str, Array]:
+    """The metrics in the units of the tables, one entry per body: millimetres, and shares as 0 or 100 %."""
     return {
         "MPJPE": 1e3 * figures.mpjpe,
         "PA-MPJPE": 1e3 * figures.pa_mpjpe,
@@ -101,7 +101,7 @@ def columns(figures: Figures, baseline: Figures) -> dict[str, Array]:
     }
 
 
-def _record(block: Block, truth: Truth, results: Sequence[Result]) -> dict[str, Any]:
+def _record(block: Block, truth: Truth, results: Sequence[VariantResult]) -> dict[str, Any]:
     """Means and intervals, whole and by family."""
     families = list(dict.fromkeys(truth.family.tolist()))
     by_name = {result.row.name: columns(result.figures, results[0].figures) for result in results}

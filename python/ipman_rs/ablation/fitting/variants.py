@@ -1,17 +1,17 @@
-"""What is compared: presets, less some of their terms."""
+"""The variants compared: presets, some without some of their terms."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
-from ...fitting.config import Config, capped, load
+from ...fitting.config import Config, limit_iterations, load
 
 PHYSICS = ("stability", "balance", "ground")
 
 
 @dataclass(frozen=True)
-class Row:
+class Variant:
     """preset: less the terms of `without`. snap: the fitted body is then put onto the floor."""
 
     name: str
@@ -20,17 +20,17 @@ class Row:
     snap: bool = False
 
 
-def rows(literal: str, with_physics: str, ours: str) -> list[Row]:
+def rows(literal: str, with_physics: str, ours: str) -> list[Variant]:
     """Baseline: the preset with both terms less them, so that all rows free the same variables in the same stages."""
     return [
-        Row("baseline", with_physics, PHYSICS),
-        Row("+ ground", with_physics, ("stability",)),
-        Row("+ stability", with_physics, ("ground",)),
-        Row("both", with_physics),
-        Row("ours", ours),
-        Row("ours without physics", ours, PHYSICS),
-        Row("as published", literal),
-        Row("baseline, snapped", with_physics, PHYSICS, snap=True),
+        Variant("baseline", with_physics, PHYSICS),
+        Variant("+ ground", with_physics, ("stability",)),
+        Variant("+ stability", with_physics, ("ground",)),
+        Variant("both", with_physics),
+        Variant("ours", ours),
+        Variant("ours without physics", ours, PHYSICS),
+        Variant("as published", literal),
+        Variant("baseline, snapped", with_physics, PHYSICS, snap=True),
     ]
 
 
@@ -38,9 +38,9 @@ CALIBRATED = rows("smplify-x", "ipman-o-star", "fast")
 PRESENTED = rows("smplify-xmc", "ipman-o", "balanced")
 
 
-def config(row: Row, iterations: int) -> Config:
+def config(row: Variant, iterations: int) -> Config:
     """The preset of a row; stages that would run longer end after `iterations`."""
-    preset = capped(load(row.preset), iterations)
+    preset = limit_iterations(load(row.preset), iterations)
     stages = (replace(stage, weights=_less(stage.weights, row.without)) for stage in preset.stages)
     return replace(preset, stages=tuple(stages))
 
@@ -49,4 +49,4 @@ def _less(weights: Mapping[str, float], names: Collection[str]) -> dict[str, flo
     return {name: weight for name, weight in weights.items() if name not in names}
 
 
-__all__ = ["CALIBRATED", "PRESENTED", "Row", "config", "rows"]
+__all__ = ["CALIBRATED", "PRESENTED", "Variant", "config", "rows"]

@@ -1,4 +1,4 @@
-"""What the paper claims of its terms on RICH against HMR*, and what the figures here say of it.
+"""The paper's claims about its terms on RICH against HMR*, and whether our numbers support them.
 
 Table 1: HMR* 92.4 mm PVE and 62.0 % BoSE; + ground 89.9, 66.5; + stability 90.8, 69.6; both, IPMAN-R, 89.9, 71.2. Table
 of push and pull: HMR* 92.3 mm; + push 96.6, + pull 99.4: either alone makes bodies worse.
@@ -51,7 +51,7 @@ CLAIMS = (
 )
 
 
-def judged(blocks: Sequence[dict[str, Any]]) -> list[tuple[Claim, list[tuple[Verdict, Sequence[float]]]]]:
+def judge_claims(blocks: Sequence[dict[str, Any]]) -> list[tuple[Claim, list[tuple[Verdict, Sequence[float]]]]]:
     """Every claim with its verdict and the interval, of each block of the record (each tilt)."""
     return [(claim, [_judged(claim, block) for block in blocks]) for claim in CLAIMS]
 

@@ -1,5 +1,5 @@
 """The ablation on images that `ipman data render` drew: the small backbone learns where keypoints are, and the
-regressor from keypoints is trained on what it finds."""
+regressor from keypoints is trained on its detections."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from ipman_rs.body import load_body
 from ipman_rs.data.rendered import Rendered
 from ipman_rs.files import atomic_write
 
-from ...training.augment import Augmenting, normalised
+from ...training.augment import AugmentConfig, normalised
 from ...training.batch import Batch
-from ...training.lifting.network import lifter
+from ...training.lifting.network import lifting_network
 from ...training.model import HMR, keypoint_maps_loss
 from ...training.model.backbones import Small, mean_positions
 from ...training.model.keypoint_encoder import KEYPOINTS
 from ...training.posed_estimate import Posing
 from ...training.sources import BadSample
 from ...training.sources.images import Images
-from ...training.train_loop import AT_ONCE, Drill, drill
+from ...training.train_loop import AT_ONCE, TrainingPlan, run_plan
 from .task import Progress, key_of
 
 SPLITS = {"test": "test", "tune": "val"}
@@ -36,12 +36,12 @@ CUTS = 2  # of each image that is trained on, flipped, turned and scaled by them
 # At most, and new at each step: radians, share of the side, half sides across and down. Without it the backbone learns
 # its cuts by heart, and what it finds in them is better than what it finds in others.
 JITTER = (0.26, 0.12, 0.1, 0.1)
-AUGMENTING = Augmenting(degrees=30.0, turned=1.0, scale=0.1, noise=0.2)
+AUGMENTING = AugmentConfig(degrees=30.0, turned=1.0, scale=0.1, noise=0.2)
 WIDTH, BLOCKS = 512, 2  # of the regressor from keypoints: what is found has more to be made out than what is given
 
 
 @dataclass(frozen=True)
-class Pictures:
+class ImageTask:
     """images: a folder of `ipman data render`. others: another one, whose images figures are taken of. folder: where
     crops are kept."""
 
@@ -71,18 +71,18 @@ class Pictures:
             if not place.exists():
                 _save(_cut(data, cuts, progress), place)
 
-    def see(self, seed: int, plan: Drill, file: BinaryIO) -> None:
+    def fit_backbone(self, seed: int, plan: TrainingPlan, file: BinaryIO) -> None:
         """The file gets the backbone, and the keypoints (n, K, 3) that it finds in the crops that are trained on."""
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             eye = Small()
         crops = self.training()
-        drill(
-            eye, lambda batch: keypoint_maps_loss(eye.maps(batch.inputs)[0], batch.keypoints), crops, moved, plan, seed
+        run_plan(
+            eye, lambda batch: keypoint_maps_loss(eye.maps(batch.inputs)[0], batch.keypoints), crops, jitter, plan, seed
         )
         generator = torch.Generator().manual_seed(seed)
         parts = (crops[start : start + AT_ONCE] for start in range(0, len(crops), AT_ONCE))
-        found = torch.cat([found_by(eye, tinted(part, generator)) for part in parts])
+        found = torch.cat([detect_keypoints(eye, tint(part, generator)) for part in parts])
         torch.save({"backbone": eye.state_dict(), "keypoints": found}, file)
 
     def training(self, seen: Path | None = None) -> Batch:
@@ -100,14 +100,14 @@ class Pictures:
             return crops
         eye = Small()
         eye.load_state_dict(_read(seen)["backbone"])
-        return dataclasses.replace(crops, inputs=found_by(eye, crops))
+        return dataclasses.replace(crops, inputs=detect_keypoints(eye, crops))
 
     def noisy(self, batch: Batch, generator: torch.Generator) -> Batch:
-        """As they are: what is seen has errors of its own."""
+        """No added noise: detected keypoints already contain errors."""
         return batch
 
-    def lifter(self, seed: int) -> HMR:
-        return lifter(seed, self._data("train").index["settings"]["body"], WIDTH, BLOCKS)
+    def lifting_network(self, seed: int) -> HMR:
+        return lifting_network(seed, self._data("train").index["settings"]["body"], WIDTH, BLOCKS)
 
     def posing(self) -> Posing:
         return Posing(ipt.BodyModel(self._data("train").index["settings"]["body"]), KEYPOINTS)
@@ -125,15 +125,15 @@ class Pictures:
         return self.folder / f"crops-{key_of([SIZE, self.tested_on()])}.pt"
 
 
-def tinted(crops: Batch, generator: torch.Generator) -> Batch:
+def tint(crops: Batch, generator: torch.Generator) -> Batch:
     """Normalised, each colour brighter or darker."""
     gains = 1 + AUGMENTING.noise * (2 * torch.rand(len(crops), 3, generator=generator) - 1)
     return dataclasses.replace(crops, inputs=normalised(crops.inputs, gains))
 
 
-def moved(crops: Batch, generator: torch.Generator) -> Batch:
+def jitter(crops: Batch, generator: torch.Generator) -> Batch:
     """Tinted, and cut anew out of themselves: images and keypoints turned, scaled and shifted by up to JITTER."""
-    crops = tinted(crops, generator)
+    crops = tint(crops, generator)
     draws = (2 * torch.rand(len(crops), len(JITTER), generator=generator) - 1) * torch.tensor(JITTER)
     turn, scale, shift = draws[:, 0], 1 + draws[:, 1], draws[:, 2:]
     cosine, sine = scale * turn.cos(), scale * turn.sin()
@@ -148,8 +148,8 @@ def moved(crops: Batch, generator: torch.Generator) -> Batch:
 
 
 @torch.no_grad()
-def found_by(eye: Small, crops: Batch) -> Tensor:
-    """Keypoints (B, K, 3), confidence 1, where their maps have their mean."""
+def detect_keypoints(eye: Small, crops: Batch) -> Tensor:
+    """Keypoints (B, K, 3) at the means of their maps, with confidence 1."""
     eye.eval()
     places = torch.cat([mean_positions(eye.maps(part)[0]) for part in crops.inputs.split(AT_ONCE)])
     places = places[:, : crops.keypoints.shape[1]]

@@ -14,7 +14,7 @@ from ...training.batch import Batch
 from ...training.lifting import network, views
 from ...training.model import HMR
 from ...training.posed_estimate import Posing
-from ...training.train_loop import Drill
+from ...training.train_loop import TrainingPlan
 from .task import Progress
 
 TRAINING = 31_000  # seeds: of the people that are trained on, and those whose figures are reported or tuned on
@@ -23,7 +23,7 @@ VIEWS = 4  # of each person that is trained on
 
 
 @dataclass(frozen=True)
-class Keypoints:
+class KeypointTask:
     """people: that are trained on. bodies: whose figures are taken, an image each. folder: where people are kept."""
 
     folder: Path
@@ -49,7 +49,7 @@ class Keypoints:
             self._drawn(TRAINING, self.people, lambda done: progress(done, count))
             self._drawn(SPLITS[self.split], self.bodies, lambda done: progress(self.people + done, count))
 
-    def see(self, seed: int, plan: Drill, file: BinaryIO) -> None:
+    def fit_backbone(self, seed: int, plan: TrainingPlan, file: BinaryIO) -> None:
         """Nothing: keypoints are given."""
 
     def training(self, seen: Path | None = None) -> Batch:
@@ -60,17 +60,17 @@ class Keypoints:
         return self.noisy(views.views(self._drawn(seed, self.bodies), seed), torch.Generator().manual_seed(seed))
 
     def noisy(self, batch: Batch, generator: torch.Generator) -> Batch:
-        return views.noisy(batch, generator)
+        return views.add_noise(batch, generator)
 
-    def lifter(self, seed: int) -> HMR:
-        return network.lifter(seed)
+    def lifting_network(self, seed: int) -> HMR:
+        return network.lifting_network(seed)
 
     def posing(self) -> Posing:
         return views.posing()
 
-    def _drawn(self, seed: int, count: int, progress: Callable[[int], None] | None = None) -> population.Bodies:
+    def _drawn(self, seed: int, count: int, progress: Callable[[int], None] | None = None) -> population.Population:
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f"people-{seed}-{count}.npz"
         if not path.exists():
-            population.draw_bodies(count, seed, progress).save(path)
-        return population.Bodies.load(path)
+            population.draw_population(count, seed, progress).save(path)
+        return population.Population.load(path)

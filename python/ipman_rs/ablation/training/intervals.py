@@ -1,4 +1,4 @@
-"""What of a difference of two rows is chance: of the bodies, and of the seeds of training."""
+"""Confidence intervals of the difference of two rows: over the bodies, and over the seeds of training."""
 
 from __future__ import annotations
 

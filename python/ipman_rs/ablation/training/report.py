@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from ipman_rs.files import atomic_write, write_whole
 from ipman_rs.files.page_templates import environment
 
-from ...training.metrics import COLUMNS, Figures, columns
-from .claims import UNITS, judged
+from ...training.metrics import COLUMNS, PoseMetrics, columns
+from .claims import UNITS, judge_claims
 from .intervals import paired_over_seeds
-from .run import TILTS, Benchmark, Result
+from .run import TILTS, Benchmark, VariantResult
 from .variants import BASELINE, CONTROL, OURS
 
 Array = NDArray[np.floating]
-Found = Mapping[float, Sequence[Result]]
+Found = Mapping[float, Sequence[VariantResult]]
 
 PAGES = {"keypoints": "training_benchmark", "images": "training_benchmark_images"}
 TEMPLATE = "training_benchmark.md.j2"
@@ -62,12 +62,12 @@ def page(record: dict[str, Any]) -> str:
     tilts = tuple(block["tilt"] for block in record["blocks"])
     return pages.get_template(TEMPLATE).render(
         record, name=PAGES[task], tilts="" if tilts == TILTS[task] else "".join(f" --tilt {tilt:g}" for tilt in tilts),
-        verdicts=verdicts(record["blocks"]), claims=judged(record["blocks"]), units=UNITS, columns=COLUMNS,
+        verdicts=verdicts(record["blocks"]), claims=judge_claims(record["blocks"]), units=UNITS, columns=COLUMNS,
         differences=DIFFERENCES,
     )  # fmt: skip
 
 
-def _record(tilt: float, results: Sequence[Result]) -> dict[str, Any]:
+def _record(tilt: float, results: Sequence[VariantResult]) -> dict[str, Any]:
     """Means and intervals of the labels of one tilt."""
     tables = {result.row.name: _stacked(result.figures) for result in results}
     baseline = tables[BASELINE]
@@ -85,7 +85,7 @@ def _record(tilt: float, results: Sequence[Result]) -> dict[str, Any]:
     return {"tilt": tilt, "bodies": len(results[0].figures[0].pve), "rows": rows}
 
 
-def _stacked(figures: Sequence[Figures]) -> dict[str, Array]:
+def _stacked(figures: Sequence[PoseMetrics]) -> dict[str, Array]:
     """{column: (seeds, bodies)}."""
     of_seeds = [columns(one) for one in figures]
     return {key: np.stack([one[key] for one in of_seeds]) for key in COLUMNS}
@@ -129,7 +129,7 @@ def _signed(value: float, digits: int = 1) -> str:
 
 
 def _write_csv(found: Found, path: Path) -> None:
-    """A line a body, row and seed."""
+    """One line per body, row and seed."""
     file = io.StringIO(newline="")
     lines = csv.writer(file)
     lines.writerow(["labels", "row", "seed", "body", *COLUMNS])

@@ -1,4 +1,4 @@
-"""Training of all rows on all labels, in several processes. What is done is kept in a folder, and not done again."""
+"""Training of all rows on all labels, in several processes. Finished jobs are saved in a folder and reused."""
 
 from __future__ import annotations
 
@@ -19,47 +19,47 @@ from ipman_rs.torch.threads import one_thread
 
 from ...training.batch import Batch
 from ...training.losses import Loss
-from ...training.metrics import Figures, figures
-from ...training.tilted_labels import Lean, leaning
-from ...training.train_loop import Drill, drill, estimated
+from ...training.metrics import PoseMetrics, pose_metrics
+from ...training.tilted_labels import TiltAxis, tilt_labels
+from ...training.train_loop import TrainingPlan, estimate_all, run_plan
 from .shuffled_camera import shuffled_camera
 from .task import Plan, Task, key_of
-from .variants import Row, settings
+from .variants import Variant, ablation_of
 
 LEANS, DEALS = 35_000, 36_000  # seeds of the labels' leans, and of the shuffled cameras
 TILTS = {"keypoints": (0.0, 4.0, 8.0, 12.0), "images": (0.0, 8.0)}
 
 
 @dataclass(frozen=True)
-class Result:
+class VariantResult:
     """A row, and its figures for each seed."""
 
-    row: Row
-    figures: list[Figures]
+    row: Variant
+    figures: list[PoseMetrics]
 
 
 @dataclass(frozen=True)
 class Job:
-    """Training of a row; of what all rows go on from (row: None); or first learning to see (tilt: None, too)."""
+    """Training of a row; of the model from which all rows start (row: None); or of the backbone (tilt: None, too)."""
 
     seed: int
     tilt: float | None = None
-    row: Row | None = None
+    row: Variant | None = None
 
 
 @dataclass(frozen=True)
 class Benchmark:
-    """seeds: of weights and batches. part: of the settings' steps, for trials. lean: as in `leaning`."""
+    """seeds: of weights and batches. part: of the settings' steps, for trials. lean: as in `tilt_labels`."""
 
     folder: Path
     task: Task
     seeds: int = 3
     part: float = 1.0
-    lean: Lean = "camera"
+    lean: TiltAxis = "camera"
 
     def run(
         self, tilts: Sequence[float], workers: int = 1, progress: Callable[[int, int], None] | None = None
-    ) -> dict[float, list[Result]]:
+    ) -> dict[float, list[VariantResult]]:
         """All rows with labels that lean by `tilts` degrees. progress: how many trainings of how many are done."""
         self.folder.mkdir(parents=True, exist_ok=True)
         self.task.make()
@@ -74,14 +74,14 @@ class Benchmark:
 
     @cached_property
     def plan(self) -> Plan:
-        told = settings(self.task.name).plan
+        told = ablation_of(self.task.name).plan
         return Plan(self._shortened(told.base), self._shortened(told.fine), told.first and self._shortened(told.first))
 
     @property
-    def rows(self) -> tuple[Row, ...]:
-        return settings(self.task.name).rows
+    def rows(self) -> tuple[Variant, ...]:
+        return ablation_of(self.task.name).rows
 
-    def _shortened(self, plan: Drill) -> Drill:
+    def _shortened(self, plan: TrainingPlan) -> TrainingPlan:
         return replace(plan, steps=max(1, round(plan.steps * self.part)))
 
     def do(self, job: Job) -> None:
@@ -92,7 +92,7 @@ class Benchmark:
         with one_thread(), atomic_write(place) as file:
             if job.tilt is None:
                 assert self.plan.first
-                self.task.see(job.seed, self.plan.first, file)
+                self.task.fit_backbone(job.seed, self.plan.first, file)
             else:
                 self._train(job, job.tilt, file)
 
@@ -116,15 +116,15 @@ class Benchmark:
                 raise
 
     def _can_begin(self, job: Job) -> bool:
-        """Whether what it goes on from is there."""
+        """Whether the file that it starts from exists."""
         if job.row is not None:
             return self._place(replace(job, row=None)).exists()
         seen = self._seen(job.seed)
         return job.tilt is None or seen is None or seen.exists()
 
     def _train(self, job: Job, tilt: float, file: BinaryIO) -> None:
-        """The file gets weights, or figures of a row."""
-        model, data, posing = self.task.lifter(job.seed), self._data(job.seed, tilt), self.task.posing()
+        """Writes weights, or the metrics of a row, into the file."""
+        model, data, posing = self.task.lifting_network(job.seed), self._data(job.seed, tilt), self.task.posing()
         if job.row is not None:
             model.load_state_dict(torch.load(self._place(replace(job, row=None)), weights_only=True))
         physics = None if job.row is None else job.row.physics(posing.body.template)
@@ -132,19 +132,19 @@ class Benchmark:
         if job.row is not None and job.row.shuffled:
             data = shuffled_camera(data, DEALS)
         plan, seed = (self.plan.base, job.seed) if job.row is None else (self.plan.fine, 1000 + job.seed)
-        drill(model, lambda batch: loss(model(batch.inputs), batch)[0], data, self.task.noisy, plan, seed)
+        run_plan(model, lambda batch: loss(model(batch.inputs), batch)[0], data, self.task.noisy, plan, seed)
         if job.row is None:
             torch.save(model.state_dict(), file)
         else:
             truth = self._truth(job.seed)
-            figures(estimated(model, truth.inputs), truth, posing).save(file)
+            pose_metrics(estimate_all(model, truth.inputs), truth, posing).save(file)
 
     def _data(self, seed: int, tilt: float) -> Batch:
         """The last one is kept."""
         seen = self._seen(seed)
         if (seen, tilt) not in self._kept:
             self._kept.clear()
-            self._kept[seen, tilt] = leaning(self.task.training(seen), tilt, LEANS, self.lean)
+            self._kept[seen, tilt] = tilt_labels(self.task.training(seen), tilt, LEANS, self.lean)
         return self._kept[seen, tilt]
 
     @cached_property
@@ -166,8 +166,8 @@ class Benchmark:
         """The file of what the first stage sees."""
         return self._place(Job(seed)) if self.plan.first else None
 
-    def _result(self, tilt: float, row: Row) -> Result:
-        return Result(row, [Figures.load(self._place(Job(seed, tilt, row))) for seed in range(self.seeds)])
+    def _result(self, tilt: float, row: Variant) -> VariantResult:
+        return VariantResult(row, [PoseMetrics.load(self._place(Job(seed, tilt, row))) for seed in range(self.seeds)])
 
     def _place(self, job: Job) -> Path:
         """The file of a result: named by all that decides it."""

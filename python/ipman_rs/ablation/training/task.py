@@ -1,4 +1,4 @@
-"""What a regressor of the ablation sees: from keypoints (`keypoints.py`), or from rendered images (`pictures.py`)."""
+"""The tasks of the ablation: regression from keypoints (`from_keypoints.py`) or rendered images (`from_images.py`)."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ import torch
 from ...training.batch import Batch
 from ...training.model import HMR
 from ...training.posed_estimate import Posing
-from ...training.train_loop import Drill
+from ...training.train_loop import TrainingPlan
 
 Progress = Callable[[int, int], None]  # how many of how many are made
 
 
 @dataclass(frozen=True)
 class Plan:
-    """first: learning to see keypoints, once for each seed; None for none. base: training without physics, once for
-    each seed and tilt. fine: what each row goes on with."""
+    """first: training of the backbone on keypoints, once for each seed; None for none. base: training without physics,
+    once for each seed and tilt. fine: the fine-tuning of each row."""
 
-    base: Drill
-    fine: Drill
-    first: Drill | None = None
+    base: TrainingPlan
+    fine: TrainingPlan
+    first: TrainingPlan | None = None
 
 
 class Task(Protocol):
@@ -38,34 +38,34 @@ class Task(Protocol):
         ...
 
     def trained_on(self) -> dict[str, Any]:
-        """All that decides the data that is trained on, for the page and for the names of kept results."""
+        """The settings that determine the training data, for the page and for the names of saved results."""
         ...
 
     def tested_on(self) -> dict[str, Any]:
-        """The same of the data that figures are taken of."""
+        """The settings that determine the test data."""
         ...
 
     def make(self, progress: Progress | None = None) -> None:
-        """Draw or read the data, and keep them in files."""
+        """Draw or read the data, and save them in files."""
         ...
 
-    def see(self, seed: int, plan: Drill, file: BinaryIO) -> None:
-        """Learn to see keypoints; what `training` and `truth` need of it goes into a file."""
+    def fit_backbone(self, seed: int, plan: TrainingPlan, file: BinaryIO) -> None:
+        """Train the backbone to detect keypoints; the file gets what `training` and `truth` need of it."""
         ...
 
     def training(self, seen: Path | None) -> Batch:
-        """What is trained on: keypoints, with true labels. seen: the file of `see`, where the plan has that stage."""
+        """The training set: keypoints, true labels. seen: the file of `fit_backbone`, if the plan has that stage."""
         ...
 
     def truth(self, seen: Path | None) -> Batch:
-        """What figures are taken of: inputs as the regressor takes them, true labels, static people."""
+        """The test set: inputs of the regressor, true labels, static people."""
         ...
 
     def noisy(self, batch: Batch, generator: torch.Generator) -> Batch:
         """Rows of `training` with inputs as the regressor takes them, with noise that is new at each step."""
         ...
 
-    def lifter(self, seed: int) -> HMR:
+    def lifting_network(self, seed: int) -> HMR:
         """The regressor from keypoints with the weights that a seed draws."""
         ...
 
@@ -73,5 +73,5 @@ class Task(Protocol):
 
 
 def key_of(told: Any) -> str:
-    """A short name of all that decides a result."""
+    """A short hash of the settings that determine a result."""
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""What is compared, read from `settings.yaml`."""
+"""The variants compared, read from `settings.yaml`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 
 from ipman_rs import BodyTemplate
 
-from ...training.losses import Physics
-from ...training.train_loop import Drill
+from ...training.losses import PhysicsLoss
+from ...training.train_loop import TrainingPlan
 from .task import Plan
 
 BASELINE = "HMR*"
@@ -19,8 +19,8 @@ CONTROL = f"{OURS}, shuffled camera"
 
 
 @dataclass(frozen=True)
-class Row:
-    """Fine-tuning with the terms of a preset, none if it is None. weights: λ that differ from the preset's.
+class Variant:
+    """One row of the table: fine-tuning with the terms of a preset, or with none. weights: λ unlike the preset's.
     shuffled: the physics terms see the cameras of other images."""
 
     name: str
@@ -28,24 +28,27 @@ class Row:
     weights: Mapping[str, float] = field(default_factory=dict)
     shuffled: bool = False
 
-    def physics(self, template: BodyTemplate) -> Physics | None:
-        return None if self.preset is None else Physics(template, self.preset, self.weights)
+    def physics(self, template: BodyTemplate) -> PhysicsLoss | None:
+        return None if self.preset is None else PhysicsLoss(template, self.preset, self.weights)
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Of one task."""
+class Ablation:
+    """The variants compared on one task, and the plan by which each is trained."""
 
     plan: Plan
-    rows: tuple[Row, ...]
+    rows: tuple[Variant, ...]
 
 
 @cache
-def settings(task: str) -> Settings:
+def ablation_of(task: str) -> Ablation:
     import yaml
 
-    told = yaml.safe_load((Path(__file__).parent / "settings.yaml").read_text())
-    stages = {name: Drill(**stage) for name, stage in told["plans"][task].items()}
-    own = told["weights"][task]  # of presets
-    rows = (Row(**{**row, "weights": own.get(row.get("preset"), {}) | row.get("weights", {})}) for row in told["rows"])
-    return Settings(Plan(**stages), tuple(rows))
+    content = yaml.safe_load((Path(__file__).parent / "settings.yaml").read_text())
+    stages = {name: TrainingPlan(**stage) for name, stage in content["plans"][task].items()}
+    own = content["weights"][task]  # of presets
+    rows = (
+        Variant(**{**row, "weights": own.get(row.get("preset"), {}) | row.get("weights", {})})
+        for row in content["rows"]
+    )
+    return Ablation(Plan(**stages), tuple(rows))

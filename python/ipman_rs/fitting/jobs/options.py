@@ -13,9 +13,9 @@ import ipman_rs.torch as ipt
 
 from ...body import BodyModel
 from ...data.keypoints.detections import Detections
-from .. import camera_file, config, detected, presented
+from .. import camera_file, config, detection_problem, presented
 from ..camera_file import KnownCamera
-from ..config import Config, weighs
+from ..config import Config, uses_terms
 from ..presented import PresentedBody
 from ..problem import Problem
 
@@ -65,11 +65,11 @@ class FitOptions:
 
     def check(self) -> None:
         """ValueError where the preset needs what is not given, or options contradict each other."""
-        if self.pose is None and weighs(self.config, "presented_pose", "presented_contact"):
+        if self.pose is None and uses_terms(self.config, "presented_pose", "presented_contact"):
             raise ValueError(f"preset {self.config.name} imitates a pose: give its name or file with --pose")
         if self.pose is None and (self.contact or self.pose_frame is not None or self.pose_up):
             raise ValueError("--contact, --pose-frame and --pose-up say more of a --pose: give that, too")
-        if self.height is None and self.mass is None and weighs(self.config, "measured_shape"):
+        if self.height is None and self.mass is None and uses_terms(self.config, "measured_shape"):
             raise ValueError(f"preset {self.config.name} knows the person's size: give --height or --mass, or both")
 
     def problem(
@@ -78,7 +78,9 @@ class FitOptions:
         """The fitting problem of detected people, who imitate a presented pose if there is one."""
         known = {"focal": self.focal, "pitch": self.pitch, "ground": self.ground}
         known |= {} if self.camera is None else {"camera": self.camera}
-        problem = detected.problem(model, detections, **known, height=self.height, mass=self.mass)
+        problem = detection_problem.problem_from_detections(
+            model, detections, **known, height=self.height, mass=self.mass
+        )
         if presented_body is None:
             return problem
         return presented.present(problem, [presented_body], self.config.moves_camera)
@@ -101,7 +103,7 @@ def fit_options(
 
     chosen = config.load(preset)
     if iterations is not None:
-        chosen = config.capped(chosen, iterations)
+        chosen = config.limit_iterations(chosen, iterations)
     if markers is not None:
         own.read(markers, ip.load_body(model))  # before anything is fitted
     known = None if camera is None else camera_file.read(camera)

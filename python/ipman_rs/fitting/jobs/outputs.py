@@ -24,7 +24,7 @@ from .. import photo
 from .items import Item
 
 if TYPE_CHECKING:
-    from ..result import Result
+    from ..result import FitResult
 
 _BEFORE = "before_"
 
@@ -41,7 +41,7 @@ class FittedItem:
 
 
 def write_item(
-    item: Item, result: Result, body: BodyModel, folder: Path, record: dict[str, Any], obj: bool
+    item: Item, result: FitResult, body: BodyModel, folder: Path, record: dict[str, Any], obj: bool
 ) -> FittedItem:
     """Write one fitted body: parameters, mesh, and the record that makes its folder complete. Raises OSError."""
     arrays = result.arrays()

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...data.markers import Point
     from ...study import Study
     from ..fit import Fit
-    from ..marker_fit import Person, Recorded
+    from ..marker_fit import MarkerFit, Person
     from .items import Item
     from .options import FitOptions
 
@@ -153,7 +153,7 @@ def _fit_markers(
             body, tracks, chosen, every=pace.every, ground=options.ground or 0.0, person=person, own=names,
             progress=lambda _stage, done: step.to(min(done, count)),
         )  # fmt: skip
-    findings, distances = marker_fit.judged_fit(fitted), fitted.skin_distances
+    findings, distances = marker_fit.check_fit(fitted), fitted.skin_distances
     flags = (*flags, *judge.admit(path, [*findings, *check_skin(distances)], options.force))
     errors = fitted.errors
     by_marker = {name: _mean(column) for name, column in zip(fitted.tracks.names, errors.T, strict=True)}
@@ -178,7 +178,7 @@ def _own_notes(own: Mapping[str, object] | None, names: Sequence[str], options: 
     return [f"no marker is called {', '.join(none[:8])}{more}, as {options.markers} has it (--markers)"]
 
 
-def _marker_notes(found: Recorded, options: FitOptions) -> list[str]:
+def _marker_notes(found: MarkerFit, options: FitOptions) -> list[str]:
     """What was done with the markers that is not odd."""
     notes = []
     if options.up is not None:
@@ -225,7 +225,7 @@ def _fit_frames(recording: Recording, options: FitOptions, pace: Pace, progress:
     problem = options.problem(model, join(frames), presented_body)
     rate = pace.fps / pace.every
     with progress(f"fitting {recording.name}", len(frames)) as step:
-        problem, variables = start.begin(problem, options.config.start)
+        problem, variables = start.initial_state(problem, options.config.start)
         fitted = fit_sequence(
             problem, variables, options.config, rate=rate, progress=lambda _stage, done: step.to(min(done, len(frames)))
         )

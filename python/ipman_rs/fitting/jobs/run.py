@@ -20,11 +20,11 @@ from ...files import safe_names
 from ...files.errors import FileError
 from ...progress import Progress, silent
 from ...study import Study
-from .. import detected, start
+from .. import detection_problem, start
 from ..camera_file import KnownCamera
 from ..fit import fit
 from ..presented import PresentedBody
-from ..result import Result, results
+from ..result import FitResult, fit_results
 from . import recordings
 from .items import MARKERS, InputOptions, Item, detect, expand, identity, read_items
 from .options import FitOptions, fit_options
@@ -181,7 +181,7 @@ def _fit_batch(
     model: ipt.BodyModel,
     presented_body: PresentedBody | None,
     progress: Progress,
-) -> Iterator[tuple[Item, Result]]:
+) -> Iterator[tuple[Item, FitResult]]:
     """The items of a batch that have a body, each with its result."""
     usable = [item for item in batch if not _refuse(item, model, options.camera)]
     if not usable:
@@ -190,10 +190,10 @@ def _fit_batch(
     problem = options.problem(model, detections, presented_body)
     config = options.config
     with progress(f"fitting {len(usable)}", len(usable) * len(config.stages)) as step:
-        problem, variables = start.begin(problem, config.start)
+        problem, variables = start.initial_state(problem, config.start)
         before = {stage.name: number * len(usable) for number, stage in enumerate(config.stages)}
         fitted = fit(problem, variables, config, lambda stage, ended: step.to(before[stage] + ended), trace=True)
-    for item, result in zip(usable, results(fitted, config, variables), strict=True):
+    for item, result in zip(usable, fit_results(fitted, config, variables), strict=True):
         if not result.finite:
             item.failure = "the fit found no finite body; check focal length, image size and points"
             continue
@@ -204,12 +204,14 @@ def _fit_batch(
 def _refuse(item: Item, model: ipt.BodyModel, camera: KnownCamera | None) -> bool:
     """Whether too few points of an item are visible, which becomes its failure; else its oddities become flags."""
     assert item.detections is not None
-    names = detected.shared_names(model, item.detections)
+    names = detection_problem.shared_names(model, item.detections)
     shared = item.detections.select(names)
-    item.failure = detected.too_little(names, shared.confidence[0])
+    item.failure = detection_problem.missing_keypoints(names, shared.confidence[0])
     if item.failure is not None:
         return True
     assert shared.image_size is not None
-    item.flags += detected.oddities(names, shared.points[0], shared.confidence[0], shared.image_size[0])
-    item.flags += [] if camera is None else detected.unlike(camera, shared.image_size[0])
+    item.flags += detection_problem.suspicious_keypoints(
+        names, shared.points[0], shared.confidence[0], shared.image_size[0]
+    )
+    item.flags += [] if camera is None else detection_problem.camera_mismatch(camera, shared.image_size[0])
     return False

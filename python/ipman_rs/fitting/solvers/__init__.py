@@ -1,7 +1,7 @@
-"""Solvers, written for one body: generators that yield a point and are sent what the objective is there.
+"""Solvers, written for one body: generators that yield a point and are sent the objective's `Evaluation` there.
 
-`drive.minimise` runs one a body and evaluates the points of all bodies together, so a body's way through the solver
-knows nothing of its batch.
+`drive.minimise` runs one solver per body and evaluates the points of all bodies together, so a body's iterates do not
+depend on its batch.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 from .drive import minimise
 from .lbfgs import lbfgs
 from .levenberg import levenberg
-from .outcome import Look, Options, Outcome
+from .outcome import Evaluation, Options, Outcome
 
 SOLVERS = {"lbfgs": lbfgs, "levenberg": levenberg}
 
-__all__ = ["SOLVERS", "Look", "Options", "Outcome", "minimise"]
+__all__ = ["SOLVERS", "Evaluation", "Options", "Outcome", "minimise"]

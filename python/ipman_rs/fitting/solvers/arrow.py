@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 from torch.linalg import cholesky, solve_triangular
 
-from .outcome import Look, Vector
+from .outcome import Evaluation, Vector
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def _solve_band(factor: Tensor, right: Tensor) -> Tensor:
     return x
 
 
-def solve(look: Look, damping: float) -> tuple[Vector, float]:
+def solve(look: Evaluation, damping: float) -> tuple[Vector, float]:
     """(H + μ diag H) step = −gradient, and the decrease that the model promises, as `levenberg` does for a matrix."""
     arrow = look.hessian
     if not isinstance(arrow, Arrow):

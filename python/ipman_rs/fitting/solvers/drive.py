@@ -1,4 +1,4 @@
-"""Many solvers, one a body, fed by an objective that is evaluated for all of them at once."""
+"""Runs one solver per body; the objective is evaluated for all of them in one batch."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
-from .outcome import Look, Options, Outcome, Vector
+from .outcome import Evaluation, Options, Outcome, Vector
 
-Solver = Generator[Vector, Look, Outcome]
+Solver = Generator[Vector, Evaluation, Outcome]
 # The bodies' indices and their points (n, P) -> what each looks like.
-Evaluate = Callable[[Sequence[int], Vector], Sequence[Look]]
+Evaluate = Callable[[Sequence[int], Vector], Sequence[Evaluation]]
 
 
 def minimise(
@@ -20,7 +20,7 @@ def minimise(
     options: Options,
     progress: Callable[[int], None] | None = None,
 ) -> list[Outcome]:
-    """One outcome a row of `starts` (B, P). `progress` is told how many have ended."""
+    """One `Outcome` per row of `starts` (B, P). `progress` is called with the number of bodies that have finished."""
     running = {body: solver(start, options) for body, start in enumerate(starts)}
     points = {body: next(generator) for body, generator in running.items()}
     outcomes: dict[int, Outcome] = {}

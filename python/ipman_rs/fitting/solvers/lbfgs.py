@@ -10,17 +10,17 @@ from collections.abc import Generator
 
 import numpy as np
 
-from .outcome import Look, Options, Outcome, Vector
+from .outcome import Evaluation, Options, Outcome, Vector
 
 MEMORY = 10
 SUFFICIENT, CURVATURE = 1e-4, 0.9  # the constants of the Wolfe conditions
 TRIES = 20  # of one line search
 STILL = 3  # iterations with hardly any decrease that count as the end
 
-Search = Generator[Vector, Look, "tuple[float, Look] | None"]
+Search = Generator[Vector, Evaluation, "tuple[float, Evaluation] | None"]
 
 
-def lbfgs(start: Vector, options: Options) -> Generator[Vector, Look, Outcome]:
+def lbfgs(start: Vector, options: Options) -> Generator[Vector, Evaluation, Outcome]:
     """A step that does not end lower is undone and shrunk; the best point is never lost."""
     point, look = start, (yield start)
     if not look.finite:
@@ -67,7 +67,7 @@ def _product(memory: deque[tuple[Vector, Vector]], gradient: Vector) -> Vector:
     return result
 
 
-def _search(point: Vector, start: Look, direction: Vector, step: float) -> Search:
+def _search(point: Vector, start: Evaluation, direction: Vector, step: float) -> Search:
     """A step that satisfies the strong Wolfe conditions, or the lowest that was found; None if nothing is lower."""
     slope = float(start.gradient @ direction)
     low, low_look, high, high_value = 0.0, start, None, np.inf
@@ -87,7 +87,7 @@ def _search(point: Vector, start: Look, direction: Vector, step: float) -> Searc
     return (low, low_look) if low_look.value < start.value else None
 
 
-def _between(low: float, look: Look, direction: Vector, high: float, high_value: float) -> float:
+def _between(low: float, look: Evaluation, direction: Vector, high: float, high_value: float) -> float:
     """The minimum of the parabola through both values and the slope at `low`, kept away from the ends."""
     width = high - low
     slope = float(look.gradient @ direction)

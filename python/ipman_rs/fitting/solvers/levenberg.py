@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from .outcome import Look, Options, Outcome, Vector
+from .outcome import Evaluation, Options, Outcome, Vector
 
 STILL = 3  # iterations with hardly any decrease that count as the end
 START, STIFFEST = 1e-3, 1e12  # damping
@@ -19,7 +19,7 @@ START, STIFFEST = 1e-3, 1e12  # damping
 
 def levenberg(
     start: Vector, options: Options, solve: Callable[[Any, float], tuple[Vector, float]] | None = None
-) -> Generator[Vector, Look, Outcome]:
+) -> Generator[Vector, Evaluation, Outcome]:
     """Looks must carry a model of the Hessian, positive semidefinite. A step that does not end lower is undone.
 
     `solve`: (look, damping) -> step and the decrease it promises, for Hessians that are no plain matrix.
@@ -48,7 +48,7 @@ def levenberg(
     return Outcome(point, look.value, options.iterations, "iterations")
 
 
-def _step(look: Look, damping: float) -> tuple[Vector, float]:
+def _step(look: Evaluation, damping: float) -> tuple[Vector, float]:
     """(H + μ diag H) step = −gradient, and the decrease that the model promises."""
     hessian = look.hessian
     if hessian is None:

@@ -1,4 +1,4 @@
-"""What solvers are told, and what they tell."""
+"""The interface of solvers: their options, the evaluations they receive, and their outcome."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Look:
-    """The objective at a point: value, gradient (P,), and a model of the Hessian for solvers that ask: (P, P), or what
-    their `solve` understands."""
+class Evaluation:
+    """The objective at a point: value, gradient (P,), and a model of the Hessian for solvers that need it: (P, P), or a
+    structured one that has its own `solve`."""
 
     value: float
     gradient: Vector

@@ -1,4 +1,4 @@
-"""The terms of fitting objectives, one a file. A new one is one file and one line here."""
+"""The terms of fitting objectives, one per file. A new term is one file and one line here."""
 
 from __future__ import annotations
 

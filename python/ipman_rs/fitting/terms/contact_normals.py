@@ -6,8 +6,8 @@ over the template's samples i that are nearer than `near` to opposite surface, j
 normals of the faces that they lie on. Opposite is what is farther than `geodesic` along the surface (`geodesics`).
 Which samples these are is decided anew for every pose and not differentiated.
 
-Searching takes 20 ms a body; so pairs that are a little farther apart are searched for, too, and looked at alone until
-the body has moved so far that others may touch (a Verlet list). That changes nothing but the time.
+A search takes 20 ms per body; so it also collects pairs that are a little farther apart, and only these are evaluated
+until the body has moved so far that others may touch (a Verlet list). This changes only the time.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A body and itself: what is inside another part is pushed out of it, and what is near another part is pulled onto it.
+"""Self-contact: vertices inside another part of the body are pushed out of it, and those near one are pulled onto it.
 
     ½ Σ_inside tanh²(d / 0.04 m)  +  0.005 · ½ Σ_near tanh²(d / 0.005 m)
 

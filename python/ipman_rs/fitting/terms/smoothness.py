@@ -3,7 +3,7 @@
 With order 1 it is the velocity. The points are all joints and the named points of the skin, in the world: so nothing
 depends on how rotations are written down, and a turn through 180° is as smooth as any other.
 
-It ties frames together, so it is none of `TERMS`, whose rows know nothing of each other; `sequence` adds it.
+It couples frames, so it is not one of `TERMS`, whose rows are independent of each other; `sequence` adds it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ipman_rs.checks import positive
 
 from ...body.landmarks import MIDPOINTS
 from ..candidate import Candidate
-from ..landmarks import Landmarks, known
+from ..landmarks import Landmarks, landmark_names
 from ..problem import Problem
 from ..variables import Variables
 
@@ -37,7 +37,7 @@ class Smoothness:
     def __init__(self, body: ipt.BodyModel, frames: int, rate: float = 1.0, order: int = 2):
         if order not in DIFFERENCES:
             raise ValueError(f"order: expected 1 (velocity) or 2 (acceleration), got {order!r}")
-        self.points = Landmarks(body, [name for name in known(body.body) if name not in MIDPOINTS])
+        self.points = Landmarks(body, [name for name in landmark_names(body.body) if name not in MIDPOINTS])
         self.band = np.zeros((order + 1, frames))
         factors = np.array(DIFFERENCES[order]) * positive("rate", rate, "frames a second") ** order
         for first in range(frames - order):

@@ -1,8 +1,8 @@
-"""What a term of a fitting objective is.
+"""The interface of the terms of a fitting objective.
 
-A term is made once a fit, by `SomeTerm(problem, **options)`, and looked at once an evaluation. Rows must not know of
-each other: nothing may be summed, sorted or multiplied across bodies, so that a body's result does not depend on its
-batch.
+A term is constructed once per fit, by `SomeTerm(problem, **options)`, and computed once per evaluation. Bodies must not
+influence each other: nothing may be summed, sorted or multiplied across rows, so that a body's result does not depend
+on its batch.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..problem import Problem
 
 
 class Term(ABC):
-    """One number a body, to be made small."""
+    """One cost per body, to be minimised."""
 
     needs_mesh = False  # whether it looks at `candidate.vertices` or `.posed`
 

@@ -1,7 +1,7 @@
-"""VPoser v2 as a pose prior: ‖z‖², z the mean of what its encoder makes of the pose. The checkpoint (V02_05) is read
-from a file: it is not included and has a licence of its own.
+"""VPoser v2 as a pose prior: ‖z‖², z the mean of its encoder's distribution for the pose. The checkpoint (V02_05) is
+read from a file: it is not included and has a licence of its own.
 
-What is taken of its layout: an encoder of 21 rotation vectors (63 numbers), `encoder_net` or `vp_model.encoder_net`,
+Layout of the weights: an encoder of 21 rotation vectors (63 numbers), `encoder_net` or `vp_model.encoder_net`,
 
     1 batch norm · 2 linear · leaky ReLU (slope 0.01) · 4 batch norm · 6 linear · 7 linear · 8.mu linear
 

@@ -1,1 +1,1 @@
-"""Images of synthetic people on a known floor, with all that is known about them (`ipman data render`)."""
+"""Images of synthetic people on a known floor, with their labels (`ipman data render`)."""

@@ -1,4 +1,4 @@
-"""From light to the bytes of an image: exposure, blur, noise."""
+"""The camera's sensor, from linear light to the pixels of an image: exposure, blur, noise."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ QUALITY = (75, 95)
 
 
 @dataclass(frozen=True)
-class Film:
+class CameraSensor:
     exposure: float
     blur: float  # pixels, standard deviation
     noise: Array  # (S, S, 3)
@@ -31,6 +31,8 @@ class Film:
         return np.rint(255 * seen.clip(0, 1)).astype(np.uint8)
 
 
-def draw_film(draw: np.random.Generator, size: int) -> Film:
+def draw_sensor(draw: np.random.Generator, size: int) -> CameraSensor:
     noise = draw.uniform(0, NOISE) * draw.standard_normal((size, size, 3), dtype=np.float32)
-    return Film(draw.uniform(*EXPOSURE), draw.uniform(0, BLUR), noise, int(draw.integers(*QUALITY, endpoint=True)))
+    return CameraSensor(
+        draw.uniform(*EXPOSURE), draw.uniform(0, BLUR), noise, int(draw.integers(*QUALITY, endpoint=True))
+    )

@@ -16,7 +16,7 @@ from ipman_rs.body import load_body
 from ipman_rs.body.landmarks import skin_points
 
 from .cameras import dot
-from .textures import CLOTH, Pattern, draw_pattern, linear
+from .textures import CLOTH, Texture, draw_texture, linear_color
 
 Array = NDArray[np.floating]
 
@@ -35,8 +35,8 @@ class Clothes:
     eyes: Array
     lips: Array
     shoes: Array | None
-    shirt: Pattern
-    trousers: Pattern
+    shirt: Texture
+    trousers: Texture
     neckline: float  # y
     sleeve: float  # |x|
     waist: float  # y
@@ -71,13 +71,13 @@ class Clothes:
         if self.long_hair:
             hair |= head & (z < middle[2] - 0.01)
         for name in ("left_eye", "right_eye"):
-            colors[within(place, marks[name], (0.015, 0.008, 0.03)) & head] = self.eyes
+            colors[inside_ellipsoid(place, marks[name], (0.015, 0.008, 0.03)) & head] = self.eyes
         mouth = nose + np.array([0.0, -0.045, -0.02])
-        colors[within(place, mouth, (0.024, 0.008, 0.04)) & head] = self.lips
+        colors[inside_ellipsoid(place, mouth, (0.024, 0.008, 0.04)) & head] = self.lips
         colors[hair] = self.hair
 
 
-def within(points: Array, center: Array, radii: tuple[float, float, float]) -> NDArray[np.bool_]:
+def inside_ellipsoid(points: Array, center: Array, radii: tuple[float, float, float]) -> NDArray[np.bool_]:
     """Which points (N, 3) are inside an ellipsoid."""
     scaled = (points - center) / radii
     return dot(scaled, scaled) < 1
@@ -96,17 +96,19 @@ def draw_clothes(draw: np.random.Generator, body: str) -> Clothes:
     marks = landmarks(body)
     shoulder, wrist = marks["left_shoulder"], marks["left_wrist"]
     hip, ankle = marks["left_hip"], marks["left_ankle"]
-    skin = linear(*SKIN[draw.integers(len(SKIN))]) * draw.uniform(0.85, 1.15)
+    skin = linear_color(*SKIN[draw.integers(len(SKIN))]) * draw.uniform(0.85, 1.15)
     shirt = draw_cloth(draw)
     trousers = shirt if draw.random() < 0.12 else draw_cloth(draw)
     sleeve = shoulder[0] + SLEEVES[draw.integers(len(SLEEVES))] * (wrist[0] - shoulder[0])
     leg = LEGS[draw.integers(len(LEGS))]
     return Clothes(
         skin=skin.clip(0, 0.9),
-        hair=linear(*HAIR[draw.integers(len(HAIR))]),
+        hair=linear_color(*HAIR[draw.integers(len(HAIR))]),
         eyes=np.full(3, 0.02),
         lips=(skin * [1.0, 0.55, 0.55]).clip(0, 0.9),
-        shoes=linear(draw.random(), draw.uniform(0, 0.5), draw.uniform(0.1, 0.95)) if draw.random() < 0.75 else None,
+        shoes=linear_color(draw.random(), draw.uniform(0, 0.5), draw.uniform(0.1, 0.95))
+        if draw.random() < 0.75
+        else None,
         shirt=shirt,
         trousers=trousers,
         neckline=marks["neck"][1] - draw.uniform(-0.02, 0.05),
@@ -119,8 +121,8 @@ def draw_clothes(draw: np.random.Generator, body: str) -> Clothes:
     )
 
 
-def draw_cloth(draw: np.random.Generator) -> Pattern:
+def draw_cloth(draw: np.random.Generator) -> Texture:
     """A third are grey, black or white, as clothes are."""
     saturation = draw.uniform(0, 0.12) if draw.random() < 0.35 else draw.uniform(0.2, 0.9)
-    color = linear(draw.random(), saturation, draw.uniform(0.12, 0.95))
-    return draw_pattern(draw, CLOTH, color, (0.03, 0.14), 0.5)
+    color = linear_color(draw.random(), saturation, draw.uniform(0.12, 0.95))
+    return draw_texture(draw, CLOTH, color, (0.03, 0.14), 0.5)

@@ -1,4 +1,4 @@
-"""What is around a person: the floor y = 0, walls or the sky, and the light. Colours are linear light, float32."""
+"""The surroundings of a person: the floor y = 0, walls or the sky, and the light. Colours are linear light, float32."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .cameras import dot, turned
-from .textures import FLOOR, WALL, Pattern, draw_pattern, linear, single
+from .cameras import dot, rotate
+from .textures import FLOOR, WALL, Texture, draw_texture, float32, linear_color
 
 Array = NDArray[np.floating]
 
@@ -35,12 +35,12 @@ class Light:
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class Environment:
     """A room is a box of half sides `reach` m around the world's origin, turned by the rotation `walls_turn`."""
 
     kind: str
-    floor: Pattern
-    wall: Pattern
+    floor: Texture
+    wall: Texture
     skirting: float  # m
     skirting_color: Array
     horizon: Array
@@ -67,24 +67,24 @@ class Surroundings:
 
     def away(self, eye: Array, rays: Array) -> Array:
         """Metres (2, N) along the rays to the box's far sides, so that a camera outside looks through the near ones."""
-        start, way = turned(eye[None], self.walls_turn)[0, ::2, None], turned(rays, self.walls_turn).T[::2]
+        start, way = rotate(eye[None], self.walls_turn)[0, ::2, None], rotate(rays, self.walls_turn).T[::2]
         with np.errstate(divide="ignore", invalid="ignore"):
             return (np.copysign(self.reach[:, None], way) - start) / way
 
     def walls(self, eye: Array, rays: Array) -> Array:
         away = self.away(eye, rays)
         side, distance = away[1] < away[0], np.minimum(*away)
-        way = turned(rays, self.walls_turn)
-        point = turned(eye[None], self.walls_turn) + distance[:, None] * way
+        way = rotate(rays, self.walls_turn)
+        point = rotate(eye[None], self.walls_turn) + distance[:, None] * way
         colors = self.wall(np.stack([np.where(side, point[:, 0], point[:, 2]), point[:, 1]], axis=1))
         colors[point[:, 1] < self.skirting] = self.skirting_color
         inwards = -np.sign(np.stack([np.where(side, 0, way[:, 0]), 0 * distance, np.where(side, way[:, 2], 0)], 1))
         everywhere = np.ones_like(distance)
-        return colors * self.light.on(turned(inwards, self.walls_turn.T), INDOORS * everywhere, everywhere)
+        return colors * self.light.on(rotate(inwards, self.walls_turn.T), INDOORS * everywhere, everywhere)
 
     def on_floor(self, points: Array, distance: Array, lit: Array, open_: Array) -> Array:
         """Colours (N, 3) of the floor at points (N, 3), `distance` (N,) m from the eye."""
-        normals = np.broadcast_to(single([0, 1, 0]), points.shape)
+        normals = np.broadcast_to(float32([0, 1, 0]), points.shape)
         colors = self.floor(points[:, [0, 2]]) * self.light.on(normals, lit, open_)
         if self.kind == "room":
             return colors
@@ -92,27 +92,27 @@ class Surroundings:
         return colors + fade * (self.horizon - colors)
 
 
-def draw_surroundings(draw: np.random.Generator) -> Surroundings:
+def draw_environment(draw: np.random.Generator) -> Environment:
     kind = KINDS[draw.integers(len(KINDS))]
     light = draw_light(draw)
-    floor = draw_pattern(draw, FLOOR, _muted(draw), (0.15, 0.8), 0.3)
-    wall = draw_pattern(draw, WALL, _muted(draw), (0.2, 1.2), 0.3)
-    horizon = linear(draw.uniform(0.5, 0.65), draw.uniform(0, 0.3), draw.uniform(0.6, 1.0))
-    zenith = linear(draw.uniform(0.52, 0.65), draw.uniform(0.1, 0.7), draw.uniform(0.5, 1.0))
+    floor = draw_texture(draw, FLOOR, _muted(draw), (0.15, 0.8), 0.3)
+    wall = draw_texture(draw, WALL, _muted(draw), (0.2, 1.2), 0.3)
+    horizon = linear_color(draw.uniform(0.5, 0.65), draw.uniform(0, 0.3), draw.uniform(0.6, 1.0))
+    zenith = linear_color(draw.uniform(0.52, 0.65), draw.uniform(0.1, 0.7), draw.uniform(0.5, 1.0))
     if kind == "studio":
         horizon, zenith = floor.first * (light.above + 0.5 * light.sun), floor.first * light.above
     angle = draw.uniform(0, np.pi)
     cosine, sine = np.cos(angle), np.sin(angle)
-    return Surroundings(
+    return Environment(
         kind,
         floor,
         wall,
         skirting=draw.uniform(*SKIRTING) * draw.integers(2),
         skirting_color=_muted(draw) * light.above,
-        horizon=single(horizon),
-        zenith=single(zenith),
-        reach=single(draw.uniform(2.2, 5.0, 2)),
-        walls_turn=single([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]),
+        horizon=float32(horizon),
+        zenith=float32(zenith),
+        reach=float32(draw.uniform(2.2, 5.0, 2)),
+        walls_turn=float32([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]),
         light=light,
     )
 
@@ -126,8 +126,8 @@ def draw_light(draw: np.random.Generator) -> Light:
     ambient = draw.uniform(0.35, 0.7)
     cool = np.array([1 - 0.5 * warm, 1.0, 1 + 0.5 * warm])
     below = ambient * draw.uniform(0.3, 0.7) * cool
-    return Light(*map(single, (towards, sun * tint, ambient * cool, below)))
+    return Light(*map(float32, (towards, sun * tint, ambient * cool, below)))
 
 
 def _muted(draw: np.random.Generator) -> Array:
-    return linear(draw.random(), 0.5 * draw.random() ** 2, draw.uniform(0.3, 0.95))
+    return linear_color(draw.random(), 0.5 * draw.random() ** 2, draw.uniform(0.3, 0.95))

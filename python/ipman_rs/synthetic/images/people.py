@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from ipman_rs.body import BodyModel, load_body, poses
 from ipman_rs.body.landmarks import point_rows, skin_points
-from ipman_rs.synthetic.at_rest import FAMILIES, TRIES, Scene, disturbed, perturbed, settle
+from ipman_rs.synthetic.at_rest import FAMILIES, TRIES, PosedPerson, disturb, perturb, settle
 
 Array = NDArray[np.floating]
 
@@ -26,7 +26,7 @@ UPSET = {"standing", "one leg", "lunge", "crouch"}  # families that can be tippe
 
 
 @dataclasses.dataclass(frozen=True)
-class Figure:
+class DrawnPerson:
     """A person: float32 pose (24, 3) with the root in the world (y up, the floor at y = 0), betas (10,), transl (3,) m.
 
     kind: "static", "tipped" or "jumping".
@@ -46,35 +46,35 @@ class Figure:
         return found.vertices, found.joints
 
 
-def draw_figure(draw: np.random.Generator, body: str, family: str, moving: float) -> Figure:
+def draw_person(draw: np.random.Generator, body: str, family: str, moving: float) -> DrawnPerson:
     """A new person in a pose of the family; `moving` is the probability that it is not at rest, where it can be."""
     model = load_body(body)
     scene = None
     while scene is None:  # a shape that does not find its balance is drawn again, pose and all
         betas = draw.standard_normal(model.num_betas).clip(-LARGEST_BETA, LARGEST_BETA).astype(np.float32)
-        scene = at_rest(draw, shaped(model, betas.astype(np.float64)), family)
+        scene = draw_at_rest(draw, with_shape(model, betas.astype(np.float64)), family)
     upset = draw.random() < moving and family in UPSET
     kind = KINDS[draw.integers(1, len(KINDS))] if upset else "static"
-    scene = disturbed(scene, kind, draw)
+    scene = disturb(scene, kind, draw)
     heading = Rotation.from_rotvec([0.0, draw.uniform(-np.pi, np.pi), 0.0])
     pose, transl = scene.full_pose.copy(), scene.transl.copy()
     pose[0] = (heading * Rotation.from_rotvec(pose[0])).as_rotvec()
     transl[[0, 2]] += draw.uniform(-PLACE, PLACE, 2)
-    return Figure(body, family, scene.name, kind, pose.astype(np.float32), betas, transl.astype(np.float32))
+    return DrawnPerson(body, family, scene.name, kind, pose.astype(np.float32), betas, transl.astype(np.float32))
 
 
-def at_rest(draw: np.random.Generator, person: BodyModel, family: str) -> Scene | None:
+def draw_at_rest(draw: np.random.Generator, person: BodyModel, family: str) -> PosedPerson | None:
     """The person in a pose of the family; None if many tries do not stand."""
     template = load_body(person.name).template
     name = FAMILIES[family][draw.integers(len(FAMILIES[family]))]
     for _ in range(TRIES):
-        settled = settle(perturbed(poses.pose_of(person, name), person, draw), person, template)
+        settled = settle(perturb(poses.pose_of(person, name), person, draw), person, template)
         if settled is not None:
-            return Scene(person, template, family, name, *settled)
+            return PosedPerson(person, template, family, name, *settled)
     return None
 
 
-def shaped(model: BodyModel, betas: Array) -> BodyModel:
+def with_shape(model: BodyModel, betas: Array) -> BodyModel:
     """The model with this shape and no betas any more."""
     return dataclasses.replace(
         model,

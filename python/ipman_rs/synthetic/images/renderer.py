@@ -1,4 +1,4 @@
-"""The picture of a person on a floor: rays into the scene; Embree says what they meet, without GPU or display."""
+"""The picture of a person on a floor: rays are cast into the scene by Embree, without GPU or display."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from ipman_rs.body.normals import vertex_normals
 
-from .cameras import Camera, dot
+from .cameras import ImageCamera, dot
 from .clothing import Clothes
-from .environment import Surroundings
-from .textures import single
+from .environment import Environment
+from .textures import float32
 
 Array = NDArray[np.floating]
 
 SAMPLES = 2  # rays a pixel along each side
 OFF = 4e-3  # m that a ray starts off the surface, not to meet it again
 CONTACT, SPREAD = 0.08, 0.6  # m and 1: the body darkens the floor that is about this close below it, and beside it
-UP = single([0, 1, 0])
+UP = float32([0, 1, 0])
 SUN = 0.03  # radius of the sun's disc, 1 m away: how soft shadows are
 
 
@@ -49,29 +49,31 @@ class Solid:
     def met(self, starts: Array, ways: Array) -> tuple[NDArray[np.integer], Array, Array]:
         """The face (N,) that each ray meets first, -1 for none; the point's weights (N, 3); the distance (N,) m."""
         starts = np.broadcast_to(starts, ways.shape)
-        found = self.scene.run(single(starts), single(ways), query="INTERSECT", output=True)
+        found = self.scene.run(float32(starts), float32(ways), query="INTERSECT", output=True)
         u, v = found["u"].astype(float), found["v"].astype(float)
         distance = np.where(found["primID"] >= 0, found["tfar"].astype(float), np.inf)
         return found["primID"], np.stack([1 - u - v, u, v], axis=1), distance
 
     def hides(self, starts: Array, ways: Array) -> NDArray[np.bool_]:
         """Which rays (N,) meet it."""
-        return self.scene.run(single(starts), single(ways), query="OCCLUDED") >= 0
+        return self.scene.run(float32(starts), float32(ways), query="OCCLUDED") >= 0
 
 
-def render(solid: Solid, resting: Array, clothes: Clothes, body: str, around: Surroundings, camera: Camera) -> Picture:
+def render(
+    solid: Solid, resting: Array, clothes: Clothes, body: str, around: Environment, camera: ImageCamera
+) -> Picture:
     """The person `solid`, whose vertices lie at `resting` (V, 3) on the mean `body` in its zero pose."""
-    grid = single((np.arange(SAMPLES * camera.size) + 0.5) / SAMPLES)
-    rays, scatter = camera.rays(np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)), scattered(len(grid))
-    face, weights = first_met(solid, camera, grid, rays)
+    grid = float32((np.arange(SAMPLES * camera.size) + 0.5) / SAMPLES)
+    rays, scatter = camera.rays(np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)), scatter_pattern(len(grid))
+    face, weights = first_hits(solid, camera, grid, rays)
     person, rest = np.flatnonzero(face >= 0), np.flatnonzero(face < 0)
     colors = np.empty_like(rays)
     colors[person] = skin(solid, face[person], weights[person], scatter[person], resting, clothes, body, around)
-    colors[rest] = background(solid, single(camera.eye), rays.take(rest, 0), scatter.take(rest, 0), around)
-    return Picture(blocks(colors, camera.size), blocks(single(face >= 0), camera.size)[..., 0])
+    colors[rest] = background(solid, float32(camera.eye), rays.take(rest, 0), scatter.take(rest, 0), around)
+    return Picture(pixel_means(colors, camera.size), pixel_means(float32(face >= 0), camera.size)[..., 0])
 
 
-def first_met(solid: Solid, camera: Camera, grid: Array, rays: Array) -> tuple[NDArray[np.integer], Array]:
+def first_hits(solid: Solid, camera: ImageCamera, grid: Array, rays: Array) -> tuple[NDArray[np.integer], Array]:
     """As `Solid.met`, asked only of the rays near the person in the image; `grid`: the pixels of a row's rays."""
     flat = camera.project(solid.vertices)[:, :2]
     x, y = ((grid > low - 1) & (grid < high + 1) for low, high in zip(flat.min(axis=0), flat.max(axis=0), strict=True))
@@ -89,17 +91,19 @@ def skin(
     resting: Array,
     clothes: Clothes,
     body: str,
-    around: Surroundings,
+    around: Environment,
 ) -> Array:
     """Colours (N, 3) of points of the person."""
     corners = solid.faces[face]
-    points, normals, places = (blend(values, corners, weights) for values in (solid.vertices, solid.normals, resting))
+    points, normals, places = (
+        interpolate(values, corners, weights) for values in (solid.vertices, solid.normals, resting)
+    )
     normals /= np.sqrt(dot(normals, normals))[:, None]
-    lit = single(~solid.hides(points + OFF * normals, around.light.towards + SUN * scatter))
+    lit = float32(~solid.hides(points + OFF * normals, around.light.towards + SUN * scatter))
     return clothes(places, body) * around.light.on(normals, lit, np.ones(len(points)))
 
 
-def background(solid: Solid, eye: Array, rays: Array, scatter: Array, around: Surroundings) -> Array:
+def background(solid: Solid, eye: Array, rays: Array, scatter: Array, around: Environment) -> Array:
     """Colours (N, 3) of what rays (N, 3) see beside the person."""
     with np.errstate(divide="ignore"):
         distance = np.where(rays[:, 1] < 0, -eye[1] / rays[:, 1], np.inf)
@@ -112,32 +116,32 @@ def background(solid: Solid, eye: Array, rays: Array, scatter: Array, around: Su
     distance, scatter = distance.take(floor), scatter.take(floor, 0)
     points = eye + distance[:, None] * rays.take(floor, 0)
     points[:, 1] = 0.0
-    lit = 1 - shaded(solid, points, around.light.towards + SUN * scatter)
-    open_ = 1 - closeness(solid, points, scatter)
+    lit = 1 - shadow(solid, points, around.light.towards + SUN * scatter)
+    open_ = 1 - contact_shadow(solid, points, scatter)
     colors[floor] = around.on_floor(points, distance, lit, open_)
     return colors
 
 
-def shaded(solid: Solid, points: Array, towards: Array) -> Array:
+def shadow(solid: Solid, points: Array, towards: Array) -> Array:
     """1 for points (N, 3) of the floor that the person keeps the sun from, else 0."""
     mean = towards.mean(axis=0)
     feet = solid.vertices - solid.vertices[:, 1:2] / mean[1] * mean
-    near = beside(points, feet, 0.1 * np.ptp(solid.vertices[:, 1]))
+    near = near_rectangle(points, feet, 0.1 * np.ptp(solid.vertices[:, 1]))
     shadow = np.zeros(len(points), np.float32)
     shadow[near] = solid.hides(points.take(near, 0) + OFF * UP, towards.take(near, 0))
     return shadow
 
 
-def closeness(solid: Solid, points: Array, scatter: Array) -> Array:
+def contact_shadow(solid: Solid, points: Array, scatter: Array) -> Array:
     """0 to 1, how much the person darkens points (N, 3) of the floor by being close above them."""
     ways = UP + SPREAD * (1 - UP) * scatter
-    near = beside(points, solid.vertices, 3 * CONTACT)
+    near = near_rectangle(points, solid.vertices, 3 * CONTACT)
     close = np.zeros(len(points), np.float32)
     close[near] = 0.8 * np.exp(-solid.met(points.take(near, 0), ways.take(near, 0))[2] / CONTACT)
     return close
 
 
-def beside(points: Array, others: Array, distance: float) -> NDArray[np.integer]:
+def near_rectangle(points: Array, others: Array, distance: float) -> NDArray[np.integer]:
     """Which of points (N, 3) are in the rectangle of the floor around the others, wider by that distance."""
     low, high = others.min(axis=0) - distance, others.max(axis=0) + distance
     x, _, z = points.T
@@ -145,7 +149,7 @@ def beside(points: Array, others: Array, distance: float) -> NDArray[np.integer]
 
 
 @cache
-def scattered(width: int) -> Array:
+def scatter_pattern(width: int) -> Array:
     """Points (width², 3) of the unit ball, one for every ray of an image: a 4 x 4 pattern of well-spread ones. So the
     four rays of a pixel see four places of the sun, and its neighbours' see others."""
     draw = np.random.default_rng(1)
@@ -154,13 +158,13 @@ def scattered(width: int) -> Array:
     return np.tile(spread, (-(-width // 4), -(-width // 4), 1))[:width, :width].reshape(-1, 3).astype(np.float32)
 
 
-def blend(values: Array, corners: NDArray[np.integer], weights: Array) -> Array:
+def interpolate(values: Array, corners: NDArray[np.integer], weights: Array) -> Array:
     """Values (V, C) of vertices -> (N, C) inside faces with these corners (N, 3), by weights (N, 3)."""
     first, second, third = (weights[:, k : k + 1] * values[corners[:, k]] for k in range(3))
     return first + second + third
 
 
-def blocks(values: Array, size: int) -> Array:
+def pixel_means(values: Array, size: int) -> Array:
     """Means (size, size, C) over the rays (N, C) of each pixel."""
     rays = values.reshape(size, SAMPLES, size, SAMPLES, -1)
     return reduce(np.add, (rays[:, i, :, j] for i in range(SAMPLES) for j in range(SAMPLES))) / SAMPLES**2

@@ -1,4 +1,4 @@
-"""One image with all that is known about it, drawn from a seed, a split and a number."""
+"""One image with its labels, drawn from a seed, a split and an index."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from ipman_rs.body import load_body
 from ipman_rs.synthetic.at_rest import FAMILIES
 
 from ...data.rendered.layout import SPLITS, key_of
-from .camera_sensor import draw_film
-from .cameras import Camera, draw_camera
+from .camera_sensor import draw_sensor
+from .cameras import ImageCamera, draw_camera
 from .clothing import draw_clothes
-from .environment import draw_surroundings
-from .people import draw_figure, keypoints
+from .environment import draw_environment
+from .people import draw_person, keypoints
 from .renderer import Solid, render
-from .textures import single
+from .textures import float32
 
 Array = NDArray[np.floating]
 
@@ -29,7 +29,7 @@ DEPTH_OF_JOINTS, DEPTH_OF_SKIN = 0.15, 0.02  # m that a seen point may lie behin
 
 
 @dataclass(frozen=True)
-class Settings:
+class RenderSettings:
     """size: pixels of a side. body: "anny-lite" or "anny". moving: the probability that a body is not at rest."""
 
     seed: int = 0
@@ -51,18 +51,18 @@ class Sample:
     quality: int
 
 
-def draw_sample(settings: Settings, split: str, index: int) -> Sample:
-    """The same one whenever, wherever and in whatever order it is drawn."""
+def draw_sample(settings: RenderSettings, split: str, index: int) -> Sample:
+    """Draw sample `index` of a split; it is the same in whatever order and process it is drawn."""
     seed = [settings.seed, SPLITS.index(split), index]
     draw = np.random.default_rng(seed)
     family = list(FAMILIES)[index % len(FAMILIES)]
-    figure = draw_figure(draw, settings.body, family, settings.moving)
+    figure = draw_person(draw, settings.body, family, settings.moving)
     vertices, joints = figure.posed()
-    camera = rounded(draw_camera(draw, vertices, settings.size))
-    clothes, around = draw_clothes(draw, settings.body), draw_surroundings(draw)
-    film = draw_film(draw, settings.size)
+    camera = round_camera(draw_camera(draw, vertices, settings.size))
+    clothes, around = draw_clothes(draw, settings.body), draw_environment(draw)
+    film = draw_sensor(draw, settings.size)
     solid = Solid(vertices, load_body(settings.body).faces)
-    picture = render(solid, resting(settings.body), clothes, settings.body, around, camera)
+    picture = render(solid, rest_vertices(settings.body), clothes, settings.body, around, camera)
     points = keypoints(settings.body, vertices, joints)
     flat = camera.project(points)[:, :2]
     inside = np.asarray(((flat >= 0) & (flat <= settings.size)).all(axis=1))
@@ -75,10 +75,10 @@ def draw_sample(settings: Settings, split: str, index: int) -> Sample:
         "camera_rotation": camera.rotation,
         "camera_translation": camera.translation,
         "intrinsics": camera.intrinsics,
-        "box": box(camera.project(vertices)[:, :2]),
+        "box": bounding_box(camera.project(vertices)[:, :2]),
     }
-    stored: dict[str, NDArray[Any]] = {name: single(value) for name, value in arrays.items()}
-    stored["visible"] = inside & seen(solid, camera, points, len(joints))
+    stored: dict[str, NDArray[Any]] = {name: float32(value) for name, value in arrays.items()}
+    stored["visible"] = inside & visible_points(solid, camera, points, len(joints))
     key = key_of(split, index)
     record = {
         "name": key, "split": split, "seed": seed, "body": settings.body, "family": figure.family,
@@ -87,13 +87,13 @@ def draw_sample(settings: Settings, split: str, index: int) -> Sample:
     return Sample(key, film.develop(picture.colors), stored, record, picture.covered, film.quality)
 
 
-def rounded(camera: Camera) -> Camera:
-    """The camera as it is written, so that labels and picture agree."""
-    written = (single(value).astype(float) for value in (camera.rotation, camera.translation, camera.intrinsics))
-    return Camera(camera.size, *written)
+def round_camera(camera: ImageCamera) -> ImageCamera:
+    """The camera in float32, as it is written, so that labels and image agree."""
+    written = (float32(value).astype(float) for value in (camera.rotation, camera.translation, camera.intrinsics))
+    return ImageCamera(camera.size, *written)
 
 
-def seen(solid: Solid, camera: Camera, points: Array, num_joints: int) -> NDArray[np.bool_]:
+def visible_points(solid: Solid, camera: ImageCamera, points: Array, num_joints: int) -> NDArray[np.bool_]:
     """Which points (K, 3) are not behind other parts of the body; joints lie inside it."""
     ways = points - camera.eye
     distance = np.sqrt((ways**2).sum(axis=1))
@@ -101,13 +101,13 @@ def seen(solid: Solid, camera: Camera, points: Array, num_joints: int) -> NDArra
     return behind < np.where(np.arange(len(points)) < num_joints, DEPTH_OF_JOINTS, DEPTH_OF_SKIN)
 
 
-def box(flat: Array) -> Array:
+def bounding_box(flat: Array) -> Array:
     """x, y, width, height around pixels (N, 2)."""
     return np.concatenate([flat.min(axis=0), np.ptp(flat, axis=0)])
 
 
 @cache
-def resting(body: str) -> Array:
+def rest_vertices(body: str) -> Array:
     """Vertices (V, 3) of the mean body in its zero pose."""
     return load_body(body)().vertices
 

@@ -15,7 +15,7 @@ CELLS = 64  # of the lattice of noise, which repeats after that many
 
 
 @dataclass(frozen=True)
-class Pattern:
+class Texture:
     """`kind` on a plane of coordinates (N, 2) m, in cells of `cell` m that are turned by `angle`.
 
     first, second: colours (3,) in linear light, float32; `grain` is the strength of noise over them.
@@ -51,42 +51,42 @@ class Pattern:
         return top + down * (bottom - top)
 
 
-def _plain(_: Pattern, u: Array, __: Array) -> Array:
+def _plain(_: Texture, u: Array, __: Array) -> Array:
     return np.zeros_like(u)
 
 
-def _stripes(_: Pattern, __: Array, v: Array) -> Array:
+def _stripes(_: Texture, __: Array, v: Array) -> Array:
     return (v % 1 < 0.5).astype(np.float32)
 
 
-def _lines(_: Pattern, __: Array, v: Array) -> Array:
+def _lines(_: Texture, __: Array, v: Array) -> Array:
     return (v % 1 < 0.12).astype(np.float32)
 
 
-def _checks(_: Pattern, u: Array, v: Array) -> Array:
+def _checks(_: Texture, u: Array, v: Array) -> Array:
     return ((u % 1 < 0.5) ^ (v % 1 < 0.5)).astype(np.float32)
 
 
-def _tiles(_: Pattern, u: Array, v: Array) -> Array:
+def _tiles(_: Texture, u: Array, v: Array) -> Array:
     return ((u % 1 < 0.06) | (v % 1 < 0.06)).astype(np.float32)
 
 
-def _planks(pattern: Pattern, u: Array, v: Array) -> Array:
+def _planks(pattern: Texture, u: Array, v: Array) -> Array:
     row = np.floor(v)
     board = np.floor(u / 6 + 0.37 * row)
     tone = pattern.lattice[row.astype(int) % CELLS, board.astype(int) % CELLS]
     return np.where(v % 1 < 0.06, np.float32(1), 0.2 + 0.2 * tone)
 
 
-def _dots(_: Pattern, u: Array, v: Array) -> Array:
+def _dots(_: Texture, u: Array, v: Array) -> Array:
     return ((u % 1 - 0.5) ** 2 + (v % 1 - 0.5) ** 2 < 0.06).astype(np.float32)
 
 
-def _clouds(pattern: Pattern, u: Array, v: Array) -> Array:
+def _clouds(pattern: Texture, u: Array, v: Array) -> Array:
     return 0.5 + 0.3 * pattern.noise(u, v) + 0.2 * pattern.noise(2.3 * u, 2.3 * v)
 
 
-KINDS: dict[str, Callable[[Pattern, Array, Array], Array]] = {
+KINDS: dict[str, Callable[[Texture, Array, Array], Array]] = {
     "plain": _plain, "stripes": _stripes, "lines": _lines, "checks": _checks, "tiles": _tiles, "planks": _planks,
     "dots": _dots, "clouds": _clouds,
 }  # fmt: skip
@@ -95,24 +95,24 @@ FLOOR = ("plain", "tiles", "planks", "checks", "clouds")
 WALL = ("plain", "plain", "stripes", "tiles", "clouds")
 
 
-def draw_pattern(
+def draw_texture(
     draw: np.random.Generator, kinds: tuple[str, ...], first: Array, cell: tuple[float, float], contrast: float
-) -> Pattern:
+) -> Texture:
     """One of the kinds; the second colour is up to `contrast` away from the first."""
     second = (first + contrast * draw.uniform(-1, 1) + 0.3 * contrast * draw.uniform(-1, 1, 3)).clip(0.01, 0.95)
     lattice = draw.uniform(-1, 1, (CELLS, CELLS)).astype(np.float32)
     kind = kinds[draw.integers(len(kinds))]
     size, angle, grain = draw.uniform(*cell), draw.uniform(0, np.pi), draw.uniform(0.02, 0.12)
-    return Pattern(kind, single(first), single(second), float(size), float(angle), float(grain), lattice)
+    return Texture(kind, float32(first), float32(second), float(size), float(angle), float(grain), lattice)
 
 
-def single(values: ArrayLike) -> Array:
-    """In single precision, which is enough for colours and twice as fast."""
+def float32(values: ArrayLike) -> Array:
+    """As float32, which is precise enough for colours and twice as fast."""
     return np.asarray(values, np.float32)
 
 
-def linear(hue: float, saturation: float, value: float) -> Array:
-    """A colour (3,) in linear light, of numbers from 0 to 1 as screens take them."""
+def linear_color(hue: float, saturation: float, value: float) -> Array:
+    """A colour (3,) in linear light, from hue, saturation and value between 0 and 1."""
     from colorsys import hsv_to_rgb
 
     return np.array(hsv_to_rgb(hue, saturation, value)) ** 2.2

@@ -1,5 +1,5 @@
-"""Writing images in shards. A shard has its name only once it is whole, and is never written again: a run that was
-killed goes on behind it."""
+"""Writing images in shards. A shard gets its name only when it is complete and is never rewritten: a killed run
+continues after it."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from ipman_rs.processes import end_with_parent
 
 from ...data.rendered.layout import FORMAT, INDEX, SPLITS, Shard, plan, read_index
 from .people import keypoint_names
-from .samples import Settings, draw_sample, files
+from .samples import RenderSettings, draw_sample, files
 
 AT_ONCE = 8  # images that a worker is asked for at a time
 
 
 def write(
     folder: Path,
-    settings: Settings,
+    settings: RenderSettings,
     counts: dict[str, int],
     shard_size: int = 500,
     workers: int = 1,
@@ -39,11 +39,11 @@ def write(
     ValueError for a folder that holds anything else, ImportError without the extra `render`.
     """
     shards = plan(counts, shard_size)
-    begin(folder, index_of(settings, counts, shards))
+    begin_run(folder, index_of(settings, counts, shards))
     missing = [shard for shard in shards if not (folder / shard.name).exists()]
     done = sum(shard.count for shard in shards) - sum(shard.count for shard in missing)
     progress(done)
-    with closing(packed(settings, missing, workers)) as samples:
+    with closing(pack_shards(settings, missing, workers)) as samples:
         for shard in missing:
             with (
                 atomic_write(folder / shard.name) as file,
@@ -51,13 +51,13 @@ def write(
             ):
                 for key, contents in itertools.islice(samples, shard.count):
                     for ending, content in contents.items():
-                        add(archive, f"{key}.{ending}", content)
+                        add_member(archive, f"{key}.{ending}", content)
                     done += 1
                     progress(done)
     return sum(shard.count for shard in missing)
 
 
-def index_of(settings: Settings, counts: dict[str, int], shards: list[Shard]) -> dict[str, Any]:
+def index_of(settings: RenderSettings, counts: dict[str, int], shards: list[Shard]) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "settings": asdict(settings),
@@ -67,8 +67,8 @@ def index_of(settings: Settings, counts: dict[str, int], shards: list[Shard]) ->
     }
 
 
-def begin(folder: Path, index: dict[str, Any]) -> None:
-    """Write the index into a new or empty folder, or see that a run begun there is this one."""
+def begin_run(folder: Path, index: dict[str, Any]) -> None:
+    """Write the index into a new or empty folder; in a folder with one, check that it is of the same run."""
     path = folder / INDEX
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{folder}: expected a folder, got a file")
@@ -96,7 +96,9 @@ def _short(value: Any) -> str:
     return text if len(text) < 160 else f"{text[:160]}…"
 
 
-def packed(settings: Settings, shards: Iterable[Shard], workers: int) -> Generator[tuple[str, dict[str, bytes]]]:
+def pack_shards(
+    settings: RenderSettings, shards: Iterable[Shard], workers: int
+) -> Generator[tuple[str, dict[str, bytes]]]:
     """The keys and files of all samples of shards, in their order."""
     tasks = [
         (settings, shard.split, range(start, min(start + AT_ONCE, shard.first + shard.count)))
@@ -104,25 +106,25 @@ def packed(settings: Settings, shards: Iterable[Shard], workers: int) -> Generat
         for start in range(shard.first, shard.first + shard.count, AT_ONCE)
     ]
     if workers == 1 or len(tasks) < 2:
-        yield from (sample for task in tasks for sample in drawn(task))
+        yield from (sample for task in tasks for sample in draw_files(task))
         return
     # Spawned, not forked: the parent has threads (a progress bar's), which a fork would break.
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(workers, context, initializer=end_with_parent)
     try:
-        for samples in pool.map(drawn, tasks):
+        for samples in pool.map(draw_files, tasks):
             yield from samples
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def drawn(task: tuple[Settings, str, range]) -> list[tuple[str, dict[str, bytes]]]:
+def draw_files(task: tuple[RenderSettings, str, range]) -> list[tuple[str, dict[str, bytes]]]:
     settings, split, numbers = task
     samples = [draw_sample(settings, split, number) for number in numbers]
     return [(sample.key, files(sample)) for sample in samples]
 
 
-def add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
+def add_member(archive: tarfile.TarFile, name: str, content: bytes) -> None:
     """A member without time, owner or anything else that differs between runs."""
     member = tarfile.TarInfo(name)
     member.size = len(content)

@@ -2,7 +2,8 @@
 
 No host synchronisation, no loop over bodies or parts, static shapes, sums in a fixed order; a first derivative by hand.
 On CUDA with Triton installed the terms run in Triton kernels, elsewhere in a fixed chain of torch operations. Every
-other quantity takes the formulas in `reference`, as do forward mode, torch.func transforms and second derivatives.
+other quantity or list of terms takes the formulas in `reference`, as do forward mode, torch.func transforms and second
+derivatives.
 """
 
 from __future__ import annotations
@@ -13,18 +14,23 @@ import torch
 from torch import Tensor
 from torch._C._functorch import is_functorch_wrapped_tensor
 
-from ipman_rs.quantities import is_paper_terms
+from ipman_rs.quantities import PAPER_TERMS, is_paper_terms, numbers_of
 
 from .derivatives import Terms, WeightedTerms
+from .stability_terms import NUMBERS
 
 if TYPE_CHECKING:
     from ipman_rs import BodyTemplate
     from ipman_rs.quantities import Quantity
 
 
+KNOWN = numbers_of(PAPER_TERMS) == NUMBERS
+"""Whether the paper's terms have the numbers that the tuned path computes."""
+
+
 def covers(quantity: Quantity, vertices: Tensor) -> bool:
     """Whether the tuned path computes this quantity of these vertices."""
-    if not is_paper_terms(quantity):
+    if not (KNOWN and is_paper_terms(quantity)):
         return False
     if torch.compiler.is_compiling():
         return True

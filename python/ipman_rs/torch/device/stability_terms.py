@@ -16,9 +16,12 @@ from ..reference.topology import widest
 from .sparse import product
 from .tables import Tables
 
+NUMBERS = ("stability", "pull", "push")
+"""What is computed here and in the Triton kernels, in this order."""
+
 
 class Options(NamedTuple):
-    """The numbers of the quantity "terms.stability", in its order."""
+    """The options of the paper's terms, in their order."""
 
     alpha: float
     gamma: float

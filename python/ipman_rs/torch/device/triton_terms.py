@@ -23,6 +23,7 @@ from torch import Tensor
 
 from ipman_rs.template import by_key
 
+from .stability_terms import NUMBERS
 from .tables import Matrices, PerTemplate, matrices
 
 if TYPE_CHECKING:
@@ -174,11 +175,11 @@ def _launch(
     normal, height = normal.to(torch.float64).contiguous(), height.to(torch.float64).contiguous()
     batch, parts = len(vertices), template.num_parts
     gradient = torch.empty_like(vertices if weights is not None else vertices[:0])
-    values = vertices.new_empty(batch, 3)
+    values = vertices.new_empty(batch, len(NUMBERS))
     if batch == 0:
         return values, gradient
     finite = vertices.isfinite().flatten(1).all(dim=1)
-    d_out = vertices.new_empty(batch, 3) if weights is None else weights.contiguous()
+    d_out = vertices.new_empty(batch, len(NUMBERS)) if weights is None else weights.contiguous()
 
     triangle_blocks, sample_blocks = len(layout.block_part), len(layout.sample_part)
     centre_count = len(layout.rim_starts) - 1
@@ -255,12 +256,12 @@ for _device in ("CUDA", "CPU"):  # the CPU under the interpreter
 
 @torch.library.register_fake("ipman_rs::stability_terms", lib=_library)
 def _(vertices: Tensor, *_: Any) -> Tensor:
-    return vertices.new_empty(vertices.shape[0], 3)
+    return vertices.new_empty(vertices.shape[0], len(NUMBERS))
 
 
 @torch.library.register_fake("ipman_rs::stability_terms_and_gradient", lib=_library)
 def _(vertices: Tensor, *_: Any) -> tuple[Tensor, Tensor]:
-    return vertices.new_empty(vertices.shape[0], 3), vertices.new_empty(vertices.shape)
+    return vertices.new_empty(vertices.shape[0], len(NUMBERS)), vertices.new_empty(vertices.shape)
 
 
 def values(

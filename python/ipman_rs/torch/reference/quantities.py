@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import torch
 from torch import Tensor
 
+from ipman_rs.quantities import TERMS as DESCRIBED
+
 from ..ground import Ground
 from .balance import balance_cost
 from .closing_volume import part_volumes
@@ -51,19 +53,6 @@ def _pull_and_push(*args: Any) -> Tensor:
     return torch.stack(ground_loss(*args), dim=-1)
 
 
-def _terms(body: Posed, ground: Ground, options: tuple[float, ...], kind: str, *modes: str) -> Tensor:
-    """The three terms of IntuitivePhysicsLoss side by side."""
-    *choices, points, curve = modes
-    first = FORMULAS[{"stability": "stability_loss", "balance": "balance_cost"}[kind]]
-    return torch.cat(
-        [
-            first(body, ground, options[:3], *choices),
-            FORMULAS["ground_loss"](body, ground, options[3:], points, curve),
-        ],
-        dim=-1,
-    )
-
-
 FORMULAS: dict[str, Formula] = {
     "part_volumes": lambda body, _, __: part_volumes(body),
     "mass_properties": lambda body, _, density: mass_properties(body, density).flatten(1),
@@ -75,5 +64,23 @@ FORMULAS: dict[str, Formula] = {
     "stability_loss": lambda body, plane, o, method: _column(stability_loss, body, plane, *o, method),
     "ground_loss": lambda body, plane, o, points, curve: _pull_and_push(body, plane, *o, points, curve),
     "balance_cost": lambda body, plane, o, wrap, method: _column(balance_cost, body, plane, *o, wrap, method),
-    "terms": _terms,
+    "terms": lambda body, plane, o, *words: _terms(body, plane, o, words),
 }
+
+# Of each term that `IntuitivePhysicsLoss` may have, its numbers (B, K).
+TERMS: dict[str, Formula] = {
+    "stability": FORMULAS["stability_loss"],
+    "balance": FORMULAS["balance_cost"],
+    "ground": FORMULAS["ground_loss"],
+}
+
+
+def _terms(body: Posed, ground: Ground, options: tuple[float, ...], words: tuple[str, ...]) -> Tensor:
+    """The numbers of all terms side by side. `words` are each term's name, followed by its modes."""
+    columns = []
+    while words:
+        name, words = words[0], words[1:]
+        modes, constants = len(DESCRIBED[name].modes), len(DESCRIBED[name].options)
+        columns.append(TERMS[name](body, ground, options[:constants], *words[:modes]))
+        words, options = words[modes:], options[constants:]
+    return torch.cat(columns, dim=-1)

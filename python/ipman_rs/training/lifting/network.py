@@ -11,7 +11,7 @@ from ..model import HMR, MeanParameters
 from ..model.keypoint_encoder import WIDTH, KeypointEncoder
 
 
-def lifter(seed: int, body: str = BODY, width: int = WIDTH, blocks: int = 1) -> HMR:
+def lifting_network(seed: int, body: str = BODY, width: int = WIDTH, blocks: int = 1) -> HMR:
     """A regressor of an embedded body with the weights that a seed draws."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)

@@ -13,7 +13,7 @@ from torch import Tensor
 import ipman_rs.torch as ipt
 from ipman_rs.body import rotations
 
-from ...synthetic.population import BODY, Bodies
+from ...synthetic.population import BODY, Population
 from ..batch import Batch
 from ..model.keypoint_encoder import KEYPOINTS
 from ..posed_estimate import HIPS, Posing
@@ -31,7 +31,7 @@ def posing() -> Posing:
     return Posing(ipt.BodyModel(BODY), KEYPOINTS)
 
 
-def views(bodies: Bodies, seed: int, per_body: int = 1) -> Batch:
+def views(bodies: Population, seed: int, per_body: int = 1) -> Batch:
     """`per_body` images of each person, one after the other: inputs (n, K, 3) without noise, true labels."""
     rows = np.repeat(np.arange(len(bodies)), per_body)
     cameras, places = _cameras(len(rows), np.random.default_rng([seed, 0]))
@@ -67,7 +67,7 @@ def views(bodies: Bodies, seed: int, per_body: int = 1) -> Batch:
     )
 
 
-def noisy(batch: Batch, generator: torch.Generator) -> Batch:
+def add_noise(batch: Batch, generator: torch.Generator) -> Batch:
     """The batch with noise on its input keypoints, some of which are lost (all zero)."""
     points = batch.inputs[..., :2] + NOISE * torch.randn(batch.inputs[..., :2].shape, generator=generator)
     there = (torch.rand(batch.inputs.shape[:2], generator=generator) >= DROPPED).to(points.dtype)[..., None]

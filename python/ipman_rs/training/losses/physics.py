@@ -18,7 +18,7 @@ from ..world import to_world
 Counted = Literal["labelled", "world"]
 
 
-class Physics(nn.Module):
+class PhysicsLoss(nn.Module):
     """`ipt.IntuitivePhysicsLoss` of a preset, its weights changed where `weights` says so.
 
     counted: whose bodies count. "labelled", as the authors' code has it: labelled parameters, and labelled as balanced

@@ -17,7 +17,7 @@ from ..projection import project
 from .body_parameters import betas_loss, pose_loss
 from .joints_3d import joints_3d_loss
 from .keypoints_2d import keypoints_2d_loss
-from .physics import Physics
+from .physics import PhysicsLoss
 from .positive_scale import positive_scale_loss
 
 
@@ -39,7 +39,7 @@ class Weights:
 class Loss(nn.Module):
     """The training loss of an estimate; physics: None leaves its terms out (HMR*)."""
 
-    def __init__(self, posing: Posing, physics: Physics | None = None, weights: Weights | None = None) -> None:
+    def __init__(self, posing: Posing, physics: PhysicsLoss | None = None, weights: Weights | None = None) -> None:
         super().__init__()
         self.posing, self.physics, self.weights = posing, physics, weights or Weights()
 

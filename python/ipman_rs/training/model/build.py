@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..trainer.config import Config
 
 
-def made(settings: Config, body: BodyModel, start: bool = True) -> HMR:
+def build_model(settings: Config, body: BodyModel, start: bool = True) -> HMR:
     """start: with the weights and mean parameters that it is to start from; without, those of a checkpoint follow.
 
     ValueError for files that do not fit, and unknown backbones.

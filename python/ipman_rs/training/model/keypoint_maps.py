@@ -1,5 +1,5 @@
-"""Where in the image the keypoints are, as the maps of the small backbone have it. It learns positions from that, as a
-large backbone has its features from ImageNet; from labels of bodies alone it takes many times as long."""
+"""Loss on the small backbone's maps of keypoints. It teaches the backbone positions in the image, in place of
+pretraining on ImageNet; from labels of bodies alone it would take many times as long."""
 
 from __future__ import annotations
 

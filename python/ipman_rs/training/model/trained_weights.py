@@ -1,4 +1,4 @@
-"""What checkpoints of `ipman train` hold."""
+"""The weights in checkpoints of `ipman train`."""
 
 from __future__ import annotations
 

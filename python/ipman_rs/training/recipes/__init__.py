@@ -1,4 +1,4 @@
-"""The paper's training runs, each a file to copy or to run: data sets in `data/`, where the files say.
+"""The paper's training runs, one file each, to be run or copied; they expect the data sets in `data/`.
 
 ipman-r           IPMAN-R on all data sets          ipman-r-human36m  fine-tuned on Human3.6M alone
 hmr-star          the baseline, without its terms

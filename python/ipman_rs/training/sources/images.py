@@ -16,7 +16,7 @@ from ipman_rs.body import BodyModel, rotations
 from ipman_rs.data import DataSet, Frames
 from ipman_rs.files import regular_file
 
-from ..augment import Augmentation, Augmenting, Pixels, cut, follow, normalised, to_crop
+from ..augment import Augmentation, AugmentConfig, Pixels, augment_labels, augmented_crop, normalised, to_crop
 from ..posed_estimate import HIPS, REGRESSED
 from .source import BadSample
 
@@ -48,12 +48,12 @@ class Images:
         body: BodyModel,
         keypoints: Sequence[str],
         size: int = 224,
-        augmenting: Augmenting | None = None,
+        augmenting: AugmentConfig | None = None,
         folder: Path = Path(),
         regressed: bool = False,
     ) -> None:
         self.data, self.body, self.keypoints, self.size, self.folder = data, body, tuple(keypoints), size, folder
-        self.augmenting, self.regressed = augmenting or Augmenting(), regressed
+        self.augmenting, self.regressed = augmenting or AugmentConfig(), regressed
         self.joints = (*body.joint_names, *(REGRESSED if regressed else ()))
         self._warned = False
 
@@ -74,10 +74,10 @@ class Images:
         box = frame.boxes[0].tolist()
         try:
             whole = to_crop(box, change)
-            pixels = cut(self._image(frame, row), box, change, self.size)
+            pixels = augmented_crop(self._image(frame, row), box, change, self.size)
         except (OSError, SyntaxError, ValueError) as error:
             raise BadSample(f"{frame.names[0]}: {error}") from None
-        return pixels, follow(self.labels(frame), whole, change, self.keypoints, self.joints)
+        return pixels, augment_labels(self.labels(frame), whole, change, self.keypoints, self.joints)
 
     def labels(self, frame: Frames) -> dict[str, Tensor]:
         """Of the one image as it is: fields of `Batch`, keypoints in pixels. What is not labelled has zeros."""

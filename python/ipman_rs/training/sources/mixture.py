@@ -1,5 +1,5 @@
 """Sources in given shares. Each sample is drawn from the run's seed and its own number, so step k of a run has the same
-batch whether the run was interrupted before it or not, and whoever of several processes makes which part of it."""
+batch whether or not the run was interrupted, and however many processes share the work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What training asks of a source."""
+"""The interface of a source of training samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checkpoints that are whole or not there: written beside their place and then moved."""
+"""Checkpoints that are complete or absent: written under a temporary name and then moved."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class WholeFiles(TorchCheckpointIO):
 
 
 class LastCheckpoint(Checkpoint):
-    """The checkpoint that an interrupted run goes on from: of every `every`-th step and of the last.
+    """The checkpoint from which an interrupted run continues: of every `every`-th step and of the last.
 
     A step that is validated (every `validated`-th, none where 0) is saved after its validation: a run that goes on from
     it does not validate it again. As a `Checkpoint` it is called after all other callbacks, and last of these.

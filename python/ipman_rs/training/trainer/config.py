@@ -1,4 +1,4 @@
-"""What a training run is told: a YAML file, and numbers on the command line that take precedence."""
+"""The configuration of a training run: a YAML file, and entries on the command line, which take precedence."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, get_type_hints
 from ipman_rs.files import parse_yaml, read_yaml
 from ipman_rs.presets import PRESETS
 
-from ..augment import Augmenting
+from ..augment import AugmentConfig
 from ..losses import Weights
 
 SCHEDULES = ("constant", "cosine")
@@ -32,8 +32,8 @@ class DataSet:
 
 
 @dataclass(frozen=True)
-class Physics:
-    """preset: of `ipman_rs.presets`, or none. weights, counted: as in `losses.Physics`."""
+class PhysicsConfig:
+    """preset: of `ipman_rs.presets`, or none. weights, counted: as in `losses.PhysicsLoss`."""
 
     preset: str = "none"
     weights: dict[str, float] = field(default_factory=dict)
@@ -69,8 +69,8 @@ class Config:
     body: str = "anny-lite"
     model: Model = field(default_factory=Model)
     loss: Weights = field(default_factory=Weights)
-    physics: Physics = field(default_factory=Physics)
-    augment: Augmenting = field(default_factory=Augmenting)
+    physics: PhysicsConfig = field(default_factory=PhysicsConfig)
+    augment: AugmentConfig = field(default_factory=AugmentConfig)
     steps: int = 10_000
     batch: int = 64
     rate: float = 5e-5
@@ -98,12 +98,12 @@ def load(path: Path, changes: Sequence[str] = ()) -> Config:
             raise ValueError(f"expected names with values, got {content!r}")
         for change in changes:
             _change(content, change)
-        return config(content)
+        return config_of(content)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
 
-def config(content: Mapping[str, Any]) -> Config:
+def config_of(content: Mapping[str, Any]) -> Config:
     """A configuration from plain dictionaries. ValueError as `load`."""
     made = _made(Config, content, "")
     if not made.data:
@@ -130,7 +130,7 @@ def config(content: Mapping[str, Any]) -> Config:
     return made
 
 
-def plain(settings: Config) -> dict[str, Any]:
+def as_dict(settings: Config) -> dict[str, Any]:
     """The configuration as dictionaries and lists, for files."""
     content = dataclasses.asdict(settings)
     return {**content, "data": list(content["data"]), "validation": list(content["validation"])}

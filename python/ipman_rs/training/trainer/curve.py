@@ -1,4 +1,4 @@
-"""The loss of every step, and the figures of every validation, as CSV that a kill leaves whole."""
+"""The losses of every step and the metrics of every validation, as CSV files that survive a kill."""
 
 from __future__ import annotations
 

@@ -60,13 +60,13 @@ def training_loader(settings: config.Config, body: BodyModel, start: int, rank: 
     """Batches of one process from step `start` on."""
     shares = [Share(told.name, source(told, settings, body), told.share) for told in settings.data]
     steps = Steps(start, settings.steps, settings.batch, rank, processes)
-    return Resumable(
+    return ResumableLoader(
         Mixture(shares, settings.seed), batch_sampler=steps, collate_fn=Batch.of, num_workers=settings.workers
     )
 
 
-class Resumable(DataLoader):
-    """Tells Lightning that it may go on in the middle: where, `Steps` is told when the loader is made."""
+class ResumableLoader(DataLoader):
+    """A loader that Lightning may resume in the middle; `Steps` gets the position when the loader is made."""
 
     def state_dict(self) -> dict[str, Any]:
         return {}
@@ -79,12 +79,12 @@ def validation_loaders(settings: config.Config, body: BodyModel, rank: int, proc
     """A loader for each set: this process' part of it, as it is."""
     loaders = []
     for told in settings.validation:
-        rows = Plain(source(told, settings, body, VALIDATION_SEED), rank, processes)
+        rows = ValidationSamples(source(told, settings, body, VALIDATION_SEED), rank, processes)
         loaders.append(DataLoader(rows, settings.batch, collate_fn=_good, num_workers=settings.workers))
     return loaders
 
 
-class Plain(Dataset):
+class ValidationSamples(Dataset):
     """Every `processes`-th sample of a source, not augmented; None for a bad one."""
 
     def __init__(self, origin: Source, rank: int, processes: int) -> None:

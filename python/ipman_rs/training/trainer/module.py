@@ -12,11 +12,11 @@ from torch import Tensor
 import ipman_rs.torch as ipt
 
 from ..batch import Batch
-from ..losses import Loss, Physics
-from ..metrics import COLUMNS, columns, figures
-from ..model.build import made
+from ..losses import Loss, PhysicsLoss
+from ..metrics import COLUMNS, columns, pose_metrics
+from ..model.build import build_model
 from ..posed_estimate import Posing
-from ..train_loop import clip_gradient, falling
+from ..train_loop import clip_gradient, cosine_decay
 from . import config, data
 
 
@@ -31,12 +31,12 @@ class Training(lightning.LightningModule):
         self.body = posing.body.body
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(settings.seed)  # the same weights in every process
-            self.model = made(settings, self.body)
+            self.model = build_model(settings, self.body)
         self.loss = Loss(posing, _physics(settings, posing), settings.loss)
         self._sums = torch.zeros(0)
 
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        checkpoint["settings"] = config.plain(self.settings)
+        checkpoint["settings"] = config.as_dict(self.settings)
 
     def forward(self, inputs: Tensor):
         return self.model(inputs)
@@ -48,7 +48,7 @@ class Training(lightning.LightningModule):
             return optimizer
         return {
             "optimizer": optimizer,
-            "lr_scheduler": {"scheduler": falling(optimizer, rate, steps), "interval": "step"},
+            "lr_scheduler": {"scheduler": cosine_decay(optimizer, rate, steps), "interval": "step"},
         }
 
     def train_dataloader(self):
@@ -59,7 +59,7 @@ class Training(lightning.LightningModule):
         return data.validation_loaders(self.settings, self.body, self.global_rank, self.trainer.world_size)
 
     def on_train_batch_start(self, batch: Batch, batch_idx: int) -> None:
-        # Dropout depends on the step and the process alone: an interrupted run goes on as if it had not been one.
+        # Dropout depends only on the step and the process, so that a resumed run equals an uninterrupted one.
         seed = np.random.SeedSequence([self.settings.seed, self.global_step, self.global_rank])
         torch.manual_seed(int(seed.generate_state(1, np.uint64)[0] >> 1))
 
@@ -78,7 +78,9 @@ class Training(lightning.LightningModule):
             return
         batch = batch.sound()
         found = columns(
-            figures(self.model(batch.inputs), batch, Posing(ipt.BodyModel(self.body), (), self.loss.posing.regressor))
+            pose_metrics(
+                self.model(batch.inputs), batch, Posing(ipt.BodyModel(self.body), (), self.loss.posing.regressor)
+            )
         )
         for number, key in enumerate(COLUMNS):
             values = torch.from_numpy(found[key][np.isfinite(found[key])])
@@ -95,8 +97,8 @@ class Training(lightning.LightningModule):
         self.log("PVE", means[0, list(COLUMNS).index("PVE")].float())
 
 
-def _physics(settings: config.Config, posing: Posing) -> Physics | None:
+def _physics(settings: config.Config, posing: Posing) -> PhysicsLoss | None:
     told = settings.physics
     if told.preset == "none":
         return None
-    return Physics(posing.body.template, told.preset, told.weights, told.counted)  # type: ignore[arg-type]
+    return PhysicsLoss(posing.body.template, told.preset, told.weights, told.counted)  # type: ignore[arg-type]

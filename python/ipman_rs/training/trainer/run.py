@@ -1,4 +1,4 @@
-"""A training run in a folder: begun, or gone on with where it was."""
+"""A training run in a folder: started, or continued from its last checkpoint."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lightning.pytorch.loggers import TensorBoardLogger
 from ipman_rs.files import write_whole
 
 from .checkpoints import LastCheckpoint, WholeFiles
-from .config import Config, load, plain
+from .config import Config, as_dict, load
 from .curve import Curve
 from .module import Training
 
@@ -79,7 +79,7 @@ def _keep(settings: Config, folder: Path) -> None:
                 raise ValueError(
                     f"{folder}: has a run with another {entry.name} ({path}); choose another folder, or remove it"
                 )
-    write_whole(path, yaml.safe_dump(plain(settings), sort_keys=False))
+    write_whole(path, yaml.safe_dump(as_dict(settings), sort_keys=False))
 
 
 def _callbacks(settings: Config, folder: Path) -> list[lightning.Callback]:

@@ -89,13 +89,6 @@ impl<'a, T: Data> Batch<'a, T> {
         3 * self.template.mesh.num_vertices
     }
 
-    /// The bodies that are finite, with their local origins and their rows of `out`.
-    pub(super) fn finite<'o, O>(&self, out: &'o mut [O]) -> Vec<(usize, Vec3<f64>, &'o mut O)> {
-        let mut bodies = memory::with_capacity(out.len());
-        bodies.extend(out.iter_mut().enumerate().filter_map(|(body, row)| Some((body, self.origin(body)?, row))));
-        bodies
-    }
-
     /// Calls `f` with one body as dual numbers along `d_vertices`, if it is finite.
     pub(super) fn on_dual(&self, body: usize, d_vertices: &[T], f: impl FnOnce(&PosedBody<Dual>)) {
         let Some(origin) = self.origin(body) else { return };
@@ -137,58 +130,46 @@ impl<'a, T: Data> Batch<'a, T> {
         points
     }
 
-    /// Runs `f` on groups of finite bodies, with their rows of the outputs. Rows of other bodies become NaN in the
-    /// first output and zero in the second.
-    pub(super) fn each<const N: usize>(
+    /// Runs what `work` makes of each group of finite bodies and their items, one body per lane, over the threads. There is
+    /// one item per body; `not_finite` gets those of the others.
+    pub(super) fn each_group<P: Send, W: OnLanes<T>>(
         &self,
-        outputs: [(&mut [T], usize); N],
-        f: impl Fn(&Group, [Vec<&mut [T]>; N]) + Sync,
+        mut items: impl Iterator<Item = P>,
+        not_finite: impl Fn(P),
+        work: impl Fn(&Group, Vec<P>) -> W + Sync,
     ) -> Result<()> {
         memory::guarded(|| {
-            let mut rest = outputs.map(|(data, size)| data.chunks_exact_mut(size));
             let mut bodies = memory::with_capacity(self.len());
             for body in 0..self.len() {
-                let mut row = rest.each_mut().map(|chunks| chunks.next().expect("one row a body"));
+                let item = items.next().expect("one item per body");
                 match self.origin(body) {
-                    Some(origin) => bodies.push((body, origin, row)),
-                    None => row.iter_mut().enumerate().for_each(|(k, row)| row.fill(T::of([f64::NAN, 0.0][k]))),
+                    Some(origin) => bodies.push((body, origin, item)),
+                    None => not_finite(item),
                 }
             }
-            self.each_group(bodies, |group, rows| {
-                let mut own: [Vec<&mut [T]>; N] = std::array::from_fn(|_| Vec::with_capacity(group.width));
-                for row in rows {
-                    own.iter_mut().zip(row).for_each(|(own, row)| own.push(row));
+            let widths = self.widths(bodies.len());
+            // Each body is listed once more in its group's vectors.
+            memory::ask(bodies.len() * (size_of::<P>() + size_of::<(usize, Vec3<f64>)>()));
+            let mut groups = Vec::new();
+            let mut rest = bodies.into_iter();
+            for &width in widths {
+                // A half-empty group takes as long as a full one, so such a rest goes to narrower lanes.
+                while 2 * rest.len() > width {
+                    let mut group = Group { width, bodies: Vec::new(), origins: Vec::new() };
+                    let mut own = Vec::with_capacity(width);
+                    for (body, origin, item) in rest.by_ref().take(width) {
+                        group.bodies.push(body);
+                        group.origins.push(origin);
+                        own.push(item);
+                    }
+                    memory::push(&mut groups, (group, own));
                 }
-                f(group, own);
+            }
+            threads::each(groups, self.pays_threads(), self.interrupted, &|(group, own)| {
+                let work = work(&group, own);
+                T::run_on_lanes(self.level, group.width, ReadBodies { batch: self, group: &group, work })
             })
         })
-    }
-
-    /// Runs `f` on groups of finite bodies over the threads, with the items P of each group's bodies.
-    pub(super) fn each_group<P: Send>(
-        &self,
-        bodies: Vec<(usize, Vec3<f64>, P)>,
-        f: impl Fn(&Group, Vec<P>) + Sync,
-    ) -> Result<()> {
-        let widths = self.widths(bodies.len());
-        // Each body is listed once more in its group's vectors.
-        memory::ask(bodies.len() * (size_of::<P>() + size_of::<(usize, Vec3<f64>)>()));
-        let mut groups = Vec::new();
-        let mut rest = bodies.into_iter();
-        for &width in widths {
-            // A half-empty group takes as long as a full one, so such a rest goes to narrower lanes.
-            while 2 * rest.len() > width {
-                let mut group = Group { level: self.level, width, bodies: Vec::new(), origins: Vec::new() };
-                let mut own = Vec::with_capacity(width);
-                for (body, origin, belonging) in rest.by_ref().take(width) {
-                    group.bodies.push(body);
-                    group.origins.push(origin);
-                    own.push(belonging);
-                }
-                memory::push(&mut groups, (group, own));
-            }
-        }
-        threads::each(groups, self.pays_threads(), self.interrupted, &|(group, own)| f(&group, own))
     }
 
     /// Runs `f` on every body with its row of the output.
@@ -212,16 +193,10 @@ impl<'a, T: Data> Batch<'a, T> {
     fn pays_threads(&self) -> bool {
         self.len() * self.template.mesh.num_vertices >= INLINE_VERTICES
     }
-
-    /// Runs `work` on a group of bodies, one per lane.
-    pub(super) fn on_lanes<W: OnLanes<T>>(&self, group: &Group, work: W) {
-        T::run_on_lanes(group.level, group.width, ReadBodies { batch: self, group, work });
-    }
 }
 
 /// Indices and local origins of finite bodies that are computed together, one per lane.
 pub(super) struct Group {
-    level: Level,
     width: usize,
     pub bodies: Vec<usize>,
     origins: Vec<Vec3<f64>>,

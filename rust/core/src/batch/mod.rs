@@ -9,3 +9,4 @@ mod per_body;
 mod quantities;
 
 pub use groups::Batch;
+pub use quantities::Evaluate;

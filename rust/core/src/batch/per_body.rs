@@ -15,7 +15,7 @@ use crate::quantity::Quantity;
 use crate::signed_volume::SignedVolumes;
 use crate::solid::{Extent, Solid};
 use crate::support::{BaseOfSupport, Contact};
-use crate::tipping::{Footing, TipTest, Tipping};
+use crate::tipping::{TipTest, Tipping};
 
 impl<T: Data> Batch<'_, T> {
     /// The base of support of each body.
@@ -31,16 +31,11 @@ impl<T: Data> Batch<'_, T> {
         analysis.check(self.template)?;
         memory::guarded(|| {
             let mut polygons = memory::filled(Polygon::new(), self.len());
-            let mut bodies = memory::with_capacity(self.len());
-            for (body, (row, polygon)) in out.chunks_exact_mut(size).zip(&mut polygons).enumerate() {
-                match self.origin(body) {
-                    Some(origin) => bodies.push((body, origin, (row, polygon))),
-                    None => row.fill(T::of(f64::NAN)),
-                }
-            }
-            self.each_group(bodies, |group, rows| {
+            let rows = out.chunks_exact_mut(size).zip(&mut polygons);
+            let not_finite = |(row, _): (&mut [T], _)| row.fill(T::of(f64::NAN));
+            self.each_group(rows, not_finite, |_, rows| {
                 let (out, polygons) = rows.into_iter().unzip();
-                self.on_lanes(group, WriteAnalysis { analysis, size, out, polygons });
+                WriteAnalysis { analysis, size, out, polygons }
             })?;
             Ok(polygons)
         })
@@ -71,13 +66,14 @@ impl<T: Data> Batch<'_, T> {
         test.check(self.template)?;
         memory::guarded(|| {
             let mut out = memory::filled(Tipping::nowhere(), self.len());
-            self.each_group(self.finite(&mut out), |group, out| {
-                let mut footings = vec![Footing::nowhere(); out.len()];
-                self.on_lanes(group, WritePerBody { result: test, out: footings.iter_mut().collect() });
-                for ((out, footing), &body) in out.into_iter().zip(footings).zip(&group.bodies) {
-                    *out = test.of_body(footing, self.vertices_of(body));
-                }
-            })?;
+            self.each_group(
+                out.iter_mut(),
+                |_| {},
+                |group, out| {
+                    let vertices = group.bodies.iter().map(|&body| self.vertices_of(body)).collect();
+                    WriteTipping { test, vertices, out }
+                },
+            )?;
             Ok(out)
         })
     }
@@ -86,7 +82,7 @@ impl<T: Data> Batch<'_, T> {
     fn per_body<F: PerBody>(&self, bad: F::Output, result: &F) -> Result<Vec<F::Output>> {
         memory::guarded(|| {
             let mut out = memory::filled(bad, self.len());
-            self.each_group(self.finite(&mut out), |group, out| self.on_lanes(group, WritePerBody { result, out }))?;
+            self.each_group(out.iter_mut(), |_| {}, |_, out| WritePerBody { result, out })?;
             Ok(out)
         })
     }
@@ -162,10 +158,18 @@ impl PerBody for Solids<'_> {
     }
 }
 
-impl PerBody for TipTest {
-    type Output = Footing;
-    fn of_lanes<R: Real>(&self, posed: &PosedBody<R>) -> Vec<Footing> {
-        self.footings(posed)
+struct WriteTipping<'a, T> {
+    test: &'a TipTest,
+    vertices: Vec<&'a [T]>,
+    out: Vec<&'a mut Tipping>,
+}
+
+impl<T: Data> OnLanes<T> for WriteTipping<'_, T> {
+    fn run<R: Real<Data = T>>(self, posed: &PosedBody<R>) {
+        let footings = self.test.footings(posed);
+        for ((out, footing), vertices) in self.out.into_iter().zip(footings).zip(self.vertices) {
+            *out = self.test.of_body(footing, vertices);
+        }
     }
 }
 

@@ -1,14 +1,11 @@
 //! L_ground = pull + push (Eq. 5): pull = mean of α1 tanh(h/α2)² over the points at or above the ground (Eq. 6), push =
 //! mean of β1 tanh(h/β2)² over those below it (Eq. 7). Both means run over all points.
 
+use super::term::{ByHeights, Description, Named, Shared, Term};
 use crate::error::{Result, unknown_choice};
-use crate::memory;
-use crate::number::vector::Vec3;
 use crate::number::{Kernel, Real, SUMS};
 use crate::options::{not_negative, positive};
 use crate::points::{PointChunk, Points};
-use crate::posed::PosedBody;
-use crate::quantity::Quantity;
 use crate::sampling::{CHUNK, Row, fold};
 use crate::template::Template;
 
@@ -49,7 +46,7 @@ impl Tanh {
     }
 }
 
-/// (pull, push) as a quantity.
+/// L_ground (Eq. 5) as (pull, push).
 ///
 /// ```
 /// use ipman::Batch;
@@ -85,64 +82,20 @@ struct Sides<R> {
     shares: [R; 2],
 }
 
-/// Running sums of both curves over the points and, if requested, their gradients by the vertices' heights.
-pub struct GroundSums<'a, R: Real> {
-    of: &'a GroundLoss,
+/// Running sums of both curves over the points.
+pub struct GroundSums<R: Real> {
     sides: Sides<R>,
     pull: R::Wide,
     push: R::Wide,
-    gradient: Gradient<'a, R>,
     /// Slopes at the current chunk of points.
     slopes: Row<R>,
 }
 
-/// What the gradient by the vertices' heights is added to.
-enum Gradient<'a, R> {
-    Unasked,
-    /// One gradient, of both terms together.
-    Of(&'a mut [R]),
-    /// Separate gradients of pull and of push.
-    OfEach([&'a mut [R]; 2]),
-}
-
-impl GroundLoss {
-    pub fn sums<R: Real>(&self) -> GroundSums<'_, R> {
-        self.sums_and(Gradient::Unasked, [R::zero(); 2])
-    }
-
-    /// Sums with the gradient of d_out · (pull, push).
-    pub fn sums_and_gradient<'a, R: Real>(
-        &'a self,
-        template: &Template,
-        d_out: &[R],
-        d_heights: &'a mut [R],
-    ) -> GroundSums<'a, R> {
-        self.sums_and(Gradient::Of(d_heights), self.shares(template, d_out))
-    }
-
-    /// Sums with the separate gradients of pull and of push.
-    pub fn sums_and_jacobian<'a, R: Real>(
-        &'a self,
-        template: &Template,
-        d_heights: [&'a mut [R]; 2],
-    ) -> GroundSums<'a, R> {
-        self.sums_and(Gradient::OfEach(d_heights), self.shares(template, &[R::of(1.0); 2]))
-    }
-
-    fn sums_and<'a, R: Real>(&'a self, gradient: Gradient<'a, R>, shares: [R; 2]) -> GroundSums<'a, R> {
-        let (sides, slopes) = (Sides::new(self, shares), [R::zero(); CHUNK]);
-        GroundSums { of: self, sides, pull: R::Wide::zero(), push: R::Wide::zero(), gradient, slopes }
-    }
-
-    /// Upstream gradient of each side divided by the number of points.
-    fn shares<R: Real>(&self, template: &Template, d_out: &[R]) -> [R; 2] {
-        let share = 1.0 / self.points.count(template) as f64;
-        [d_out[0] * R::of(self.alpha1 * share), d_out[1] * R::of(self.beta1 * share)]
-    }
-}
-
 impl<R: Real> Sides<R> {
-    fn new(of: &GroundLoss, shares: [R; 2]) -> Self {
+    /// `d_out` is the upstream gradient of pull and of push.
+    fn new(of: &GroundLoss, template: &Template, d_out: &[R]) -> Self {
+        let share = 1.0 / of.points.count(template) as f64;
+        let shares = [d_out[0] * R::of(of.alpha1 * share), d_out[1] * R::of(of.beta1 * share)];
         let widths = [R::of(1.0 / of.alpha2), R::of(-1.0 / of.beta2)];
         Sides { tanh: of.tanh, widths, shares: [widths[0] * shares[0], widths[1] * shares[1]] }
     }
@@ -156,36 +109,82 @@ impl<R: Real> Sides<R> {
     }
 }
 
-impl<R: Real> GroundSums<'_, R> {
-    /// Adds a chunk of points.
-    pub fn add(&mut self, chunk: &PointChunk, heights: &Row<R>) {
-        let sums = [&mut self.pull, &mut self.push];
-        R::dispatch::<AddChunk, _>((&self.sides, heights, chunk.len(), &mut self.slopes, sums));
-        match &mut self.gradient {
-            Gradient::Unasked => {}
-            Gradient::Of(d_heights) => chunk.scatter_add(&self.slopes, d_heights),
-            Gradient::OfEach([pull, push]) => {
-                let mut below = [R::zero(); CHUNK];
-                R::dispatch::<SplitBelow, _>((heights, &mut self.slopes, &mut below));
-                chunk.scatter_add(&self.slopes, pull);
-                chunk.scatter_add(&below, push);
+impl Named for GroundLoss {
+    const DESCRIPTION: &'static Description = &Description {
+        name: "ground",
+        numbers: &["pull", "push"],
+        along_normal: true,
+        modes: &["points", "curve"],
+        options: &["alpha1", "alpha2", "beta1", "beta2"],
+    };
+
+    fn named(modes: &[&str], options: &[f64]) -> Result<Self> {
+        let (&[points, tanh], &[alpha1, alpha2, beta1, beta2]) = (modes, options) else {
+            unreachable!("as many as described")
+        };
+        Ok(GroundLoss { points: Points::named(points)?, tanh: Tanh::named(tanh)?, alpha1, alpha2, beta1, beta2 })
+    }
+}
+
+impl Term for GroundLoss {
+    type Sums<R: Real> = GroundSums<R>;
+    type Saved<R: Real> = ();
+
+    fn description(&self) -> &'static Description {
+        Self::DESCRIPTION
+    }
+
+    fn check(&self, _: &Template) -> Result<()> {
+        not_negative("alpha1", self.alpha1)?;
+        positive("alpha2", self.alpha2)?;
+        not_negative("beta1", self.beta1)?;
+        positive("beta2", self.beta2)
+    }
+
+    fn reads_samples(&self) -> bool {
+        self.points == Points::Samples
+    }
+
+    fn begin<R: Real>(&self, shared: &Shared<R>, d_out: &[R], d_heights: &mut ByHeights<R>) -> GroundSums<R> {
+        let sides = Sides::new(self, shared.template(), d_out);
+        let (pull, push, slopes) = (R::Wide::zero(), R::Wide::zero(), [R::zero(); CHUNK]);
+        let mut sums = GroundSums { sides, pull, push, slopes };
+        if self.points == Points::Vertices {
+            let mut row = [R::zero(); CHUNK];
+            for chunk in self.points.chunks(shared.template()) {
+                chunk.gather(&shared.heights, &mut row);
+                self.add(&mut sums, &chunk, &row, d_heights);
             }
         }
+        sums
     }
 
-    /// Adds all points.
-    pub fn add_all(&mut self, template: &Template, heights: &[R]) {
-        let mut row = [R::zero(); CHUNK];
-        for chunk in self.of.points.chunks(template) {
-            chunk.gather(heights, &mut row);
-            self.add(&chunk, &row);
+    fn add<R: Real>(
+        &self,
+        sums: &mut GroundSums<R>,
+        chunk: &PointChunk,
+        heights: &Row<R>,
+        d_heights: &mut ByHeights<R>,
+    ) {
+        let GroundSums { sides, pull, push, slopes } = sums;
+        R::dispatch::<AddChunk, _>((sides, heights, chunk.len(), slopes, [pull, push]));
+        match d_heights {
+            ByHeights::Unasked => {}
+            ByHeights::Sum(d_heights) => chunk.scatter_add(slopes, d_heights),
+            ByHeights::Each([pull, push]) => {
+                let mut below = [R::zero(); CHUNK];
+                R::dispatch::<SplitBelow, _>((heights, slopes, &mut below));
+                chunk.scatter_add(slopes, pull);
+                chunk.scatter_add(&below, push);
+            }
+            ByHeights::Each(_) => unreachable!("two numbers"),
         }
     }
 
-    pub fn finish(&self, template: &Template, out: &mut [R]) {
-        let share = 1.0 / self.of.points.count(template) as f64;
-        out[0] = R::narrow(self.pull * R::Wide::of(self.of.alpha1 * share));
-        out[1] = R::narrow(self.push * R::Wide::of(self.of.beta1 * share));
+    fn finish<R: Real>(&self, shared: &Shared<R>, sums: GroundSums<R>, out: &mut [R]) {
+        let share = 1.0 / self.points.count(shared.template()) as f64;
+        out[0] = R::narrow(sums.pull * R::Wide::of(self.alpha1 * share));
+        out[1] = R::narrow(sums.push * R::Wide::of(self.beta1 * share));
     }
 }
 
@@ -234,56 +233,6 @@ impl<R: Real> Kernel<(&Row<R>, &mut Row<R>, &mut Row<R>)> for SplitBelow {
         for ((&height, above), below) in heights.iter().zip(above).zip(below) {
             *below = height.if_negative(*above, R::zero());
             *above = height.if_negative(R::zero(), *above);
-        }
-    }
-}
-
-impl Quantity for GroundLoss {
-    /// The vertices' heights.
-    type Saved<R: Real> = Vec<R>;
-
-    fn num_outputs(&self, _: &Template) -> usize {
-        2
-    }
-
-    fn check(&self, _: &Template) -> Result<()> {
-        not_negative("alpha1", self.alpha1)?;
-        positive("alpha2", self.alpha2)?;
-        not_negative("beta1", self.beta1)?;
-        positive("beta2", self.beta2)
-    }
-
-    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Vec<R> {
-        let heights = posed.heights();
-        let mut sums = self.sums();
-        sums.add_all(posed.template, &heights);
-        sums.finish(posed.template, out);
-        heights
-    }
-
-    fn backward<R: Real>(&self, posed: &PosedBody<R>, heights: &Vec<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        let sides = Sides::new(self, self.shares(posed.template, d_out));
-        let mut d_heights = memory::filled(R::zero(), heights.len());
-        let mut row = [R::zero(); CHUNK];
-        for chunk in self.points.chunks(posed.template) {
-            chunk.gather(heights, &mut row);
-            R::dispatch::<Slopes, _>((&sides, &mut row));
-            chunk.scatter_add(&row, &mut d_heights);
-        }
-        posed.heights_backward(&d_heights, d_points);
-    }
-}
-
-/// From heights to the slopes of both curves.
-struct Slopes;
-
-impl<R: Real> Kernel<(&Sides<R>, &mut Row<R>)> for Slopes {
-    type Output = ();
-
-    #[inline(always)]
-    fn run((sides, row): (&Sides<R>, &mut Row<R>)) {
-        for height in row {
-            *height = sides.value_and_slope(*height).1;
         }
     }
 }

@@ -1,17 +1,19 @@
 //! L_stability = ‖g(m̄) − g(s̄)‖₂ (Eq. 4): the distance, on the ground, from the centre of mass to the centre of pressure,
 //! metres.
 
+use super::term::{ByHeights, Description, Gradient, Named, Shared, Term};
 use crate::error::Result;
 use crate::mass::{Centre, Method};
-use crate::memory;
 use crate::number::Real;
 use crate::number::vector::{Vec3, dot, scale, sub};
+use crate::points::PointChunk;
 use crate::posed::PosedBody;
-use crate::pressure::{CenterOfPressure, Cop};
+use crate::pressure::{CenterOfPressure, Cop, LoadSums, PressureCurve};
 use crate::quantity::Quantity;
+use crate::sampling::Row;
 use crate::template::Template;
 
-/// L_stability (Eq. 4) as a quantity, metres.
+/// L_stability (Eq. 4), metres.
 ///
 /// ```
 /// use ipman::Batch;
@@ -39,43 +41,58 @@ pub fn distance_on_ground<R: Real>(posed: &PosedBody<R>, centre: &Centre<R>, cop
     (length, scale(R::Wide::of(1.0) / length.at_least(R::Wide::of(1e-300)), offset))
 }
 
-impl StabilityLoss {
-    /// The backward. `d_heights` may already hold a gradient by the vertices' heights; it is added, too.
-    pub fn backward_with<R: Real>(
-        &self,
-        posed: &PosedBody<R>,
-        (centre, cop, heights): &(Centre<R>, Cop<R>, Vec<R>),
-        d_out: R,
-        d_heights: Vec<R>,
-        d_points: &mut [Vec3<R>],
-    ) {
-        let d_centre = scale(d_out.widen(), distance_on_ground(posed, centre, cop).1);
-        cop.backward(posed, heights, scale(R::Wide::of(-1.0), d_centre), d_heights, d_points);
-        self.method.backward(posed, centre, d_centre, d_points);
+impl Named for StabilityLoss {
+    const DESCRIPTION: &'static Description = &Description {
+        name: "stability",
+        numbers: &["stability"],
+        along_normal: false,
+        modes: &["method"],
+        options: &["alpha", "gamma", "epsilon"],
+    };
+
+    fn named(modes: &[&str], options: &[f64]) -> Result<Self> {
+        let (&[method], &[alpha, gamma, epsilon]) = (modes, options) else { unreachable!("as many as described") };
+        let pressure = CenterOfPressure { curve: PressureCurve { alpha, gamma }, epsilon };
+        Ok(StabilityLoss { method: Method::named(method)?, pressure })
     }
 }
 
-impl Quantity for StabilityLoss {
-    /// m̄, s̄ and the vertices' heights.
-    type Saved<R: Real> = (Centre<R>, Cop<R>, Vec<R>);
+impl Term for StabilityLoss {
+    type Sums<R: Real> = LoadSums<R>;
+    /// s̄
+    type Saved<R: Real> = Cop<R>;
 
-    fn num_outputs(&self, _: &Template) -> usize {
-        1
+    fn description(&self) -> &'static Description {
+        Self::DESCRIPTION
     }
 
     fn check(&self, template: &Template) -> Result<()> {
         self.pressure.check(template)
     }
 
-    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Self::Saved<R> {
-        let heights = posed.heights();
-        let centre = self.method.forward(posed);
-        let cop = self.pressure.locate(posed, &heights);
-        out[0] = R::narrow(distance_on_ground(posed, &centre, &cop).0);
-        (centre, cop, heights)
+    fn reads_samples(&self) -> bool {
+        true
     }
 
-    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        self.backward_with(posed, saved, d_out[0], memory::filled(R::zero(), saved.2.len()), d_points);
+    fn begin<R: Real>(&self, shared: &Shared<R>, _: &[R], _: &mut ByHeights<R>) -> LoadSums<R> {
+        LoadSums::new(self.pressure, shared.template(), &shared.heights)
+    }
+
+    fn add<R: Real>(&self, sums: &mut LoadSums<R>, chunk: &PointChunk, heights: &Row<R>, _: &mut ByHeights<R>) {
+        sums.add(chunk, heights);
+    }
+
+    fn finish<R: Real>(&self, shared: &Shared<R>, sums: LoadSums<R>, out: &mut [R]) -> Cop<R> {
+        let cop = sums.finish(shared.posed);
+        out[0] = R::narrow(distance_on_ground(shared.posed, shared.centre(self.method), &cop).0);
+        cop
+    }
+
+    fn backward<R: Real>(&self, shared: &Shared<R>, cop: &Cop<R>, d_out: &[R], gradient: &mut Gradient<R>) {
+        let (posed, centre) = (shared.posed, shared.centre(self.method));
+        let d_centre = scale(d_out[0].widen(), distance_on_ground(posed, centre, cop).1);
+        let (d_heights, d_points) = gradient.heights_and_points();
+        cop.backward(posed, &shared.heights, scale(R::Wide::of(-1.0), d_centre), d_heights, d_points);
+        self.method.backward(posed, centre, d_centre, d_points);
     }
 }

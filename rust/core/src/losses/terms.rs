@@ -1,45 +1,22 @@
-//! The terms of a training or fitting step together: (stability, pull, push), Eqs. 4, 6 and 7, or (balance, pull, push).
-//!
-//! Stability and ground share one pass over the samples.
+//! The terms of a training or fitting step together: any of the list in [`super`], in one pass over the body.
 
-use crate::error::Result;
-use crate::losses::balance::{Balance, BalanceCost};
-use crate::losses::ground::{GroundLoss, GroundSums};
-use crate::losses::stability::{StabilityLoss, distance_on_ground};
-use crate::mass::Centre;
+use super::AnyTerm;
+use super::term::{OwnGradient, Term, forward, forward_and_backward, forward_and_jacobian};
+use crate::error::{Result, unknown_choice};
 use crate::memory;
 use crate::number::Real;
 use crate::number::vector::Vec3;
-use crate::points::Points;
 use crate::posed::PosedBody;
-use crate::pressure::{Cop, LoadSums};
 use crate::quantity::Quantity;
-use crate::sampling::CHUNK;
 use crate::template::Template;
 
-/// The first term, pull and push.
-pub const NUM_TERMS: usize = 3;
-
-/// The terms (first, pull, push). The gradients of pull and push are parallel to the ground's normal.
-pub trait Terms: Quantity {
-    /// The values; the gradient of the first term, added to `d_first`, the virtual vertices' included; and the gradients
-    /// of pull and push by the vertices' heights, added to `d_ground`.
-    fn forward_and_jacobian<R: Real>(
-        &self,
-        posed: &PosedBody<R>,
-        out: &mut [R],
-        d_first: &mut [Vec3<R>],
-        d_ground: [&mut [R]; 2],
-    );
-}
-
-/// (stability, pull, push) in one pass; the values are those of the separate losses.
+/// Terms that share one pass; their numbers stand side by side and are those of the separate losses.
 ///
 /// ```
 /// use ipman::Batch;
 /// use ipman::losses::ground::{GroundLoss, Tanh};
 /// use ipman::losses::stability::StabilityLoss;
-/// use ipman::losses::terms::StabilityTerms;
+/// use ipman::losses::terms::Terms;
 /// use ipman::mass::Method;
 /// use ipman::points::Points;
 /// use ipman::pressure::{CenterOfPressure, PressureCurve};
@@ -51,62 +28,73 @@ pub trait Terms: Quantity {
 /// let (alpha1, alpha2, beta1, beta2) = (1.0, 0.15, 10.0, 0.15);
 /// let ground = GroundLoss { points: Points::Samples, tanh: Tanh::Squared, alpha1, alpha2, beta1, beta2 };
 /// let alone = [batch.value(&stability)?, batch.value(&ground)?].concat();
-/// assert_eq!(batch.value(&StabilityTerms { stability, ground })?, alone);
+/// assert_eq!(batch.value(&Terms(vec![stability.into(), ground.into()]))?, alone);
 /// # Ok::<(), ipman::Error>(())
 /// ```
-pub struct StabilityTerms {
-    pub stability: StabilityLoss,
-    pub ground: GroundLoss,
-}
+pub struct Terms(pub Vec<AnyTerm>);
 
-impl StabilityTerms {
-    /// The values, with what the stability's backward needs. If `ground` requests gradients, they come from the same
-    /// pass over the samples.
-    fn one_pass<R: Real>(
-        &self,
-        posed: &PosedBody<R>,
-        mut ground: GroundSums<R>,
-        out: &mut [R],
-    ) -> (Centre<R>, Cop<R>, Vec<R>) {
-        let heights = posed.heights();
-        let mut loads = LoadSums::new(self.stability.pressure, posed.template, &heights);
-        let mut row = [R::zero(); CHUNK];
-        for chunk in Points::Samples.chunks(posed.template) {
-            chunk.gather(&heights, &mut row);
-            loads.add(&chunk, &row);
-            if self.ground.points == Points::Samples {
-                ground.add(&chunk, &row);
-            }
+impl Terms {
+    /// From each term's name followed by its modes, and the options of all.
+    pub fn named(mut words: &[&str], mut options: &[f64]) -> Result<Self> {
+        let mut terms = Vec::new();
+        while let [name, rest @ ..] = words {
+            let Some(known) = AnyTerm::DESCRIPTIONS.iter().find(|known| known.name == *name) else {
+                let names: Vec<_> = AnyTerm::DESCRIPTIONS.iter().map(|known| format!("{:?}", known.name)).collect();
+                return Err(unknown_choice("terms", &names.join(", "), name));
+            };
+            let (Some((modes, rest)), Some((own, others))) =
+                (rest.split_at_checked(known.modes.len()), options.split_at_checked(known.options.len()))
+            else {
+                return Err(unknown_choice("terms", &format!("{:?} and {:?}", known.modes, known.options), name));
+            };
+            terms.push(AnyTerm::named(known.name, modes, own)?);
+            (words, options) = (rest, others);
         }
-        if self.ground.points == Points::Vertices {
-            ground.add_all(posed.template, &heights);
+        match (terms.is_empty(), options) {
+            (false, []) => Ok(Terms(terms)),
+            _ => Err(unknown_choice("terms", "terms and their options", &format!("{} more options", options.len()))),
         }
-        let (centre, cop) = (self.stability.method.forward(posed), loads.finish(posed));
-        out[0] = R::narrow(distance_on_ground(posed, &centre, &cop).0);
-        ground.finish(posed.template, &mut out[1..]);
-        (centre, cop, heights)
+    }
+
+    /// For each number of a row, how many numbers per vertex the Jacobian has: 1 for a gradient along the ground's
+    /// normal, else 3.
+    pub fn widths(&self) -> Vec<usize> {
+        let of_term = |term: &AnyTerm| {
+            let known = term.description();
+            std::iter::repeat_n(if known.along_normal { 1 } else { 3 }, known.numbers.len())
+        };
+        self.0.iter().flat_map(of_term).collect()
+    }
+
+    /// Length of a body's Jacobian.
+    pub fn jacobian_row(&self, template: &Template) -> usize {
+        self.widths().iter().sum::<usize>() * template.mesh.num_vertices
+    }
+
+    /// The numbers, and the gradient of each.
+    pub fn forward_and_jacobian<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Vec<OwnGradient<R>> {
+        forward_and_jacobian(&self.0, posed, out)
     }
 }
 
-impl Quantity for StabilityTerms {
-    type Saved<R: Real> = (Centre<R>, Cop<R>, Vec<R>);
+impl Quantity for Terms {
+    type Saved<R: Real> = ();
 
     fn num_outputs(&self, _: &Template) -> usize {
-        NUM_TERMS
+        self.widths().len()
     }
 
     fn check(&self, template: &Template) -> Result<()> {
-        self.stability.check(template)?;
-        self.ground.check(template)
+        self.0.iter().try_for_each(|term| Term::check(term, template))
     }
 
-    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Self::Saved<R> {
-        self.one_pass(posed, self.ground.sums(), out)
+    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) {
+        forward(&self.0, posed, out);
     }
 
-    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        self.stability.backward(posed, saved, &d_out[..1], d_points);
-        self.ground.backward(posed, &saved.2, &d_out[1..], d_points);
+    fn backward<R: Real>(&self, posed: &PosedBody<R>, _: &(), d_out: &[R], d_points: &mut [Vec3<R>]) {
+        let mut out = memory::filled(R::zero(), d_out.len());
+        forward_and_backward(&self.0, posed, d_out, &mut out, d_points);
     }
 
     fn forward_and_backward<R: Real>(
@@ -116,68 +104,126 @@ impl Quantity for StabilityTerms {
         out: &mut [R],
         d_points: &mut [Vec3<R>],
     ) {
-        let mut d_heights = memory::filled(R::zero(), posed.template.mesh.num_vertices);
-        let ground = self.ground.sums_and_gradient(posed.template, &d_out[1..], &mut d_heights);
-        let saved = self.one_pass(posed, ground, out);
-        self.stability.backward_with(posed, &saved, d_out[0], d_heights, d_points);
+        forward_and_backward(&self.0, posed, d_out, out, d_points);
     }
 }
 
-impl Terms for StabilityTerms {
-    fn forward_and_jacobian<R: Real>(
-        &self,
-        posed: &PosedBody<R>,
-        out: &mut [R],
-        d_first: &mut [Vec3<R>],
-        d_ground: [&mut [R]; 2],
-    ) {
-        let saved = self.one_pass(posed, self.ground.sums_and_jacobian(posed.template, d_ground), out);
-        self.stability.backward(posed, &saved, &[R::of(1.0)], d_first);
-    }
+/// Makes [`AnyTerm`] from the list of all terms: an enum, for the methods of [`Term`] are generic.
+macro_rules! list_of_terms {
+    ($($Name:ident($Type:ty)),* $(,)?) => {
+        /// A term of the list.
+        pub enum AnyTerm {
+            $($Name($Type)),*
+        }
+
+        /// Its running sums.
+        pub enum AnySums<R: $crate::number::Real> {
+            $($Name(<$Type as $crate::losses::term::Term>::Sums<R>)),*
+        }
+
+        /// What it saves for its backward.
+        pub enum AnySaved<R: $crate::number::Real> {
+            $($Name(<$Type as $crate::losses::term::Term>::Saved<R>)),*
+        }
+
+        const _: () = {
+            use $crate::error::{Error, Result};
+            use $crate::losses::term::{ByHeights, Description, Gradient, Named, Shared, Term};
+            use $crate::number::Real;
+            use $crate::points::PointChunk;
+            use $crate::sampling::Row;
+            use $crate::template::Template;
+
+            impl AnyTerm {
+                /// All terms of the list, in their order.
+                pub const DESCRIPTIONS: &'static [&'static Description] = &[$(<$Type>::DESCRIPTION),*];
+
+                /// A term by its name, with the modes and options that its description lists.
+                pub fn named(name: &str, modes: &[&str], options: &[f64]) -> Result<Self> {
+                    $(
+                        if name == <$Type>::DESCRIPTION.name {
+                            return Ok(AnyTerm::$Name(<$Type>::named(modes, options)?));
+                        }
+                    )*
+                    Err(Error::UnknownQuantity(name.into()))
+                }
+            }
+
+            $(
+                impl From<$Type> for AnyTerm {
+                    fn from(term: $Type) -> Self {
+                        AnyTerm::$Name(term)
+                    }
+                }
+            )*
+
+            impl Term for AnyTerm {
+                type Sums<R: Real> = AnySums<R>;
+                type Saved<R: Real> = AnySaved<R>;
+
+                fn description(&self) -> &'static Description {
+                    match self {
+                        $(AnyTerm::$Name(term) => term.description()),*
+                    }
+                }
+
+                fn check(&self, template: &Template) -> Result<()> {
+                    match self {
+                        $(AnyTerm::$Name(term) => Term::check(term, template)),*
+                    }
+                }
+
+                fn reads_samples(&self) -> bool {
+                    match self {
+                        $(AnyTerm::$Name(term) => term.reads_samples()),*
+                    }
+                }
+
+                fn begin<R: Real>(&self, shared: &Shared<R>, d_out: &[R], d_heights: &mut ByHeights<R>) -> AnySums<R> {
+                    match self {
+                        $(AnyTerm::$Name(term) => AnySums::$Name(term.begin(shared, d_out, d_heights))),*
+                    }
+                }
+
+                fn add<R: Real>(
+                    &self,
+                    sums: &mut AnySums<R>,
+                    chunk: &PointChunk,
+                    heights: &Row<R>,
+                    d_heights: &mut ByHeights<R>,
+                ) {
+                    match (self, sums) {
+                        $((AnyTerm::$Name(term), AnySums::$Name(sums)) => term.add(sums, chunk, heights, d_heights),)*
+                        _ => unreachable!("sums of another term"),
+                    }
+                }
+
+                fn finish<R: Real>(&self, shared: &Shared<R>, sums: AnySums<R>, out: &mut [R]) -> AnySaved<R> {
+                    match (self, sums) {
+                        $((AnyTerm::$Name(term), AnySums::$Name(sums)) => {
+                            AnySaved::$Name(term.finish(shared, sums, out))
+                        })*
+                        _ => unreachable!("sums of another term"),
+                    }
+                }
+
+                fn backward<R: Real>(
+                    &self,
+                    shared: &Shared<R>,
+                    saved: &AnySaved<R>,
+                    d_out: &[R],
+                    gradient: &mut Gradient<R>,
+                ) {
+                    match (self, saved) {
+                        $((AnyTerm::$Name(term), AnySaved::$Name(saved)) => {
+                            term.backward(shared, saved, d_out, gradient)
+                        })*
+                        _ => unreachable!("results of another term"),
+                    }
+                }
+            }
+        };
+    };
 }
 
-/// (balance, pull, push).
-pub struct BalanceTerms {
-    pub balance: BalanceCost,
-    pub ground: GroundLoss,
-}
-
-impl Quantity for BalanceTerms {
-    type Saved<R: Real> = (Balance<R>, Vec<R>);
-
-    fn num_outputs(&self, _: &Template) -> usize {
-        NUM_TERMS
-    }
-
-    fn check(&self, template: &Template) -> Result<()> {
-        self.balance.check(template)?;
-        self.ground.check(template)
-    }
-
-    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Self::Saved<R> {
-        let (first, rest) = out.split_at_mut(1);
-        (self.balance.forward(posed, first), self.ground.forward(posed, rest))
-    }
-
-    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Self::Saved<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        self.ground.backward(posed, &saved.1, &d_out[1..], d_points);
-        self.balance.backward(posed, &saved.0, &d_out[..1], d_points);
-    }
-}
-
-impl Terms for BalanceTerms {
-    fn forward_and_jacobian<R: Real>(
-        &self,
-        posed: &PosedBody<R>,
-        out: &mut [R],
-        d_first: &mut [Vec3<R>],
-        d_ground: [&mut [R]; 2],
-    ) {
-        let (first, rest) = out.split_at_mut(1);
-        let saved = self.balance.forward(posed, first);
-        self.balance.backward(posed, &saved, &[R::of(1.0)], d_first);
-        let mut ground = self.ground.sums_and_jacobian(posed.template, d_ground);
-        ground.add_all(posed.template, &posed.heights());
-        ground.finish(posed.template, rest);
-    }
-}
+pub(super) use list_of_terms;

@@ -125,8 +125,8 @@ pub fn quantities() -> Vec<(String, Vec<f64>)> {
         for tanh in ["tanh_squared", "tanh_of_square"] {
             all.push((format!("ground_loss.{points}.{tanh}"), ground.clone()));
             let with = |first: &[f64]| [first, &ground].concat();
-            all.push((format!("terms.stability.pcom.{points}.{tanh}"), with(&pressure)));
-            all.push((format!("terms.balance.log.pcom.{points}.{tanh}"), with(&balance)));
+            all.push((format!("terms.stability.pcom.ground.{points}.{tanh}"), with(&pressure)));
+            all.push((format!("terms.balance.log.pcom.ground.{points}.{tanh}"), with(&balance)));
         }
     }
     all

@@ -10,6 +10,7 @@
 mod loads;
 mod newton;
 
+use super::term::{ByHeights, Description, Gradient, Named, Shared, Term};
 use crate::error::{Result, unknown_choice};
 use crate::mass::{Centre, Method};
 use crate::memory;
@@ -18,7 +19,6 @@ use crate::number::{Kernel, Real};
 use crate::options::positive;
 use crate::posed::PosedBody;
 use crate::pressure::PressureCurve;
-use crate::quantity::Quantity;
 use crate::sampling::{CHUNK, Row};
 use crate::template::Template;
 use loads::{Exponent, Reach, Weigh, all_lanes, factor, negligible, read};
@@ -57,7 +57,7 @@ impl Wrap {
     }
 }
 
-/// The balance cost as a quantity.
+/// The balance cost.
 ///
 /// ```
 /// use ipman::Batch;
@@ -82,24 +82,40 @@ pub struct BalanceCost {
 
 /// The solved problem.
 pub struct Balance<R: Real> {
-    centre: Centre<R>,
     solution: Solution<R>,
 }
 
 impl BalanceCost {
     /// The forward, given the centre of mass.
-    pub fn forward_about<R: Real>(&self, posed: &PosedBody<R>, centre: Centre<R>, out: &mut [R]) -> Balance<R> {
+    pub fn forward_about<R: Real>(&self, posed: &PosedBody<R>, centre: &Centre<R>, out: &mut [R]) -> Balance<R> {
         let solution = R::dispatch::<Solve, _>((&self.curve, self.sigma, posed, centre.point));
         out[0] = R::narrow(self.wrap.value_and_slope(solution.cost).0);
-        Balance { centre, solution }
+        Balance { solution }
     }
 }
 
-impl Quantity for BalanceCost {
+impl Named for BalanceCost {
+    const DESCRIPTION: &'static Description = &Description {
+        name: "balance",
+        numbers: &["balance"],
+        along_normal: false,
+        modes: &["wrap", "method"],
+        options: &["alpha", "balance_gamma", "sigma"],
+    };
+
+    fn named(modes: &[&str], options: &[f64]) -> Result<Self> {
+        let (&[wrap, method], &[alpha, gamma, sigma]) = (modes, options) else { unreachable!("as many as described") };
+        let curve = PressureCurve { alpha, gamma };
+        Ok(BalanceCost { method: Method::named(method)?, wrap: Wrap::named(wrap)?, curve, sigma })
+    }
+}
+
+impl Term for BalanceCost {
+    type Sums<R: Real> = ();
     type Saved<R: Real> = Balance<R>;
 
-    fn num_outputs(&self, _: &Template) -> usize {
-        1
+    fn description(&self) -> &'static Description {
+        Self::DESCRIPTION
     }
 
     fn check(&self, _: &Template) -> Result<()> {
@@ -107,24 +123,29 @@ impl Quantity for BalanceCost {
         positive("sigma", self.sigma)
     }
 
-    fn forward<R: Real>(&self, posed: &PosedBody<R>, out: &mut [R]) -> Balance<R> {
-        self.forward_about(posed, self.method.forward(posed), out)
+    fn begin<R: Real>(&self, _: &Shared<R>, _: &[R], _: &mut ByHeights<R>) {}
+
+    fn finish<R: Real>(&self, shared: &Shared<R>, _: (), out: &mut [R]) -> Balance<R> {
+        self.forward_about(shared.posed, shared.centre(self.method), out)
     }
 
-    fn backward<R: Real>(&self, posed: &PosedBody<R>, saved: &Balance<R>, d_out: &[R], d_points: &mut [Vec3<R>]) {
-        R::dispatch::<Backward, _>((self, posed, saved, d_out[0], d_points));
+    fn backward<R: Real>(&self, shared: &Shared<R>, saved: &Balance<R>, d_out: &[R], gradient: &mut Gradient<R>) {
+        let centre = shared.centre(self.method);
+        R::dispatch::<Backward, _>((self, shared.posed, centre, saved, d_out[0], gradient.points()));
     }
 }
 
 /// The backward of the cost. Arms are taken from the loaded mean, so that the weights are accurate.
 struct Backward;
 
-impl<R: Real> Kernel<(&BalanceCost, &PosedBody<'_, R>, &Balance<R>, R, &mut [Vec3<R>])> for Backward {
+type SolvedCost<'a, R> = (&'a BalanceCost, &'a PosedBody<'a, R>, &'a Centre<R>, &'a Balance<R>, R, &'a mut [Vec3<R>]);
+
+impl<R: Real> Kernel<SolvedCost<'_, R>> for Backward {
     type Output = ();
 
     #[inline(always)]
-    fn run((of, posed, saved, d_out, d_points): (&BalanceCost, &PosedBody<R>, &Balance<R>, R, &mut [Vec3<R>])) {
-        let Balance { centre, solution: Solution { supports, still, lambda, mean, cost } } = saved;
+    fn run((of, posed, centre, saved, d_out, d_points): SolvedCost<R>) {
+        let Solution { supports, still, lambda, mean, cost } = &saved.solution;
         let d_cost = d_out.widen() * of.wrap.value_and_slope(*cost).1;
         let pull = posed.plane.raise([d_cost * lambda[0], d_cost * lambda[1]]);
         of.method.backward(posed, centre, pull, d_points);

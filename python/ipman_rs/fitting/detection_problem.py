@@ -1,4 +1,4 @@
-"""From what a detector saw to a problem: cameras from focal length and pitch, and what is odd about each person."""
+"""The fitting problem of detected keypoints: cameras from focal length and pitch, and warnings about each person."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import torch
 from torch import Tensor
 
 import ipman_rs.torch as ipt
+from ipman_rs.renamed import old_names
 
 from ..body.sites import FEWEST_POINTS
 from ..data.keypoints.detections import Detections
 from .camera import Camera
 from .camera_file import KnownCamera
-from .landmarks import Landmarks, known
+from .landmarks import Landmarks, landmark_names
 from .problem import Problem
 from .start import SEEN, level_camera
 
@@ -38,7 +39,7 @@ FEET = (
 )
 
 
-def problem(
+def problem_from_detections(
     body: ipt.BodyModel,
     detections: Detections,
     *,
@@ -65,7 +66,7 @@ def problem(
     size = torch.from_numpy(np.asarray(detections.image_size, dtype=np.float64))
 
     def each(name: str, value: float | None) -> Tensor | None:
-        return None if value is None else torch.full((people,), measured(name, value), dtype=torch.float64)
+        return None if value is None else torch.full((people,), check_measurement(name, value), dtype=torch.float64)
 
     def known_of(numbers: tuple[float, ...] | None, *shape: int) -> Tensor | None:
         if numbers is None:
@@ -99,8 +100,8 @@ def problem(
 POSSIBLE = {"focal": ("pixels", 0.0, math.inf), "height": ("metres", 0.4, 2.8), "mass": ("kilograms", 3.0, 400.0)}
 
 
-def measured(name: str, value: float) -> float:
-    """A focal length, height or mass. ValueError, with its unit, for what none can be."""
+def check_measurement(name: str, value: float) -> float:
+    """A plausible focal length, height or mass. ValueError, with its unit, for an impossible one."""
     unit, least, largest = POSSIBLE[name]
     if not least < value < largest:
         within = "above 0" if largest == math.inf else f"between {least:g} and {largest:g}"
@@ -110,7 +111,7 @@ def measured(name: str, value: float) -> float:
 
 def shared_names(body: ipt.BodyModel, detections: Detections) -> tuple[str, ...]:
     """The detected points that the body has, too."""
-    there = set(known(body.body))
+    there = set(landmark_names(body.body))
     return tuple(name for name in detections.names if name in there)
 
 
@@ -121,7 +122,7 @@ def _floor(people: int, height: float) -> ipt.Ground:
     return ipt.Ground(up, torch.full((people,), float(height), dtype=torch.float64))
 
 
-def too_little(names: Sequence[str], confidence: np.ndarray) -> str | None:
+def missing_keypoints(names: Sequence[str], confidence: np.ndarray) -> str | None:
     """Why a person with these confidences (K,) cannot be fitted, or None."""
     count = int((confidence > SEEN).sum())
     if count >= FEWEST_POINTS:
@@ -132,8 +133,10 @@ def too_little(names: Sequence[str], confidence: np.ndarray) -> str | None:
     )
 
 
-def oddities(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, size: np.ndarray) -> list[str]:
-    """What a user should know of one person's points (K, 2): they may be wrong, or say little."""
+def suspicious_keypoints(
+    names: Sequence[str], points: np.ndarray, confidence: np.ndarray, size: np.ndarray
+) -> list[str]:
+    """Warnings about one person's points (K, 2) that may be wrong, or that constrain the body poorly."""
     where = {name: points[k] for k, name in enumerate(names) if confidence[k] > SEEN}
     flags = []
     hips, shoulders = _pair(where, "hip"), _pair(where, "shoulder")
@@ -180,8 +183,8 @@ def _mirrored(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, 
     return bool(turn < 0 and left[0] < nose[0] < right[0])
 
 
-def unlike(camera: KnownCamera, size: np.ndarray) -> list[str]:
-    """What says that a known camera is of images of another size than (2,), width and height."""
+def camera_mismatch(camera: KnownCamera, size: np.ndarray) -> list[str]:
+    """Warnings if a known camera seems to belong to images of another size than `size` (2,), width and height."""
     if camera.center is None:
         return []
     center = np.array(camera.center)
@@ -194,3 +197,6 @@ def unlike(camera: KnownCamera, size: np.ndarray) -> list[str]:
 def _pair(where: dict[str, np.ndarray], joint: str) -> list[np.ndarray]:
     pair = [where.get(f"{side}_{joint}") for side in ("left", "right")]
     return [point for point in pair if point is not None] if all(point is not None for point in pair) else []
+
+
+__getattr__ = old_names(__name__, {"problem": "problem_from_detections"})
