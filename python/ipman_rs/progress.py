@@ -8,15 +8,18 @@ from typing import Protocol
 
 
 class Step(Protocol):
-    """A piece of work that is under way: `to` a number of its parts, or `one` further."""
+    """A piece of work that is under way: `to` a number of its parts, `one` further, or a number `of` a total."""
 
     def to(self, done: int) -> None: ...
 
     def one(self) -> None: ...
 
+    def of(self, done: int, total: int) -> None: ...
 
-Progress = Callable[[str, int], AbstractContextManager[Step]]
-"""Begins a piece of work with its title and the number of its parts; the work ends with the context."""
+
+Progress = Callable[[str, int | None], AbstractContextManager[Step]]
+"""Begins a piece of work with its title and the number of its parts, None where that is not known yet; the work ends
+with the context."""
 
 
 class _Silent:
@@ -26,8 +29,11 @@ class _Silent:
     def one(self) -> None:
         pass
 
+    def of(self, done: int, total: int) -> None:
+        pass
+
 
 @contextmanager
-def silent(title: str, total: int) -> Iterator[Step]:
+def silent(title: str, total: int | None = None) -> Iterator[Step]:
     """The `Progress` that shows nothing."""
     yield _Silent()

@@ -371,11 +371,12 @@ def test_other_files_go_on(run, mesh, tmp_path):
 
 
 def test_what_is_odd_about_a_predicted_body(lite_body, standing):
-    from ipman_rs.cli.predict import _flags
+    pytest.importorskip("timm", reason="needs the extra train")
+    from ipman_rs.training.predicted_images import odd_about
 
-    assert _flags("a.jpg", standing, lite_body.template, np.array([0.0, 1.0, 0.0])) == ()
-    large = _flags("a.jpg", 1.7 * standing, lite_body.template, np.array([0.0, 1.0, 0.0]))
+    assert odd_about("a.jpg", standing, lite_body.template, np.array([0.0, 1.0, 0.0])) == ()
+    large = odd_about("a.jpg", 1.7 * standing, lite_body.template, np.array([0.0, 1.0, 0.0]))
     assert large == ("a person of 301.4 kg",)
-    assert _flags("a.jpg", standing, lite_body.template, np.array([0.0, -1.0, 0.0])) == (
+    assert odd_about("a.jpg", standing, lite_body.template, np.array([0.0, -1.0, 0.0])) == (
         "stands on its head, with its feet in the air",
     )

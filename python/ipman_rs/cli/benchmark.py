@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
 import click
 
+from .errors import one_line_errors
 from .options import several_processes
 
 
@@ -38,23 +38,14 @@ def fit(output: Path, bodies: int, controls: int, iterations: int, split: str, o
     Writes fitting_benchmark.md, .json, .csv and .svg into the folder, beside the fits themselves: interrupted, the same
     command goes on where it was.
     """
-    from ..ablation.fitting import report
-    from ..ablation.fitting.run import Benchmark, blocks
+    from ..ablation.fitting.benchmark import benchmark as run
+    from ..ablation.fitting.run import Benchmark
     from . import console
 
-    chosen = [block for block in blocks() if not only or block.name.startswith(only)]
-    if not chosen:
-        listed = "; ".join(block.name for block in blocks())
-        raise click.BadParameter(f"expected the start of one of: {listed}", param_hint="'--only'")
-    run = Benchmark(output, bodies, controls, iterations, split)
-    for kind in dict.fromkeys(block.kind for block in chosen):
-        with console.progress(f"drawing {kind} people", run.count(kind)) as step:
-            run.truth(kind, step.to)
-    found = []
-    with console.progress("fitting", sum(len(block.rows) for block in chosen)) as step:
-        for block in chosen:
-            found.append((block, *run.run(block, step.one)))
-    page = report.write(found, run)
+    try:
+        page = run(Benchmark(output, bodies, controls, iterations, split), only, console.progress)
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="'--only'") from error
     click.echo(page.read_text())
 
 
@@ -116,27 +107,16 @@ def train(
     ipman data render -o out/images -n 30000 --size 128
     ipman benchmark train --images out/images -o out/ablation
     """
-    from concurrent.futures.process import BrokenProcessPool
-
-    from ..ablation.training import report
-    from ..ablation.training.from_images import ImageTask
-    from ..ablation.training.from_keypoints import KeypointTask
-    from ..ablation.training.run import TILTS, Benchmark
     from . import console
 
-    task = KeypointTask(output, people, bodies, split) if images is None else ImageTask(output, images, split, others)
-    run = Benchmark(output, task, seeds, part, lean)
-    chosen = tuple(dict.fromkeys(tilts)) or TILTS[task.name]
-    try:
-        with console.progress("drawing people" if images is None else "reading images") as step:
-            task.make(step.of)
-        with console.progress("training") as step:
-            found = run.run(chosen, workers, step.of)
-    except ValueError as error:
-        console.error(str(error))
-        sys.exit(1)
-    except BrokenProcessPool:
-        console.error("a process ended too early, for want of memory perhaps; the same command, with fewer -j, goes on")
-        sys.exit(1)
-    page = report.write(found, run)
+    with one_line_errors(output):
+        from ..ablation.training.benchmark import benchmark as run
+        from ..ablation.training.from_images import ImageTask
+        from ..ablation.training.from_keypoints import KeypointTask
+        from ..ablation.training.run import Benchmark
+
+        task = (
+            KeypointTask(output, people, bodies, split) if images is None else ImageTask(output, images, split, others)
+        )
+        page = run(Benchmark(output, task, seeds, part, lean), tilts, workers, console.progress)
     click.echo(page.read_text())

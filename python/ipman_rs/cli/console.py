@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
-from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
 from ..files.errors import one_line
-from ..study.study import Study, flagged_name
+from ..study.study import Study
+from ..study.table import fit_table, study_table
 
 
 def error(text: str) -> None:
@@ -76,133 +75,62 @@ def busy(title: str) -> Iterator[None]:
         yield
 
 
-def print_table(studies: Sequence[Study]) -> None:
-    """A line for each body or named pose; a recording's line has medians, and the smallest margin of its contacts.
-
-    Stable: the CoM lies over the base of support (BoS).
-    """
-    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
-    table.add_column("body" if not studies[0].labels else "pose", overflow="fold", min_width=14)
-    for title in ("kg", "CoM–CoP mm", "margin mm", "BoS cm²", "contacts", "balance"):
-        table.add_column(title, justify="right", no_wrap=True)
-    table.add_column("stable", no_wrap=True)
-    for study in studies:
-        one_each = bool(study.labels) or study.num_frames == 1
-        for frames in range(study.num_frames) if one_each else (slice(None),):
-            table.add_row(*_row(study, frames))
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = 120
-    console.print(table)
-
-
-def _row(study: Study, frames: int | slice) -> list[Text]:
-    value = {key: np.atleast_1d(column[frames]) for key, column in study.numbers.items() if column.ndim == 1}
-    single = isinstance(frames, int)
-    name = flagged_name(study.label(frames) if single else f"{study.name} ({study.num_frames} frames)", study.flags)
-    stable = value["bose"].astype(bool)
-    if single:
-        said = "yes" if stable[0] else ("no" if value["has_contact"][0] else "no contact")
-    else:
-        said = f"{100 * stable.mean():.0f} %"
-    cells = [
-        one_line(name),
-        _number(np.median(value["mass"]), 1, 1),
-        _number(np.median(value["com_cop_distance"]), 1e3, 0),
-        _number(value["margin"].min(where=value["has_contact"], initial=np.inf), 1e3, 0),
-        _number(np.median(value["area"]), 1e4, 0),
-        _number(np.median(value["num_contacts"]), 1, 0),
-        _number(np.median(value["balance"]), 1, 2),
-    ]
-    return [*map(Text, cells), Text(said, style="green" if stable.all() else "red")]
-
-
 def print_rows(head: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
     """A table of text, its first column to the left."""
-    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
+    table = _table()
     for number, title in enumerate(head):
         table.add_column(title, justify="left" if number == 0 else "right", overflow="fold")
     for line in lines:
         table.add_row(*(Text(one_line(cell)) for cell in line))
+    _print(table, 200)
+
+
+def print_colored(
+    head: Sequence[str],
+    rows: Iterable[tuple[Sequence[str], str]],
+    colored: str,
+    words: Mapping[str, int | None],
+    width: int = 160,
+) -> None:
+    """A table of numbers, rows with the colour of what is in the column `colored`. `words`: the columns of words,
+    which wrap, and their share of the width where they fill it. `width`: in characters, where there is no terminal."""
+    table = _table()
+    for number, title in enumerate(head):
+        if title in words:
+            table.add_column(title, overflow="fold", ratio=words[title], min_width=14 if number == 0 else None)
+        else:
+            table.add_column(title, justify="left" if title == colored else "right", no_wrap=True)
+    for cells, color in rows:
+        texts = [Text(one_line(cell), style=color if head[k] == colored else "") for k, cell in enumerate(cells)]
+        table.add_row(*texts)
+    _print(table, width)
+
+
+def _table() -> Table:
+    return Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
+
+
+def _print(table: Table, width: int) -> None:
     console = Console(highlight=False)
     if not console.is_terminal:
-        console.width = 200
+        console.width = width
     console.print(table)
+
+
+def print_table(studies: Sequence[Study]) -> None:
+    """A line for each body, named pose or recording: see `study_table`."""
+    head, rows = study_table(studies)
+    print_colored(head, map(_green_or_red, rows), "stable", {head[0]: None}, width=120)
 
 
 def print_fits(studies: Sequence[Study]) -> None:
-    """A line for each fitted body: how its fit went, how it stands, and what to look at."""
-    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
-    table.add_column("item", overflow="fold", min_width=14)
-    table.add_column("converged", no_wrap=True)
-    for title in ("iterations", "error px", "error %", "CoM–CoP mm", "margin mm"):
-        table.add_column(title, justify="right", no_wrap=True)
-    table.add_column("look", overflow="fold")
-    for study in studies:
-        if study.fitted is not None:
-            table.add_row(*_fit_row(study, study.fitted.record))
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = 160
-    console.print(table)
+    """A line for each fitted body: see `fit_table`."""
+    head, rows = fit_table(studies)
+    print_colored(head, map(_green_or_red, rows), "converged", {"item": None, "look": None})
 
 
-def _fit_row(study: Study, record: Mapping[str, Any]) -> list[Text]:
-    value = {key: column[0] for key, column in study.numbers.items()}
-    errors = record["reprojection"]
-    said = "yes" if record["converged"] else f"no: {record['reason']}"
-    cells = [
-        str(record["iterations"]),
-        _number(errors["median_px"], 1, 1),
-        _number(errors["median_percent"], 1, 1),
-        _number(value["com_cop_distance"], 1e3, 0),
-        _number(value["margin"] if value["has_contact"] else np.inf, 1e3, 0),
-        "; ".join(one_line(text) for text in (*study.flags, *record["notes"])),
-    ]
-    return [Text(one_line(study.name)), Text(said, style="green" if record["converged"] else "red"), *map(Text, cells)]
-
-
-def _number(value: float, factor: float, digits: int) -> str:
-    return f"{value * factor:.{digits}f}" if np.isfinite(value) else "–"
-
-
-def print_validation(records: Sequence[Mapping[str, Any]]) -> None:
-    """A line for each phase of each recording: weight, centre of mass and centre of pressure against the measured; and
-    what is odd. A weight by plates that is not to be trusted has a mark."""
-    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
-    table.add_column("recording", overflow="fold", min_width=10)
-    table.add_column("", no_wrap=True)
-    for title in ("markers mm", "kg", "by plates", "CoM mm", "CoP: at rest mm", "ZMP mm", "γ = 10 mm"):
-        table.add_column(title, justify="right", no_wrap=True)
-    for one in records:
-        compared = one["com"]["methods"]["exact"]["distance"] if one["com"] else None
-        told = [
-            (one["fit"]["markers"], 1e3),
-            (one["mass"]["volume_mean"], 1),
-            (one["mass"]["plates"], 1),
-            (compared, 1e3),
-        ]
-        cells = [_known(value, factor) for value, factor in told]
-        cells[2] += " !" if any(flag.startswith("weight by the plates") for flag in one["flags"]) else ""
-        first = [one["name"], one["kind"], *cells]
-        phases = one["cop"] or {"all": {"distance": {}}}
-        for phase, found in phases.items():
-            lead = first if phase == next(iter(phases)) else [""] * len(first)
-            if phase != "all":
-                lead[1] = f"{one['kind']}, {phase}"
-            away = [found["distance"].get(name) for name in ("at rest: g(CoM)", "moving: ZMP of the parts", "γ = 10")]
-            table.add_row(*(Text(one_line(cell)) for cell in [*lead, *(_known(value, 1e3) for value in away)]))
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = 160
-    console.print(table)
-    for one in records:
-        for flag in one["flags"]:
-            say(one_line(f"look: {one['name']}: {flag}"))
-
-
-def _known(value: float | None, factor: float) -> str:
-    return "–" if value is None else _number(value, factor, 1)
+def _green_or_red(row: tuple[list[str], bool]) -> tuple[list[str], str]:
+    return row[0], "green" if row[1] else "red"
 
 
 def print_notes(studies: Sequence[Study]) -> None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from ..data import Finding
 
-SIGNS = {"ok": ("ok", "green"), "odd": ("odd", "yellow"), "missing": ("missing", "yellow"), "wrong": ("wrong", "red")}
+COLORS = {"ok": "green", "odd": "yellow", "missing": "yellow", "wrong": "red"}
 
 
 @click.group()
@@ -67,18 +67,20 @@ def check(dataset: str, path: Path, as_json: bool) -> None:
 
     Exit code: 0 when all is there and right, 1 when something is missing or wrong, 2 for wrong usage.
     """
+    from ..data import check_download, is_complete
     from . import console
 
-    module = _module(dataset)
+    _module(dataset)
     with console.busy(f"looking at {path}"):
-        findings = _findings(module, path)
+        findings = check_download(dataset, path)
+    complete = is_complete(findings)
     if as_json:
         listed = [vars(each) for each in findings]
-        record = {"dataset": dataset, "path": str(path), "complete": _complete(findings), "findings": listed}
+        record = {"dataset": dataset, "path": str(path), "complete": complete, "findings": listed}
         click.echo(json.dumps(record, ensure_ascii=False, indent=1))
     else:
-        _print(findings, dataset)
-    sys.exit(0 if _complete(findings) else 1)
+        _print(findings, dataset, complete)
+    sys.exit(0 if complete else 1)
 
 
 def _module(dataset: str) -> ModuleType:
@@ -89,46 +91,12 @@ def _module(dataset: str) -> ModuleType:
     return module(dataset)
 
 
-def _findings(module: ModuleType, path: Path) -> list[Finding]:
-    from ..data import Finding
+def _print(findings: list[Finding], dataset: str, complete: bool) -> None:
+    from . import console
 
-    try:
-        return list(module.check(path))
-    except (ValueError, OSError, ImportError) as error:  # an extra that is not installed, a disk that fails
-        return [Finding("wrong", str(error))]
-
-
-def _mends(finding: Finding) -> str:
-    """The advice, and the option of the commands that take such data."""
-    option = "" if finding.option in finding.advice else f"for ipman fit: {finding.option}"
-    return "; ".join(part for part in (finding.advice, option) if part)
-
-
-def _complete(findings: list[Finding]) -> bool:
-    return all(each.level in ("ok", "odd") for each in findings)
-
-
-def _print(findings: list[Finding], dataset: str) -> None:
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    from ..files.errors import one_line
-
-    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
-    table.add_column("", no_wrap=True)
-    table.add_column("found", overflow="fold", ratio=2)
-    table.add_column("what to do", overflow="fold", ratio=1)
-    for each in findings:
-        sign, style = SIGNS[each.level]
-        table.add_row(Text(sign, style=style), Text(one_line(each.what)), Text(one_line(_mends(each))))
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = 160
-    console.print(table)
-    counts = {level: sum(each.level == level for each in findings) for level in SIGNS}
-    if _complete(findings):
-        console.print(f"\n{dataset}: complete and right", markup=False)
-    else:
-        said = ", ".join(f"{counts[level]} {level}" for level in ("missing", "wrong", "odd", "ok") if counts[level])
-        console.print(f"\n{dataset}: {said}; `ipman data layout {dataset}` says what is expected", markup=False)
+    rows = [([each.level, each.what, each.remedy], COLORS[each.level]) for each in findings]
+    console.print_colored(("", "found", "what to do"), rows, "", {"found": 2, "what to do": 1})
+    counts = {level: sum(each.level == level for each in findings) for level in ("missing", "wrong", "odd", "ok")}
+    listed = ", ".join(f"{count} {level}" for level, count in counts.items() if count)
+    verdict = f"{listed}; `ipman data layout {dataset}` says what is expected"
+    console.say(f"\n{dataset}: {'complete and right' if complete else verdict}")

@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import PRESETS, Setting, degrees, force, units
+from .errors import one_line_errors
+from .options import PRESETS, SETTING, SHARD, degrees, force, units
 
 if TYPE_CHECKING:
-    from ..evaluation.tables.job import Job, Shard
-    from ..evaluation.tables.paper import Table
+    from ..evaluation.tables import Evaluation
 
 # Kept equal to `ipman_rs.evaluation.tables.paper.TABLES` by a test.
 TABLES = ("rich", "h36m", "moyo", "biomech", "com", "3dpw", "push-pull", "rich-o-star")
-
-
-class ShardOf(click.ParamType):
-    name = "i/n"
-
-    def convert(self, value, param, ctx):
-        """Number and count, from 1."""
-        if isinstance(value, tuple):
-            return value
-        words = value.split("/")
-        if len(words) != 2 or not all(word.isdecimal() for word in words) or not 1 <= int(words[0]) <= int(words[1]):
-            self.fail(f"{value!r} is no shard such as 2/7, the second of seven", param, ctx)
-        return int(words[0]), int(words[1])
 
 
 @click.command()
@@ -39,7 +25,7 @@ class ShardOf(click.ParamType):
 @click.option("--path", type=click.Path(path_type=Path), metavar="PATH", help="Folder or file of the data set.")
 @click.option("--split", metavar="NAME", help="Part of the data set, such as test.")
 @click.option(
-    "--option", "options", type=Setting(), multiple=True, help="Of the data set's reader, such as frame=camera."
+    "--option", "options", type=SETTING, multiple=True, help="Of the data set's reader, such as frame=camera."
 )
 @click.option("--table", type=click.Choice(TABLES), help="A table of the paper: its data set, split and figures.")
 @click.option(
@@ -58,10 +44,10 @@ class ShardOf(click.ParamType):
 @units
 @degrees
 @force
-@click.option("--shard", type=ShardOf(), help="Do this part only, such as 2/7; the last one writes the report.")
+@click.option("--shard", type=SHARD, help="Do this part only, such as 2/7; the last one writes the report.")
 @click.option("--ray", is_flag=True, help="Do the shards on Ray (RAY_ADDRESS: a cluster; else this machine).")
 def evaluate(
-    predictions: tuple[Path, ...], output: Path, shard: tuple[int, int] | None, ray: bool, **given: Any
+    predictions: tuple[Path, ...], output: Path, shard: tuple[int, int] | None, ray: bool, **options: Any
 ) -> None:
     """Measure predictions against a data set: errors, balance, contact and pressure, with intervals.
 
@@ -86,121 +72,39 @@ def evaluate(
 
     Exit code: 0 when all is well (also of a shard), 1 when something could not be read or measured, 2 for wrong usage.
     """
-    from . import console
-
     if ray and shard:
         raise click.UsageError("--ray does all shards: leave out --shard")
-    try:
-        table, jobs = _jobs(predictions, output, given)
-        _evaluate(jobs, table, output, shard, ray)
-    except (ValueError, ImportError) as error:
-        console.error(str(error))
-        sys.exit(1)
-    except MemoryError:
-        console.error("there is not enough memory; is something else running? What is done is kept")
-        sys.exit(1)
-    except OSError as error:
-        console.error(f"{error.filename or output}: {error.strerror or error}; what is done is kept")
-        sys.exit(1)
+    with one_line_errors(output, "what is done is kept"):
+        from ..evaluation.tables import TABLES as PAPER
+        from ..evaluation.tables import evaluation
+
+        name = options["data"] or (None if options["table"] is None else PAPER[options["table"]].data)
+        if name is None:
+            raise click.UsageError("Missing option '--data', the data set, or '--table', one of the paper's.")
+        if options["path"] is None:
+            raise click.UsageError(f"Missing option '--path', where {name} is.")
+        options["options"] = dict(options["options"])
+        _evaluate(evaluation(predictions, output, unit=options.pop("units"), **options), shard, ray)
 
 
-def _jobs(predictions: tuple[Path, ...], output: Path, given: dict[str, Any]) -> tuple[Table | None, list[Job]]:
-    from ..evaluation.tables.job import Job, Source, method_names
-    from ..evaluation.tables.paper import TABLES as PAPER
-
-    table = None if given["table"] is None else PAPER[given["table"]]
-    name = given["data"] or (table.data if table else None)
-    if name is None:
-        raise click.UsageError("Missing option '--data', the data set, or '--table', one of the paper's.")
-    if given["path"] is None:
-        raise click.UsageError(f"Missing option '--path', where {name} is.")
-    split = given["split"] or (table.split if table is not None and name == table.data else None)
-    defaults = table.options if table is not None and name == table.data else {}
-    source = Source(name, str(given["path"]), split, tuple({**defaults, **dict(given["options"])}.items()))
-    shared = {
-        "models": None if given["models"] is None else str(given["models"]),
-        "regressors": tuple(str(path) for path in given["regressors"]),
-        "preset": given["preset"],
-        "partial": given["partial"],
-        "unit": given["units"],
-        "degrees": given["degrees"],
-        "force": given["force"],
-        "folder": str(output),
-    }
-    names = method_names(predictions)
-    return table, [Job(name, str(path), source, **shared) for name, path in zip(names, predictions, strict=True)]
-
-
-def _evaluate(jobs: list[Job], table: Table | None, output: Path, shard: tuple[int, int] | None, ray: bool) -> None:
-    from ..evaluation.tables.job import Shard
+def _evaluate(whole: Evaluation, shard: tuple[int, int] | None, ray: bool) -> None:
+    from ..evaluation.tables import Shard, report
     from . import console
 
-    for job in jobs:
-        job.begin()
-        for number in job.damaged():
-            console.warn(f"{job.file(number)}: is not whole, or of another evaluation; it is measured again")
-        for flag in job.flags:
-            console.warn(f"{job.predictions}: {flag}")
-    _measure(jobs, Shard(*shard) if shard else Shard(), ray)
-    missing = sum(len(job.missing()) for job in jobs)
-    if missing:
-        every = sum(job.pieces for job in jobs)
-        console.say(f"{every - missing} of {every} pieces are there; the other shards have the rest")
-        return
-    _report(jobs, table, output)
-
-
-def _measure(jobs: list[Job], shard: Shard, ray: bool) -> None:
-    from . import console
-
-    todo = sum(job.frames(number) for job in jobs for number in shard.of(job.pieces) if not job.done(number))
+    for warning in whole.begin():
+        console.warn(warning)
     begun = time.perf_counter()
-    with console.progress("measuring", todo) as step:
-        count = _counter(step)
-        if ray:
-            from ..evaluation.tables import on_ray
-
-            on_ray.run(jobs, count)
-        else:
-            for job in jobs:
-                job.run(shard, count)
+    done = whole.measure(Shard(*shard) if shard else Shard(), ray, console.progress)
     seconds = time.perf_counter() - begun
-    if todo:
-        console.say(f"{todo:,} frames in {seconds:.1f} s: {todo / seconds:,.0f} a second")
-
-
-def _report(jobs: list[Job], table: Table | None, output: Path) -> None:
-    from ..evaluation.tables import report
-    from ..evaluation.tables.summary import difference, summarise
-    from . import console
-
-    frames = sum(len(job.data) for job in jobs)
-    with console.progress("adding up", 2 * frames - len(jobs[0].data)) as step:
-        count = _counter(step)
-        found = [summarise(job, count) for job in jobs]
-        differences = [difference(job, jobs[0], count) for job in jobs[1:]]
-    source = jobs[0].source
-    title = table.title if table else f"{' and '.join(job.name for job in jobs)} on {source.name}"
-    parts = [source.name, *([source.split] if source.split else []), *(f"{k}={v}" for k, v in source.options)]
-    where = f"Data: {', '.join(parts)}, {len(jobs[0].data):,} frames ({source.path})."
-    definitions = {job.name: job.definition for job in jobs}
-    flags = {job.name: job.flags for job in jobs}
-    made = report.Report(title, where, found, differences, table, definitions, flags)
-    with console.progress("writing", frames) as step:
-        written = report.write(made, output, jobs, _counter(step))
-    console.print_rows(*report.rows(made))
+    if done:
+        console.say(f"{done:,} frames in {seconds:.1f} s: {done / seconds:,.0f} a second")
+    if whole.missing:
+        here = whole.pieces - whole.missing
+        console.say(f"{here} of {whole.pieces} pieces are there; the other shards have the rest")
+        return
+    summary = whole.report(console.progress)
+    written = whole.write(summary, console.progress)
+    console.print_rows(*report.rows(summary))
     if not any(path.suffix == ".parquet" for path in written):
         console.say("frames.parquet is left out: it needs pyarrow (pip install 'ipman_rs[evaluate]')")
     console.say(f"report: {written[0].resolve()}")
-
-
-def _counter(step: Any) -> Any:
-    """`count(n)`: n more are done."""
-    done = 0
-
-    def count(more: int) -> None:
-        nonlocal done
-        done += more
-        step.to(done)
-
-    return count

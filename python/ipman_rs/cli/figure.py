@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import functools
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .figure_inputs import models_in, one_body, one_line_errors, opened_data_sets, told_apart
-from .options import GROUND, PRESETS, UP, Setting, of_files
+from .errors import one_line_errors
+from .options import GROUND, PRESETS, SETTING, UP, of_files
 
 if TYPE_CHECKING:
     from ..paper_figures import PaperFigure
+    from ..paper_figures.inputs import Body, DataSets
 
 PEOPLE = 210  # built ones: seven families in turn
 
-_output = click.option(
-    "-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Output folder."
-)
 _preset = click.option(
     "--preset", type=click.Choice(PRESETS), default="paper-r", show_default=True, help="Constants of the formulas."
 )
@@ -27,7 +29,7 @@ _models = click.option(
 )  # fmt: skip
 _split = click.option("--split", metavar="NAME", help="Part of the data sets, such as test.")
 _option = click.option(
-    "--option", "options", type=Setting(), multiple=True, help="Of the data set's reader, such as frame_rate=30."
+    "--option", "options", type=SETTING, multiple=True, help="Of the data set's reader, such as frame_rate=30."
 )
 _people = click.option(
     "--people", type=click.IntRange(1), default=PEOPLE, show_default=True,
@@ -35,8 +37,53 @@ _people = click.option(
 )  # fmt: skip
 
 
-def _data_sets(command):
-    """Options of commands that take one or several data sets."""
+def _drawn(command: Callable[..., PaperFigure]) -> Callable[..., None]:
+    """A command that draws a figure: its option -o, what it writes and says, and how it fails."""
+
+    @functools.wraps(command)
+    def run(output: Path, **options: Any) -> None:
+        from . import console
+
+        with one_line_errors(output, memory="take fewer frames"), _few_warnings():
+            from .. import paper_figures
+
+            figure = command(**options)
+            paper_figures.write(figure, output)
+        if figure.summary_table is not None:
+            console.print_rows(*figure.summary_table)
+        for line in (*figure.summary, f"figure: {(output / f'{figure.name}.png').resolve()}"):
+            console.say(line)
+
+    folder = click.Path(file_okay=False, path_type=Path)
+    return click.option("-o", "--output", required=True, type=folder, help="Output folder.")(run)
+
+
+@contextmanager
+def _few_warnings() -> Iterator[None]:
+    """A warning about units is one line, one about an image is one for each."""
+    import ipman_rs as ip
+
+    from ..paper_figures.estimated_people import ImageWarning
+    from . import console
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("ignore")
+        for kind in (ip.UnitsWarning, ImageWarning):
+            warnings.simplefilter("always", kind)
+        yield
+    units = [str(each.message) for each in caught if issubclass(each.category, ip.UnitsWarning)]
+    images = [str(each.message) for each in caught if issubclass(each.category, ImageWarning)]
+    for warning in (*units[:1], *dict.fromkeys(images)):
+        console.warn(warning)
+
+
+def _data_sets(command: Callable[..., PaperFigure]) -> Callable[..., PaperFigure]:
+    """Options of commands that take one or several data sets, which they are given as `data`."""
+
+    @functools.wraps(command)
+    def run(names: tuple[str, ...], paths: tuple[Path, ...], **options: Any) -> PaperFigure:
+        return command(data=_opened_later(names, paths, options), **options)
+
     data = click.option(
         "--data", "names", multiple=True, metavar="NAME",
         help="Data set of `ipman data list`, or own (as of `ipman evaluate`); may be repeated, each with its --path.",
@@ -44,7 +91,17 @@ def _data_sets(command):
     path = click.option(
         "--path", "paths", multiple=True, type=click.Path(path_type=Path), help="Folder or file of the data set."
     )
-    return data(path(_split(_option(command))))
+    return data(path(_split(_option(run))))
+
+
+def _opened_later(names: tuple[str, ...], paths: tuple[Path, ...], options: dict[str, Any]) -> DataSets:
+    """The data sets; takes split, options and models out of the options of a command."""
+    from ..paper_figures.inputs import DataSets, models_in
+
+    if len(names) != len(paths):
+        raise click.UsageError(f"expected a --path for each --data, got {len(names)} and {len(paths)}")
+    models = models_in(options.pop("models", None))
+    return DataSets(names, paths, options.pop("split"), dict(options.pop("options")), models)
 
 
 @click.group()
@@ -67,16 +124,13 @@ def figure() -> None:
 
 
 @figure.command()
-@_output
+@_drawn
 @_data_sets
 @_models
 @_people
 @click.option("--every", type=click.IntRange(1), default=1, show_default=True, help="Take each n-th frame.")
 @_preset
-def stability(
-    output: Path, names: tuple[str, ...], paths: tuple[Path, ...], split: str | None,
-    options: tuple[tuple[str, Any], ...], models: Path | None, people: int, every: int, preset: str,
-) -> None:  # fmt: skip
+def stability(data: DataSets, people: int, every: int, preset: str) -> PaperFigure:
     """The distribution of L_stability, CoM to CoP on the ground, over data sets; the paper says that it peaks at 0.
 
     Without --data of built people whose balance is known. The numbers: median, percentiles, the share below 50 mm, and
@@ -87,37 +141,20 @@ def stability(
     ipman figure stability --data amass --path AMASS/ --every 30 --models models/ -o out
     ipman figure stability --data amass --path AMASS/ --data moyo --path MOYO/ --every 60 --models models/ -o out
     """
+    from ..paper_figures import stability_distribution as library
     from . import console
 
-    with one_line_errors(output):
-        from ..paper_figures import stability_distribution as made
-
-        losses = []
-        for name, data in opened_data_sets(names, paths, split, options, models_in(models)):
-            with console.progress(f"measuring {name}", len(range(0, len(data), every))) as step:
-                losses.append(made.of_data_set(name, data, models_in(models), every, preset, step.to))
-        if not names:
-            with console.progress("building people", people) as step:
-                losses.append(made.of_built_people(people, preset, step.to))
-        found = made.stability_distribution(losses)
-        _write(found, output)
-    for each in found.numbers["data"]:
-        low, high = (1e3 * edge for edge in each["peak_m"])
-        console.say(
-            f"{each['name']}: {each['bodies']:,} bodies, median {1e3 * each['median_m']:.0f} mm, "
-            f"{100 * each['share_below_50_mm']:.0f} % below 50 mm; peaks at {low:.0f}–{high:.0f} mm (the paper: at 0)"
-        )
-    _say(found, output)
+    return library.stability_distribution(library.of_data_sets(data, people, every, preset, console.progress))
 
 
 @figure.command()
-@_output
+@_drawn
 @click.option(
     "--width", type=float, default=0.15, show_default=True, metavar="M", help="α2, the width of the pull's tanh."
 )
 @click.option("--push-width", type=float, default=0.15, show_default=True, metavar="M", help="β2, that of the push.")
 @click.option("--body", default="anny", show_default=True, metavar="NAME", help="Whose pictures: anny or anny-lite.")
-def pull(output: Path, width: float, push_width: float, body: str) -> None:
+def pull(width: float, push_width: float, body: str) -> PaperFigure:
     """The gradient of L_pull over height, and a floating and a sinking body in the colours of pull and push.
 
     The paper says that the gradient is minimal beyond 15 to 20 cm; the numbers say what of its peak is left there.
@@ -126,34 +163,22 @@ def pull(output: Path, width: float, push_width: float, body: str) -> None:
     ipman figure pull -o out
     ipman figure pull --width 0.5 -o out       the width of the authors' class, before the trained configuration
     """
+    from ..body import embedded
+    from ..paper_figures.pull_gradient import pull_gradient
     from . import console
 
-    with one_line_errors(output):
-        from ..body import embedded
-        from ..paper_figures import pull_gradient as made
-
-        for name, value in (("--width", width), ("--push-width", push_width)):
-            if not 0 < value < 100:
-                raise click.UsageError(f"{name}: expected metres above 0, got {value:g}")
-        if body not in embedded.NAMES:
-            raise click.UsageError(f"--body: expected one of {', '.join(embedded.NAMES)}, got {body!r}")
-        with console.busy("drawing"):
-            found = made.pull_gradient(alpha2=width, beta2=push_width, body=body)
-            _write(found, output)
-    shares = found.numbers["share_of_peak"]
-    console.say(
-        f"gradient of L_pull: largest at {100 * found.numbers['peak_m']:.1f} cm; of that "
-        + ", ".join(f"{100 * share:.0f} % at {100 * float(at):.0f} cm" for at, share in shares.items())
-    )
-    console.say(
-        f"the paper's “minimal beyond 15–20 cm”: {'holds' if found.numbers['claim_holds'] else 'does not hold'}"
-    )
-    _say(found, output)
+    for name, value in (("--width", width), ("--push-width", push_width)):
+        if not 0 < value < 100:
+            raise click.UsageError(f"{name}: expected metres above 0, got {value:g}")
+    if body not in embedded.NAMES:
+        raise click.UsageError(f"--body: expected one of {', '.join(embedded.NAMES)}, got {body!r}")
+    with console.busy("drawing"):
+        return pull_gradient(alpha2=width, beta2=push_width, body=body)
 
 
 @figure.command()
+@_drawn
 @click.argument("body", metavar="BODY")
-@_output
 @click.option("--frame", type=click.IntRange(0), help="Of a sequence, from 0. Default: the first.")
 @click.option("--body", "model", metavar="NAME|PATH", help="Body model, as of `ipman analyze`.")
 @click.option("--up", type=UP, metavar="AXIS", default=None, help="What points up, as of `ipman analyze`.")
@@ -164,7 +189,7 @@ def pull(output: Path, width: float, push_width: float, body: str) -> None:
 @click.option("--parts", type=click.Path(path_type=Path), metavar="FILE", help="Body parts, as of `ipman analyze`.")
 @of_files
 @_preset
-def com(body: str, output: Path, frame: int | None, preset: str, **request: Any) -> None:
+def com(body: str, frame: int | None, preset: str, **request: Any) -> PaperFigure:
     """The formulations of the centre of mass on one body, with the CoP and that of binary contact (Fig. S.3).
 
     BODY is a file as `ipman analyze` reads it, or a named pose of `ipman demo` on the built-in body.
@@ -173,30 +198,38 @@ def com(body: str, output: Path, frame: int | None, preset: str, **request: Any)
     ipman figure com warrior -o out
     ipman figure com scan.ply --up z -o out
     """
+    from ..paper_figures.center_of_mass import center_of_mass
     from . import console
 
-    with one_line_errors(output):
-        from ..paper_figures import center_of_mass as made
-
-        vertices, template, floor, name = one_body(body, frame, request)
-        with console.busy("drawing"):
-            found = made.center_of_mass(vertices, template, floor, name, preset)
-            _write(found, output)
-    rows = [
-        [key, f"{100 * each['height_m']:.1f}", f"{1e3 * each['to_exact_m']:.0f}", *_millimetres(each)]
-        for key, each in found.numbers["centers_of_mass"].items()
-    ]
-    console.print_rows(["centre of mass", "height cm", "from exact mm", "from CoP mm", "from binary CoP mm"], rows)
-    _say(found, output)
+    one = _one_body(body, frame, request)
+    console.warn_of(body, one.flags)
+    with console.busy("drawing"):
+        return center_of_mass(one.vertices, one.template, one.ground, one.name, preset)
 
 
-def _millimetres(about: dict[str, Any]) -> list[str]:
-    distances = (about[f"to_{kind}center_of_pressure_on_ground_m"] for kind in ("", "binary_"))
-    return ["–" if value != value else f"{1e3 * value:.0f}" for value in distances]
+def _one_body(body: str, frame: int | None, request: dict[str, Any]) -> Body:
+    """A file, or a named pose; `request`: the fields of `study.from_file.Request`."""
+    import ipman_rs as ip
+
+    from ..paper_figures.inputs import named_pose, one_body
+    from ..study.from_file import Request
+
+    poses = ip.body.poses.NAMES
+    if body in poses and not Path(body).exists():
+        for option, value in (("--frame", frame), ("--up", request["up"]), ("--parts", request["parts"])):
+            if value is not None:
+                raise click.UsageError(f"{option}: is for files; {body} is a named pose, one body with y up")
+        return named_pose(body, ip.load_body(request["model"] or "anny"), request["ground"] or 0.0)
+    if not Path(body).suffix and not Path(body).exists():
+        raise click.UsageError(f"BODY: expected a file, or a pose such as {', '.join(poses)}; got {body!r}")
+    try:
+        return one_body(Path(body), frame or 0, Request(**request))
+    except IndexError as error:
+        raise click.UsageError(f"--frame: {error}") from error
 
 
 @figure.command()
-@_output
+@_drawn
 @click.option("--data", "name", default="moyo", show_default=True, metavar="NAME", help="Data set with a mat's maps.")
 @click.option("--path", required=True, type=click.Path(path_type=Path), help="Folder of the data set.")
 @_split
@@ -204,10 +237,7 @@ def _millimetres(about: dict[str, Any]) -> list[str]:
 @_models
 @click.option("--frame", metavar="NAME|N", help="Name of the frame, or its number from 0. Default: the heaviest map's.")
 @_preset
-def pressure(
-    output: Path, name: str, path: Path, split: str | None, options: tuple[tuple[str, Any], ...], models: Path | None,
-    frame: str | None, preset: str,
-) -> None:  # fmt: skip
+def pressure(name: str, path: Path, frame: str | None, preset: str, **options: Any) -> PaperFigure:
     """Estimated beside measured pressure of one frame on a mat, with CoPs and CoM (Fig. 6).
 
     IoU and CoP error as in `ipman evaluate --table biomech`: at the preset's α and γ, and at the best of the paper's
@@ -217,26 +247,17 @@ def pressure(
     ipman figure pressure --path MOYO/ --models models/ -o out
     ipman figure pressure --path MOYO/ --models models/ --frame 220923_yogi_body_hands_03596_Tree_-b/00200 -o out
     """
+    from ..paper_figures import pressure as library
     from . import console
 
-    with one_line_errors(output):
-        from ..paper_figures import pressure as made
-
-        ((_, data),) = opened_data_sets((name,), (path,), split, options, models_in(models))
-        with console.busy("measuring and drawing"):
-            asked = int(frame) if frame is not None and frame.isdecimal() else frame
-            found = made.pressure(made.of_data_set(name, data, asked, models_in(models)), preset)
-            _write(found, output)
-    numbers, best = found.numbers, found.numbers["best_of_the_grid"]
-    console.say(
-        f"{numbers['frame']}: IoU {numbers['iou']:.3f}, CoP {1e3 * numbers['cop_error_m']:.0f} mm off; the best of the "
-        f"paper's grid {best['iou']:.3f}, {1e3 * best['cop_error_m']:.0f} mm"
-    )
-    _say(found, output)
+    data = _opened_later((name,), (path,), options)
+    number = int(frame) if frame is not None and frame.isdecimal() else frame
+    with console.busy("measuring and drawing"), data.open() as opened:
+        return library.pressure(library.of_data_set(*next(opened), number, data.models), preset)
 
 
 @figure.command()
-@_output
+@_drawn
 @_data_sets
 @_people
 @click.option(
@@ -244,10 +265,7 @@ def pressure(
 )
 @click.option("--perplexity", type=float, default=30.0, show_default=True, help="About how many neighbours count.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of t-SNE.")
-def poses(
-    output: Path, names: tuple[str, ...], paths: tuple[Path, ...], split: str | None,
-    options: tuple[tuple[str, Any], ...], people: int, most: int, perplexity: float, seed: int,
-) -> None:  # fmt: skip
+def poses(data: DataSets, people: int, most: int, perplexity: float, seed: int) -> PaperFigure:
     """A map of body poses by t-SNE, coloured by data set; without --data of built people, coloured by family.
 
     A pose is the rotation of 21 joints, without the root: neither where somebody faces nor their shape counts. No body
@@ -257,33 +275,17 @@ def poses(
     ipman figure poses -o out
     ipman figure poses --data amass --path AMASS/ --data moyo --path MOYO/ --most 3000 -o out
     """
+    from ..paper_figures import poses as library
     from . import console
 
-    with one_line_errors(output):
-        from ..paper_figures import poses as made
-
-        groups = []
-        for name, data in opened_data_sets(names, paths, split, options, models_in(None)):
-            with console.progress(f"reading {name}", min(most, len(data))) as step:
-                groups.append(made.of_data_set(name, data, most, step.to))
-        if not names:
-            with console.progress("building people", people) as step:
-                groups = made.of_built_people(people, step.to)
-        with console.busy(f"mapping {sum(len(each.values) for each in groups):,} poses"):
-            found = made.poses(groups, perplexity, seed)
-            _write(found, output)
-    numbers = found.numbers
-    console.say(
-        f"{numbers['poses']:,} poses; the nearest neighbour is of the same group in "
-        f"{100 * numbers['nearest_neighbour_of_same_group']:.0f} % "
-        f"({100 * numbers['nearest_neighbour_of_same_group_by_chance']:.0f} % by chance)"
-    )
-    _say(found, output)
+    groups = library.of_data_sets(data, people, most, console.progress)
+    with console.busy(f"mapping {sum(len(each.values) for each in groups):,} poses"):
+        return library.poses(groups, perplexity, seed)
 
 
 @figure.command()
+@_drawn
 @click.argument("methods", nargs=-1, required=True, metavar="METHOD...", type=click.Path(path_type=Path))
-@_output
 @click.option(
     "--title", "titles", multiple=True, metavar="TEXT", help="Of each method, in their order. Default: their names."
 )
@@ -305,10 +307,18 @@ def poses(
 @_models
 @_preset
 def compare(
-    methods: tuple[Path, ...], output: Path, titles: tuple[str, ...], people: tuple[str, ...], most: int,
-    photos: Path | None, body: str | None, name: str | None, path: Path | None, split: str | None,
-    options: tuple[tuple[str, Any], ...], images: Path, models: Path | None, preset: str,
-) -> None:  # fmt: skip
+    methods: tuple[Path, ...],
+    titles: tuple[str, ...],
+    people: tuple[str, ...],
+    most: int,
+    photos: Path | None,
+    body: str | None,
+    name: str | None,
+    path: Path | None,
+    images: Path,
+    preset: str,
+    **options: Any,
+) -> PaperFigure:
     """A grid of people: their image, and by each method the body over it, from the side, and its pressure.
 
     METHOD is a folder of `ipman fit` or `ipman predict`; or, with --data, a file of predictions as `ipman evaluate`
@@ -322,54 +332,29 @@ def compare(
     ipman figure compare hmr.npz ours.npz --data rich-ipman --path RICH/ --image-folder RICH/ --models models/ -o out
     ipman figure compare fit/xmc fit/o --data moyo --path MOYO/ --option camera=1 --models models/ -o out
     """
+    from ..paper_figures import estimated_people as library
+    from ..paper_figures.comparison import comparison
+    from ..paper_figures.inputs import numbered
     from . import console
 
     if titles and len(titles) != len(methods):
         raise click.UsageError(f"--title: expected {len(methods)}, one a method, or none; got {len(titles)}")
     if (name is None) != (path is None):
         raise click.UsageError("expected --data together with --path")
-    names = titles or told_apart([method.resolve().stem for method in methods])
+    names = titles or numbered([method.resolve().stem for method in methods])
     if len(set(names)) < len(names):
         raise click.UsageError("--title: expected a title for each method that no other has")
-    with one_line_errors(output):
-        from ..paper_figures import comparison as made
-        from ..paper_figures.estimated_people import PREDICTIONS, FittedFolder, Predicted
-
-        found_by: list[tuple[str, Any]] = []
-        opened = (
-            None
-            if name is None or path is None
-            else next(opened_data_sets((name,), (path,), split, options, models_in(models)))[1]
-        )
-        for title, method in zip(names, methods, strict=True):
-            if opened is None and method.is_file():
-                raise click.UsageError(
-                    f"{method}: is a file; name the data set that it predicts with --data and --path"
-                )
-            if opened is None:
-                found_by.append((title, FittedFolder(method, photos, body)))
-            else:
-                file = method / PREDICTIONS if method.is_dir() else method
-                found_by.append((title, Predicted(file, opened, models_in(models), images)))
+    file = next((method for method in methods if method.is_file()), None)
+    if path is None and file is not None:
+        raise click.UsageError(f"{file}: is a file; name the data set that it predicts with --data and --path")
+    data = _opened_later(() if name is None else (name,), () if path is None else (path,), options)
+    with data.open() as opened:
+        truth = next(opened, None)
+        estimates = [
+            library.FittedFolder(each, photos, body)
+            if truth is None
+            else library.predicted(each, truth[1], data.models, images)
+            for each in methods
+        ]
         with console.progress("drawing people", len(people) or most) as step:
-            found = made.comparison(found_by, people, most, preset, step.to)
-        _write(found, output)
-    rows = [
-        [person, method, made.caption(about)]
-        for person, each in found.numbers["people"].items()
-        for method, about in each.items()
-    ]
-    console.print_rows(["person", "method", "stands"], rows)
-    _say(found, output)
-
-
-def _write(found: PaperFigure, output: Path) -> None:
-    from .. import paper_figures
-
-    paper_figures.write(found, output)
-
-
-def _say(found: PaperFigure, output: Path) -> None:
-    from . import console
-
-    console.say(f"figure: {(output / f'{found.name}.png').resolve()}")
+            return comparison([*zip(names, estimates, strict=True)], people, most, preset, step.to)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import FLOOR, METRES, SIZE, UNIT, UP, Setting, force, needs, of_unknown_camera, rate, subject
+from .options import FLOOR, METRES, SETTING, SIZE, UNIT, UP, force, needs, of_unknown_camera, rate, subject
 
 if TYPE_CHECKING:
     from ..fitting.jobs.run import Fits
@@ -101,9 +101,7 @@ if TYPE_CHECKING:
 )
 @click.option("--path", type=click.Path(path_type=Path), help="With --data: where it is.")
 @click.option("--split", metavar="NAME", help="With --data: which part. Default: the paper's, or all.")
-@click.option(
-    "--option", "settings", type=Setting(), multiple=True, help="With --data: of its reader, such as camera=2."
-)
+@click.option("--option", "settings", type=SETTING, multiple=True, help="With --data: of its reader, such as camera=2.")
 @click.option(
     "--models", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
     help="With --data: body models, SMPLX_FEMALE.npz and so on, anywhere below it.",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.util
 import math
 import os
+from collections.abc import Callable
+from typing import Any
 
 import click
 
@@ -15,119 +17,100 @@ METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.02
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-class UpAxis(click.ParamType):
-    name = "axis"
+class Parsed(click.ParamType):
+    """A word of the command line, read by a function that raises ValueError with what is wrong; `kind`: of a default
+    that is read already."""
+
+    def __init__(self, name: str, read: Callable[[str], Any], kind: type) -> None:
+        self.name, self._read, self._kind = name, read, kind
 
     def convert(self, value, param, ctx):
-        """A unit axis or a normal as three numbers."""
-        if isinstance(value, tuple):
+        if value is None or isinstance(value, self._kind):
             return value
-        text = value.strip().lower()
-        if text.lstrip("+-") in _AXES and len(text) <= 2:
-            sign = -1.0 if text.startswith("-") else 1.0
-            return tuple(sign * x for x in _AXES[text.lstrip("+-")])
         try:
-            normal = tuple(float(x) for x in text.split(","))
-        except ValueError:
-            normal = ()
-        if len(normal) != 3 or not all(map(math.isfinite, normal)) or not any(normal):
-            self.fail(f"{value!r} is neither one of x, y, z, -x, -y, -z nor a normal such as 0,0,1", param, ctx)
-        return normal
+            return self._read(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
 
 
-class Unit(click.ParamType):
-    name = "unit"
-
-    def convert(self, value, param, ctx):
-        """Metres in one of it."""
-        if isinstance(value, float):
-            return value
-        word = value.strip().lower()
-        if word in METRES:
-            return METRES[word]
-        metres = _number(word)
-        if not 0 < metres < math.inf:
-            self.fail(f"{value!r} is none of {', '.join(METRES)}, and no number of metres such as 0.001", param, ctx)
-        return metres
+def _up(text: str) -> tuple[float, ...]:
+    """A unit axis or a normal as three numbers."""
+    word = text.strip().lower()
+    if word.lstrip("+-") in _AXES and len(word) <= 2:
+        sign = -1.0 if word.startswith("-") else 1.0
+        return tuple(sign * x for x in _AXES[word.lstrip("+-")])
+    normal = tuple(map(_number, word.split(",")))
+    if len(normal) != 3 or not all(map(math.isfinite, normal)) or not any(normal):
+        raise ValueError(f"{text!r} is neither one of x, y, z, -x, -y, -z nor a normal such as 0,0,1")
+    return normal
 
 
-class Rate(click.ParamType):
-    name = "hz"
-
-    def convert(self, value, param, ctx):
-        """Frames a second."""
-        hertz = _number(value)
-        if not 0 < hertz < math.inf:
-            self.fail(f"{value!r} is no number of frames a second above 0", param, ctx)
-        return hertz
+def _unit(text: str) -> float:
+    """Metres in one of it."""
+    word = text.strip().lower()
+    metres = METRES.get(word, _number(word))
+    if not 0 < metres < math.inf:
+        raise ValueError(f"{text!r} is none of {', '.join(METRES)}, and no number of metres such as 0.001")
+    return metres
 
 
-class GroundHeight(click.ParamType):
-    name = "height"
+def _rate(text: str) -> float:
+    """Frames a second."""
+    hertz = _number(text)
+    if not 0 < hertz < math.inf:
+        raise ValueError(f"{text!r} is no number of frames a second above 0")
+    return hertz
 
-    def __init__(self, word: str) -> None:
-        self.word = word
 
-    def convert(self, value, param, ctx):
-        """Metres, or None for the word."""
-        if value is None or isinstance(value, float):
-            return value
-        if value.strip().lower() == self.word:
+def _height_or(word: str) -> Callable[[str], float | None]:
+    """Metres, or None for the word."""
+
+    def read(text: str) -> float | None:
+        height = _number(text)
+        if text.strip().lower() == word:
             return None
-        height = _number(value)
         if not math.isfinite(height):
-            self.fail(f"{value!r} is neither a height in metres nor {self.word}", param, ctx)
+            raise ValueError(f"{text!r} is neither a height in metres nor {word}")
         return height
 
+    return read
 
-class ImageSize(click.ParamType):
-    name = "size"
 
-    def convert(self, value, param, ctx):
-        """Width and height in pixels."""
-        if isinstance(value, tuple):
-            return value
+def _size(text: str) -> tuple[float, ...]:
+    """Width and height in pixels."""
+    sides = tuple(map(_number, text.lower().split("x")))
+    if len(sides) != 2 or not all(0 < side < math.inf for side in sides):
+        raise ValueError(f"{text!r} is no width and height in pixels such as 1920x1080")
+    return sides
+
+
+def _times(text: str) -> tuple[float, ...]:
+    """Ascending seconds."""
+    times = tuple(map(_number, text.split(",")))
+    if not all(0 <= time < math.inf for time in times) or list(times) != sorted(times):
+        raise ValueError(f"{text!r} is no ascending list of seconds such as 0.41667,2")
+    return times
+
+
+def _setting(text: str) -> tuple[str, str | int | float]:
+    """A name and a word or number."""
+    name, equals, word = text.partition("=")
+    if not name or not equals:
+        raise ValueError(f"{text!r} is no option such as frame=camera")
+    for number in (int, float):
         try:
-            width, height = (float(side) for side in value.lower().split("x"))
+            return name, number(word)
         except ValueError:
-            width = height = math.nan
-        if not (0 < width < math.inf and 0 < height < math.inf):
-            self.fail(f"{value!r} is no width and height in pixels such as 1920x1080", param, ctx)
-        return width, height
+            continue
+    return name, word
 
 
-class Times(click.ParamType):
-    name = "seconds"
-
-    def convert(self, value, param, ctx):
-        """Ascending seconds."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            times = tuple(float(word) for word in value.split(","))
-        except ValueError:
-            times = ()
-        if not times or not all(0 <= time < math.inf for time in times) or list(times) != sorted(times):
-            self.fail(f"{value!r} is no ascending list of seconds such as 0.41667,2", param, ctx)
-        return times
-
-
-class Setting(click.ParamType):
-    name = "name=value"
-
-    def convert(self, value, param, ctx):
-        """A name and a word or number."""
-        if isinstance(value, tuple):
-            return value
-        name, equals, word = value.partition("=")
-        if not name or not equals:
-            self.fail(f"{value!r} is no option such as frame=camera", param, ctx)
-        for number in (int, float):
-            try:
-                return name, number(word)
-            except ValueError:
-                continue
-        return name, word
+def _shard(text: str) -> tuple[int, ...]:
+    """Number and count, from 1."""
+    words = text.split("/")
+    if len(words) != 2 or not all(word.isdecimal() for word in words) or not 1 <= int(words[0]) <= int(words[1]):
+        raise ValueError(f"{text!r} is no shard such as 2/7, the second of seven")
+    return tuple(map(int, words))
 
 
 def _number(text: str) -> float:
@@ -138,9 +121,10 @@ def _number(text: str) -> float:
         return math.nan
 
 
-TIMES = Times()
-UNIT, RATE = Unit(), Rate()
-UP, GROUND, FLOOR, SIZE = UpAxis(), GroundHeight("auto"), GroundHeight("found"), ImageSize()
+UP, SIZE, TIMES = Parsed("axis", _up, tuple), Parsed("size", _size, tuple), Parsed("seconds", _times, tuple)
+SETTING, SHARD = Parsed("name=value", _setting, tuple), Parsed("i/n", _shard, tuple)
+UNIT, RATE = Parsed("unit", _unit, float), Parsed("hz", _rate, float)
+GROUND, FLOOR = (Parsed("height", _height_or(word), float) for word in ("auto", "found"))
 
 
 def several_processes(command):

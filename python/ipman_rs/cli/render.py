@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import click
 
+from .errors import one_line_errors, writing
 from .options import several_processes
 
 
@@ -52,10 +52,6 @@ def render(
     The same options give the same bytes, whatever the number of processes. Interrupted, the same command goes on with
     the first shard that is not whole. Needs pip install 'ipman_rs[render]'.
     """
-    from concurrent.futures.process import BrokenProcessPool
-
-    from ..synthetic.images.samples import RenderSettings
-    from ..synthetic.images.writer import write
     from . import console
 
     counts = {
@@ -63,18 +59,11 @@ def render(
         "val": images // 10 if val is None else val,
         "test": images // 10 if test is None else test,
     }
-    settings = RenderSettings(seed, size, body, moving)
-    try:
+    with one_line_errors(output), writing(output):
+        from ..synthetic.images.samples import RenderSettings
+        from ..synthetic.images.writer import write
+
         with console.progress("rendering", sum(counts.values())) as step:
-            drawn = write(output, settings, counts, shard_size, workers, step.to)
-    except (ValueError, ImportError) as error:
-        console.error(str(error))
-        sys.exit(1)
-    except OSError as error:
-        console.error(f"{output}: cannot be written ({error.strerror or error}); choose another folder")
-        sys.exit(1)
-    except BrokenProcessPool:
-        console.error("a process ended too early, for want of memory perhaps; the same command, with fewer -j, goes on")
-        sys.exit(1)
+            drawn = write(output, RenderSettings(seed, size, body, moving), counts, shard_size, workers, step.to)
     listed = ", ".join(f"{count} {split}" for split, count in counts.items())
     console.say(f"{output}: {listed}; {drawn} drawn now")

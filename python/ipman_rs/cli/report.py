@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from .errors import writing
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -17,13 +18,10 @@ def write(studies: list[Study], output: Path, failures: list[tuple[str, str]], o
     from ..view.report import count_files, write_report
     from . import console
 
-    try:
-        with console.progress("writing the report", count_files(studies)) as step:
-            told = {"progress": lambda _name: step.one(), "own_folders": own_folders}
-            return write_report(studies, output, failures, **told).resolve()
-    except OSError as error:
-        console.error(f"{output}: the report cannot be written ({error.strerror or error}); choose another folder")
-        sys.exit(1)
+    with writing(output, "the report"), console.progress("writing the report", count_files(studies)) as step:
+        options = {"progress": lambda _name: step.one(), "own_folders": own_folders}
+        return write_report(studies, output, failures, **options).resolve()
+    raise AssertionError  # `writing` ends the command
 
 
 def print_json(studies: list[Study], failures: list[tuple[str, str]]) -> None:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..files.errors import FileError, one_line
+from ..files.errors import one_line
+from .errors import writing
 from .options import GROUND, TIMES, UP, of_files
 
 if TYPE_CHECKING:
-    from ..simulation.inputs import GroundedBodies
-    from ..simulation.report import Fall
+    from ..simulation.files import Falls
 
 MOST_ROWS = 40
 
@@ -106,16 +103,7 @@ def simulate(
 
     Exit code: 0 when all is well, 1 when a file could not be read (the others are), 2 for wrong usage.
     """
-    from ..simulation.comparison_report import (
-        compare_falls,
-        comparison_lines,
-        comparison_record,
-        comparison_table,
-        pairs,
-        write_comparison,
-    )
-    from ..simulation.inputs import read_bodies
-    from ..simulation.report import run_falls, write_falls
+    from ..simulation.files import compare_files, simulate_files
     from ..study.from_file import Request
     from . import console
 
@@ -127,93 +115,45 @@ def simulate(
     )
     films = options.pop("filmstrips")
     films = films if output is not None else 0
-    falls: list[Fall] = []
-    failures: list[tuple[str, str]] = []
-
-    @contextmanager
-    def reported() -> Iterator[None]:
-        try:
-            yield
-        except FileError as error:
-            failures.append((error.path, error.what))
-            console.error(str(error))
-        except ImportError as error:
-            raise click.ClickException(str(error)) from error
-
-    def opened(path: Path) -> GroundedBodies:
-        read = read_bodies(path, request, console.progress)
-        console.warn_of(path, read.flags)
-        return read
-
-    compared = None
-    if against is None:
-        for path in bodies:
-            with reported():
-                falls.append(run_falls(opened(path), films, **options, progress=console.progress))
-    else:  # what cannot be compared is not simulated
-        both: list[GroundedBodies] = []
-        for path in (*bodies, against):
-            with reported():
-                both.append(opened(path))
-        with reported():
-            if not failures:
-                pairs(*both)
-                falls += [run_falls(each, films, **options, progress=console.progress) for each in both]
-                compared = compare_falls(*falls)
-    record: dict[str, Any] = {"bodies": [one.record() for one in falls]}
-    if compared is not None:
-        record["comparison"] = comparison_record(compared[0], *falls)
-    record["failures"] = [dict(zip(("file", "error"), failure, strict=True)) for failure in failures]
-    text = json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1)
-    if output is not None and falls:
-        try:
-            write_falls(falls, output, text, console.progress)
-            if compared is not None:
-                write_comparison(*compared[1:], (falls[0].path, falls[1].path), output)
-        except OSError as error:
-            console.error(f"{output}: cannot be written ({error.strerror or error}); choose another folder")
-            sys.exit(1)
+    try:
+        if against is None:
+            result = simulate_files(bodies, request, films, console.progress, **options)
+        else:
+            result = compare_files(bodies[0], against, request, films, console.progress, **options)
+    except ImportError as error:
+        raise click.ClickException(str(error)) from error
+    for path, flags in result.flags:
+        console.warn_of(path, flags)
+    for failure in result.failures:
+        console.error(str(failure))
+    if output is not None and result.falls:
+        with writing(output):
+            result.write(output, console.progress)
     if as_json:
-        click.echo(text)
-    elif falls:
-        print_falls(falls)
-        for one in falls:
-            for flag in one.flags:
-                console.say(one_line(f"! {one.path}: {flag}"))
-            assumed = [note for note in one.notes if note.startswith(("up: ", "ground: "))]
-            for note in one.notes:
-                if note not in assumed and not note.startswith("parts: "):
-                    console.say(one_line(f"{one.path}: {note}"))
-            if assumed:
-                console.say(one_line(f"{one.path}: {'; '.join(assumed)}"))
-        for note in dict.fromkeys(one.without_verdict for one in falls if one.without_verdict):
-            console.say(note)
-        if compared is not None:
-            console.say("")
-            console.print_rows(*comparison_table(compared[0]))
-            for line in comparison_lines(compared[0], *falls):
-                console.say(one_line(line))
+        click.echo(result.record())
+    elif result.falls:
+        _print(result)
         if output is not None:
             console.say(f"results: {output.resolve()}")
-    sys.exit(1 if failures else 0)
+    sys.exit(1 if result.failures else 0)
 
 
-def print_falls(falls: Sequence[Fall]) -> None:
-    """A line for each body of a file; one for all of them where they are many."""
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
+def _print(result: Falls) -> None:
+    """A line for each body of a file, one for all of them where they are many; what is odd; the comparison."""
+    from . import console
 
-    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1))
-    table.add_column("body", overflow="fold", min_width=14)
-    for title in falls[0].titles():
-        table.add_column(title, justify="right", no_wrap=True)
-    table.add_column("stands", no_wrap=True)
-    for one in falls:
+    rows = []
+    for one in result.falls:
         for name, cells, stands in one.rows() if one.count <= MOST_ROWS else [one.summary()]:
-            style = "" if stands is None else ("green" if stands.startswith(("yes", "100")) else "red")
-            table.add_row(one_line(name), *cells, Text(stands or "–", style=style))
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = 160
-    console.print(table)
+            color = "" if stands is None else ("green" if stands.startswith(("yes", "100")) else "red")
+            rows.append(([name, *cells, stands or "–"], color))
+    console.print_colored(("body", *result.falls[0].titles(), "stands"), rows, "stands", {"body": None})
+    for line in result.lines():
+        console.say(one_line(line))
+    compared = result.comparison()
+    if compared is not None:
+        head, lines, words = compared
+        console.say("")
+        console.print_rows(head, lines)
+        for line in words:
+            console.say(one_line(line))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import click
+
+from .errors import extra, one_line_errors
 
 
 @click.command()
@@ -25,8 +26,6 @@ def train(config: Path, changes: tuple[str, ...], output: Path) -> None:
     ipman train ipman-r -o out/ipman-r accelerator=gpu    # the paper's, with its data sets in data/
     torchrun --nproc-per-node 4 $(which ipman) train hmr.yaml -o out/hmr devices=4
     """
-    from . import console
-
     if not config.exists():
         from ..training import recipes
 
@@ -34,15 +33,9 @@ def train(config: Path, changes: tuple[str, ...], output: Path) -> None:
             config = recipes.path_of(str(config))
         except ValueError as error:
             raise click.UsageError(str(error)) from None
-    try:
-        from ..training.trainer.config import load
-        from ..training.trainer.run import train as run
-    except ImportError as error:
-        console.error(f"{error.name} is needed: pip install 'ipman_rs[train]'")
-        sys.exit(1)
-    try:
+    with one_line_errors(output):
+        with extra("train"):
+            from ..training.trainer.config import load
+            from ..training.trainer.run import train as run
         last = run(load(config, changes), output)
-    except (ImportError, ValueError) as error:
-        console.error(str(error))
-        sys.exit(1)
     click.echo(f"checkpoint: {last}")

@@ -9,7 +9,8 @@ from typing import Any
 
 import click
 
-from ..files.errors import FileError
+from ..files.errors import one_line
+from .errors import writing
 from .options import METRES, RATE, UNIT, UP, force, needs, subject
 
 
@@ -65,7 +66,7 @@ def validate(
     rate: float,
     fresh: bool,
     recorded_rate: float | None,
-    **said: Any,
+    **options: Any,
 ) -> None:
     """Compare the engine's centre of mass, centre of pressure and pressure with measurements.
 
@@ -89,29 +90,24 @@ def validate(
     """
     needs("torch", "roma", "yaml")
     warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
-    from ..validation import run
+    from ..validation import report, run
     from . import console
 
     try:
-        said["rate"] = recorded_rate
-        plan = run.plan(folder, output, model, person, rate, not fresh, **said)
+        options["rate"] = recorded_rate
+        plan = run.plan(folder, output, model, person, rate, not fresh, **options)
     except (ValueError, ImportError) as error:
         raise click.UsageError(str(error)) from error
-    try:
+    with writing(output, "outputs"):
         records, notes, failures = run.run(plan, console.progress)
         page = run.write(plan, records, notes, failures) if records else None
-    except OSError as error:
-        what = f"{output}: outputs cannot be written ({error.strerror or error}); choose another folder"
-        raise click.ClickException(what) from error
     for failure in failures:
         console.error(str(failure))
     if page is not None:
-        console.print_validation(records)
-    for note in notes:
-        console.say(note)
-    if page is not None:
-        console.say(f"report: {page}")
+        head, rows = report.phase_table(records)
+        console.print_colored(head, [(row, "") for row in rows], "", {"recording": None})
+    for line in report.flag_lines(records):
+        console.say(one_line(line))
+    for line in (*notes, *([] if page is None else [f"report: {page}"])):
+        console.say(line)
     sys.exit(1 if failures else 0)
-
-
-__all__ = ["FileError", "validate"]

@@ -9,13 +9,26 @@ from __future__ import annotations
 
 import os
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from .check import Finding
+from .check import Finding, is_complete
 from .frames import Cameras, DataSet, Frames, PressureMaps, pieces
 
-__all__ = ["DATASETS", "Cameras", "DataSet", "Finding", "Frames", "PressureMaps", "module", "open", "pieces"]
+__all__ = [
+    "DATASETS",
+    "Cameras",
+    "DataSet",
+    "Finding",
+    "Frames",
+    "PressureMaps",
+    "check_download",
+    "is_complete",
+    "module",
+    "open",
+    "pieces",
+]
 
 DATASETS = {  # name -> module with NAME, open(path, split=None, **options) and check(path)
     "3dpw": "threedpw",
@@ -48,3 +61,15 @@ def open(name: str, path: str | os.PathLike[str], **options: Any) -> DataSet:
     Raises ValueError naming the file, what was expected and what was found, also where units or axes cannot be right.
     """
     return module(name).open(path, **options)
+
+
+def check_download(name: str, path: str | os.PathLike[str]) -> list[Finding]:
+    """What is there, missing or wrong in a download, a file or a folder, of the data set of that name.
+
+    A file that cannot be opened, or an extra that is not installed, is a finding. ValueError for an unknown name.
+    """
+    checked = module(name)
+    try:
+        return list(checked.check(Path(path)))
+    except (ValueError, OSError, ImportError) as error:
+        return [Finding("wrong", str(error))]

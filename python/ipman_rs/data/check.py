@@ -52,6 +52,17 @@ class Finding:
     advice: str = ""
     option: str = ""
 
+    @property
+    def remedy(self) -> str:
+        """The advice, and the option of the commands that take such data."""
+        option = "" if self.option in self.advice else f"for ipman fit: {self.option}"
+        return "; ".join(part for part in (self.advice, option) if part)
+
+
+def is_complete(findings: Iterable[Finding]) -> bool:
+    """Whether nothing is missing or wrong."""
+    return all(each.level in ("ok", "odd") for each in findings)
+
 
 def raise_if_wrong(path: str | os.PathLike[str], findings: Iterable[Finding]) -> None:
     """ValueError with the file's name and all that is wrong; what is merely missing passes."""

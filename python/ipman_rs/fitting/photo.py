@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.files import regular_file
+from ipman_rs.files.image import SMALLEST as SMALLEST
+from ipman_rs.files.image import read as read
 
 from ..data.keypoints import mediapipe
 from ..data.keypoints.detections import Array, Detections, join
 
 Box = tuple[float, float, float, float]  # x, y, width, height in pixels
 
-SMALLEST = 32  # pixels: nobody is found in less
 AROUND = 0.04  # of the longer side: how far a body reaches beyond its landmarks; the median of rendered people
 
 
@@ -65,26 +65,6 @@ def box_around(points: Array) -> Box:
     x, y = (low - margin).tolist()
     width, height = (high - low + 2 * margin).tolist()
     return x, y, width, height
-
-
-def read(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
-    """The pixels (height, width, 3) of an image, turned as its EXIF says. ValueError if unreadable or tiny."""
-    from PIL import Image, ImageOps
-
-    regular_file(path)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(path, formats=("JPEG", "PNG")) as image:  # others start programs
-                pixels = np.array(ImageOps.exif_transpose(image).convert("RGB"))
-    except Exception as error:  # damaged bytes can fail in any way
-        raise ValueError(f"{path}: expected an image: {error}") from None
-    if min(pixels.shape[:2]) < SMALLEST:
-        height, width = pixels.shape[:2]
-        raise ValueError(
-            f"{path}: expected an image of at least {SMALLEST} × {SMALLEST} pixels, got {width} × {height}"
-        )
-    return pixels
 
 
 def _model() -> Any:

@@ -68,7 +68,17 @@ def center_of_mass(
         {"formulation": key, "x_m": point[0], "y_m": point[1], "z_m": point[2], **_distances(about[key])}
         for key, point in points.items()
     ]
-    return PaperFigure("com", _draw(study, points, binary, numbers), numbers, table=table)
+    head = ["centre of mass", "height cm", "from exact mm", "from CoP mm", "from binary CoP mm"]
+    lines = [
+        [key, f"{100 * each['height_m']:.1f}", f"{1e3 * each['to_exact_m']:.0f}", *_millimetres(each)]
+        for key, each in about.items()
+    ]
+    return PaperFigure("com", _draw(study, points, binary, numbers), numbers, table=table, summary_table=(head, lines))
+
+
+def _millimetres(about: dict[str, Any]) -> list[str]:
+    distances = (about[f"to_{kind}center_of_pressure_on_ground_m"] for kind in ("", "binary_"))
+    return ["–" if value != value else f"{1e3 * value:.0f}" for value in distances]
 
 
 def _about(point: Array, exact: Array, pressure: Array, binary: Array, ground: ip.Ground) -> dict[str, Any]:

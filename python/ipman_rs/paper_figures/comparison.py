@@ -56,7 +56,8 @@ def comparison(
         table += [{"person": name, "method": title, **values} for title, values in about.items()]
         progress(number + 1)
     numbers = {"preset": preset, "methods": [title for title, _ in methods], "people": rows}
-    return PaperFigure("compare", figure, numbers, table=table)
+    lines = [[name, title, caption(about)] for name, each in rows.items() for title, about in each.items()]
+    return PaperFigure("compare", figure, numbers, table=table, summary_table=(["person", "method", "stands"], lines))
 
 
 def figures(study: Study) -> dict[str, Any]:

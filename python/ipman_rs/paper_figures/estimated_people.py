@@ -198,6 +198,11 @@ class Predicted:
 Estimated = FittedFolder | Predicted
 
 
+def predicted(path: Path, data: DataSet, models: Models, images: Path = Path()) -> Predicted:
+    """A file of predictions for a data set, or the folder of `ipman fit --data` that has one."""
+    return Predicted(path / PREDICTIONS if path.is_dir() else path, data, models, images)
+
+
 def shared_names(methods: Sequence[tuple[str, Estimated]], wanted: Sequence[str], most: int) -> list[str]:
     """The people that all methods have: those that are wanted, or up to `most`, evenly spaced. ValueError if one is not
     in all, or none is."""

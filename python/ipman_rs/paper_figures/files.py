@@ -30,7 +30,7 @@ class PaperFigure:
     """A picture and the numbers that it shows.
 
     numbers: for JSON; what is not finite becomes null. arrays: for NAME.npz, none without any. table: rows of NAME.csv
-    by column, none without any.
+    by column, none without any. summary: the numbers in lines of text; summary_table: as head and rows.
     """
 
     name: str
@@ -38,6 +38,8 @@ class PaperFigure:
     numbers: dict[str, Any]
     arrays: Mapping[str, np.ndarray] = field(default_factory=dict)
     table: Sequence[Mapping[str, Any]] = ()
+    summary: Sequence[str] = ()
+    summary_table: tuple[Sequence[str], Sequence[Sequence[str]]] | None = None
 
 
 def write(figure: PaperFigure, folder: Path) -> list[Path]:

@@ -16,8 +16,11 @@ from numpy.typing import NDArray
 from ipman_rs.body import rotations
 from ipman_rs.data.check import evenly
 from ipman_rs.data.frames import DataSet
+from ipman_rs.progress import Progress as Stages
+from ipman_rs.progress import silent
 
 from .files import PaperFigure
+from .inputs import DataSets
 from .posed_bodies import Progress
 from .style import SERIES, WORDS, new_figure
 
@@ -80,6 +83,20 @@ def of_built_people(people: int, progress: Progress = lambda done: None) -> list
     ]
 
 
+def of_data_sets(data_sets: DataSets, people: int, most: int = MOST, progress: Stages = silent) -> list[Poses]:
+    """Up to `most` poses of each data set; of so many built people where there is no data set. Raises as
+    `of_data_set`."""
+    groups = []
+    with data_sets.open() as opened:
+        for name, data in opened:
+            with progress(f"reading {name}", min(most, len(data))) as step:
+                groups.append(of_data_set(name, data, most, step.to))
+    if groups:
+        return groups
+    with progress("building people", people) as step:
+        return of_built_people(people, step.to)
+
+
 def _as_matrices(pose: Array) -> Array:
     """Numbers (F, 9 J) of rotation vectors (F, J, 3)."""
     return rotations.from_axis_angle(pose.astype(np.float64)).reshape(len(pose), -1)
@@ -101,7 +118,7 @@ def poses(groups: Sequence[Poses], perplexity: float = PERPLEXITY, seed: int = 0
     group = np.repeat(np.arange(len(groups)), [len(each.values) for each in groups])
     places, divergence = embedded(values, perplexity, seed)
     shares = np.bincount(group) / len(group)
-    numbers = {
+    numbers: dict[str, Any] = {
         "poses": len(values),
         "perplexity": perplexity,
         "seed": seed,
@@ -116,7 +133,12 @@ def poses(groups: Sequence[Poses], perplexity: float = PERPLEXITY, seed: int = 0
         for number, name, (x, y) in zip(group.tolist(), names, places, strict=True)
     ]
     arrays = {"places": places, "group": group, "frames": names}
-    return PaperFigure("poses", _draw(groups, places, group), numbers, arrays, table)
+    summary = (
+        f"{numbers['poses']:,} poses; the nearest neighbour is of the same group in "
+        f"{100 * numbers['nearest_neighbour_of_same_group']:.0f} % "
+        f"({100 * numbers['nearest_neighbour_of_same_group_by_chance']:.0f} % by chance)"
+    )
+    return PaperFigure("poses", _draw(groups, places, group), numbers, arrays, table, [summary])
 
 
 def embedded(values: Array, perplexity: float, seed: int) -> tuple[Array, float]:

@@ -116,7 +116,7 @@ def pressure(pressed: MatBody, preset: str = "paper-r") -> PaperFigure:
     center = np.asarray(
         ip.center_of_pressure(pressed.vertices, template, pressed.ground, constants.alpha, constants.gamma)
     )
-    numbers = {
+    numbers: dict[str, Any] = {
         "frame": pressed.name,
         "preset": preset,
         "alpha_per_m": constants.alpha,
@@ -152,7 +152,12 @@ def pressure(pressed: MatBody, preset: str = "paper-r") -> PaperFigure:
     figure.get_layout_engine().set(h_pad=0.08)  # type: ignore[union-attr]
     figure.suptitle(f"{pressed.name}\n{words}", size=WORDS, color=colors.INK, parse_math=False)
     _write_key(figure, (left, right))
-    return PaperFigure("pressure", figure, numbers, maps)
+    best = numbers["best_of_the_grid"]
+    summary = (
+        f"{pressed.name}: IoU {numbers['iou']:.3f}, CoP {1e3 * numbers['cop_error_m']:.0f} mm off; the best of the "
+        f"paper's grid {best['iou']:.3f}, {1e3 * best['cop_error_m']:.0f} mm"
+    )
+    return PaperFigure("pressure", figure, numbers, maps, summary=[summary])
 
 
 def _estimated(pressed: MatBody, samples: Array, preset: Any) -> Array:

@@ -78,7 +78,18 @@ def pull_gradient(
         show_pixels(axes, _moved_body(body, lift, paints))
         axes.set_title(f"{word}: {abs(100 * lift):.0f} cm", size=WORDS, color=colors.INK)
     _draw_bars(figure, (middle, right), (steepest, np.abs(push_slope).max()))
-    return PaperFigure("pull", figure, numbers, table=table)
+    return PaperFigure("pull", figure, numbers, table=table, summary=_in_words(numbers))
+
+
+def _in_words(numbers: dict[str, Any]) -> list[str]:
+    shares = ", ".join(
+        f"{100 * share:.0f} % at {100 * float(at):.0f} cm" for at, share in numbers["share_of_peak"].items()
+    )
+    claim = "holds" if numbers["claim_holds"] else "does not hold"
+    return [
+        f"gradient of L_pull: largest at {100 * numbers['peak_m']:.1f} cm; of that {shares}",
+        f"the paper's “minimal beyond 15–20 cm”: {claim}",
+    ]
 
 
 def engine_curve(

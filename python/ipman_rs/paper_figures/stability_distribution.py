@@ -19,8 +19,11 @@ import ipman_rs as ip
 from ipman_rs.data.frames import DataSet
 from ipman_rs.evaluation.tables.models import Models
 from ipman_rs.presets import Preset
+from ipman_rs.progress import Progress as Stages
+from ipman_rs.progress import silent
 
 from .files import PaperFigure
+from .inputs import DataSets
 from .posed_bodies import Progress, posed_bodies
 from .style import SERIES, WORDS, new_figure, plot_style
 
@@ -86,6 +89,24 @@ def of_built_people(people: int, preset: str = "paper-r", progress: Progress = l
     return Losses("built people at rest", values, names, touching.astype(bool), preset)
 
 
+def of_data_sets(
+    data_sets: DataSets, people: int, every: int = 1, preset: str = "paper-r", progress: Stages = silent
+) -> list[Losses]:
+    """L_stability of each `every`-th frame of each data set; of so many built people where there is no data set.
+
+    Raises as `of_data_set`.
+    """
+    losses = []
+    with data_sets.open() as opened:
+        for name, data in opened:
+            with progress(f"measuring {name}", len(range(0, len(data), every))) as step:
+                losses.append(of_data_set(name, data, data_sets.models, every, preset, step.to))
+    if not losses:
+        with progress("building people", people) as step:
+            losses.append(of_built_people(people, preset, step.to))
+    return losses
+
+
 def _losses(
     vertices: Array, template: ip.BodyTemplate, ground: ip.Ground, preset: Preset
 ) -> tuple[Array, NDArray[np.bool_]]:
@@ -111,7 +132,15 @@ def stability_distribution(losses: Sequence[Losses]) -> PaperFigure:
         f"{key}_{number}": getattr(each, key) for number, each in enumerate(losses) for key in ("values", "frames")
     }
     numbers = {"preset": losses[0].preset, "bin_width_m": width, "claim": "the paper: peaks at 0", "data": found}
-    return PaperFigure("stability", _draw(losses, found, width), numbers, arrays, table)
+    return PaperFigure("stability", _draw(losses, found, width), numbers, arrays, table, [*map(_in_words, found)])
+
+
+def _in_words(about: dict[str, Any]) -> str:
+    low, high = (1e3 * edge for edge in about["peak_m"])
+    return (
+        f"{about['name']}: {about['bodies']:,} bodies, median {1e3 * about['median_m']:.0f} mm, "
+        f"{100 * about['share_below_50_mm']:.0f} % below 50 mm; peaks at {low:.0f}–{high:.0f} mm (the paper: at 0)"
+    )
 
 
 def summary(losses: Losses, width: float) -> dict[str, Any]:

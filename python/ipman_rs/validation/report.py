@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..study.table import number
 from .comparison import MeasuredComparison
 from .computed import GAMMAS, METHODS, plate_loads
 
@@ -253,6 +254,38 @@ def table(columns: dict[str, NDArray[Any]]) -> str:
 
 def _axes(name: str, count: int) -> Sequence[str]:
     return [f"plate{number}" for number in range(1, count + 1)] if name == "loads_N" else "xyz"
+
+
+def phase_table(records: Sequence[Record]) -> tuple[list[str], list[list[str]]]:
+    """A row for each phase of each recording: weight, centre of mass and centre of pressure against the measured. A
+    weight by plates that is not to be trusted has a mark."""
+    head = [
+        "recording", "", "markers mm", "kg", "by plates", "CoM mm", "CoP: at rest mm", "ZMP mm", "γ = 10 mm"
+    ]  # fmt: skip
+    return head, [row for record in records for row in _phases(record)]
+
+
+def _phases(record: Record) -> Iterator[list[str]]:
+    values = [
+        (record["fit"]["markers"], 1e3),
+        (record["mass"]["volume_mean"], 1),
+        (record["mass"]["plates"], 1),
+        (record["com"]["methods"]["exact"]["distance"] if record["com"] else None, 1e3),
+    ]
+    cells = [number(value, factor, 1) for value, factor in values]
+    cells[2] += " !" if any(flag.startswith("weight by the plates") for flag in record["flags"]) else ""
+    lead = [record["name"], record["kind"], *cells]
+    for phase, compared in (record["cop"] or {"all": {"distance": {}}}).items():
+        if phase != "all":
+            lead[1] = f"{record['kind']}, {phase}"
+        away = [compared["distance"].get(name) for name in ("at rest: g(CoM)", "moving: ZMP of the parts", "γ = 10")]
+        yield [*lead, *(number(value, 1e3, 1) for value in away)]
+        lead = [""] * len(lead)
+
+
+def flag_lines(records: Sequence[Record]) -> list[str]:
+    """What is odd about each recording."""
+    return [f"look: {record['name']}: {flag}" for record in records for flag in record["flags"]]
 
 
 def _records_with(records: Iterable[Record], key: str) -> Iterator[Record]:

@@ -5,11 +5,13 @@ from ipman_rs.renamed import old_names
 from .job import Job, Shard, Source
 from .paper import TABLES, Table
 from .predictions import Predictions, read
+from .run import Evaluation, evaluate, evaluation
 from .summary import Difference, MethodSummary, difference, summarise
 
 __all__ = [
     "TABLES",
     "Difference",
+    "Evaluation",
     "Job",
     "MethodSummary",
     "Predictions",
@@ -17,6 +19,8 @@ __all__ = [
     "Source",
     "Table",
     "difference",
+    "evaluate",
+    "evaluation",
     "read",
     "summarise",
 ]

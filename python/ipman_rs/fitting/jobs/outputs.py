@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-import io
-import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +14,10 @@ import numpy as np
 import ipman_rs as ip
 
 from ...body import BodyModel, pose_arrays
-from ...files import read_json, safe_npz, write_whole
+from ...files import read_json, safe_npz
+from ...files.item_folder import RECORD as RECORD
+from ...files.item_folder import npz as npz
+from ...files.item_folder import write_files as write_files
 from ...io import write_mesh
 from ...study import Fitted, Study, camera_of, study
 from .. import photo
@@ -25,7 +26,6 @@ from .items import Item
 if TYPE_CHECKING:
     from ..result import FitResult
 
-RECORD = "fit.json"
 _BEFORE = "before_"
 
 
@@ -65,18 +65,6 @@ def read_item(item: Item, body: BodyModel, folder: Path, identity: str) -> Fitte
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """All arrays of an .npz file. Raises ValueError."""
     return {name: safe_npz.read(path, name) for name in safe_npz.names(path)}
-
-
-def write_files(folder: Path, files: dict[str, Any], record: dict[str, Any]) -> dict[str, Any]:
-    """Write files, bytes or arrays for an .npz, and then the record, with their names, that makes the folder complete;
-    that record. Raises OSError."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / RECORD).unlink(missing_ok=True)  # incomplete from here on
-    for name, content in files.items():
-        write_whole(folder / name, content if isinstance(content, bytes) else npz(content))
-    record = {**record, "files": sorted(files)}
-    write_whole(folder / RECORD, json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1) + "\n")
-    return record
 
 
 def complete(folder: Path, identity: str) -> dict[str, Any] | None:
@@ -139,10 +127,3 @@ def _presented(shown: dict[str, Any]) -> str:
     height, above = shown["body_height_m"], 1000 * shown["lowest_above_floor_m"]
     said = f"presented pose: {shown['source']}, {height:.2f} m tall, its lowest point {above:.0f} mm above its floor"
     return f"{said}; {shown['contact_vertices']} vertices touch ({by})"
-
-
-def npz(arrays: dict[str, np.ndarray]) -> bytes:
-    """The file of these arrays."""
-    stream = io.BytesIO()
-    np.savez(stream, allow_pickle=False, **arrays)
-    return stream.getvalue()
