@@ -37,7 +37,7 @@ class Page:
             else:
                 assert {language for language, _ in blocks} == {"diff"}, path
                 edits[path] = [block for _, block in blocks]
-        tries = _BLOCK.findall(text.split("## Try it\n")[1])
+        tries = _BLOCK.findall(text.split("## Try it\n")[1].split("\n## ")[0])
         return cls((int(said[1]), int(said[2])), files, edits, tries)
 
     def carry_out(self, folder: Path) -> Path:

@@ -2,12 +2,13 @@
 
 pub mod balance;
 pub mod ground;
+mod list;
 pub mod stability;
 pub mod term;
 pub mod terms;
 
 // In the order in which their numbers stand. A new term is listed here.
-terms::list_of_terms! {
+list::list_of_terms! {
     Stability(stability::StabilityLoss),
     Balance(balance::BalanceCost),
     Ground(ground::GroundLoss),
