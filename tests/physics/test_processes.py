@@ -231,9 +231,9 @@ def test_interrupted_once_and_usable_again():
         def stop(*_):
             raise Enough
         signal.signal(signal.SIGALRM, stop)
-        signal.setitimer(signal.ITIMER_REAL, 0.2)
         big = np.ascontiguousarray(np.tile(bodies, (20, 1, 1)))
         try:
+            signal.setitimer(signal.ITIMER_REAL, 0.2)
             while True:
                 ip.balance_cost(big, template, ground)
         except Enough:

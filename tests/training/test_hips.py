@@ -35,7 +35,7 @@ UP = 0.06  # m from SMPL's hips up to those of the regressor, at rest
 
 @pytest.fixture(scope="module")
 def body():
-    return dataclasses.replace(load_body("anny-lite"), name="SMPL_NEUTRAL")
+    return dataclasses.replace(load_body("anny-lite"), name="SMPL_NEUTRAL", kind="smpl")
 
 
 @pytest.fixture(scope="module")

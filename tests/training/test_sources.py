@@ -216,7 +216,7 @@ def test_joints_that_mean_something_else_do_not_count(frames):
 
 def test_parameters_of_a_model_file(frames):
     """What a data set calls smpl fits any file of SMPL's, and not the embedded body."""
-    smpl = dataclasses.replace(load_body("anny-lite"), name="SMPL_NEUTRAL")
+    smpl = dataclasses.replace(load_body("anny-lite"), name="SMPL_NEUTRAL", kind="smpl")
     told = dataclasses.replace(frames, body="smpl")
     assert Images(People(told), smpl, KEYPOINTS, 60).sample(0, None)["has_body"]
     assert not images(told).sample(0, None)["has_body"]
