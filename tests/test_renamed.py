@@ -11,6 +11,7 @@ RENAMED = {
     "ipman_rs.evaluation.tables": {"Measured": "MethodSummary", "measured": "summarise"},
     "ipman_rs.validation": {"Comparison": "MeasuredComparison"},
     "ipman_rs.data.check": {"demanded": "require_plausible", "of_frames": "check_frames"},
+    "ipman_rs.io": {"Recording": "BodySequence"},
     "ipman_rs.data.tracks": {"Named": "MarkerColumns", "named": "select_markers"},
 }
 

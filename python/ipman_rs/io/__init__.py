@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from ..renamed import old_names
+from .body_sequence import BodySequence
 from .meshes import read_mesh
 from .parameters import read_npz
-from .recording import Recording
 from .write_mesh import glb, obj
 
-__all__ = ["Recording", "glb", "obj", "read_mesh", "read_npz"]
+__all__ = ["BodySequence", "glb", "obj", "read_mesh", "read_npz"]
+
+__getattr__ = old_names(__name__, {"Recording": "BodySequence"})

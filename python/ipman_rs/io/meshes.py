@@ -6,10 +6,10 @@ from pathlib import Path
 
 from ..files.errors import FileError
 from ..files.mesh import read_mesh as io
-from .recording import Recording
+from .body_sequence import BodySequence
 
 
-def read_mesh(path: Path) -> Recording:
+def read_mesh(path: Path) -> BodySequence:
     """The surface of a mesh file. Raises FileError."""
     if path.suffix.lower() not in io.ENDINGS:
         kind = path.suffix.lower() or "without ending"
@@ -18,6 +18,6 @@ def read_mesh(path: Path) -> Recording:
         mesh = io.read_mesh(path)
     except ValueError as error:
         raise FileError(path, str(error)) from error
-    return Recording(
+    return BodySequence(
         path, mesh.vertices[None], mesh.faces, vertex_map=mesh.vertex_map, face_map=mesh.face_map, notes=mesh.notes
     )

@@ -17,8 +17,8 @@ from ..data.check import Finding
 from ..files import safe_npz
 from ..files.errors import FileError
 from ..files.mesh import repair
+from .body_sequence import Y_UP, Z_UP, BodySequence
 from .parts import match_body
-from .recording import Y_UP, Z_UP, Recording
 
 _EXPECTED = (
     "expected vertices and faces, or poses/betas/trans (AMASS), or global_orient/body_pose/betas/transl, or "
@@ -105,7 +105,7 @@ def read_npz(
     degrees: bool = False,
     rate: float | None = None,
     arrays: Mapping[str, np.ndarray] | None = None,
-) -> Recording:
+) -> BodySequence:
     """The bodies of an .npz file; `model` None: of the body that the file names, or anny. Raises FileError.
 
     unit: metres in one of the file's lengths. degrees: rotation vectors are degrees. rate: Hz, instead of the file's.
@@ -147,7 +147,7 @@ def _are_of_another_body(stored: _Npz, model: str) -> bool:
     return len(shape) < 2 or shape[-2] != ip.load_body(model).num_vertices
 
 
-def _read_vertices(stored: _Npz, model: str, unit: float, rate: float | None) -> Recording:
+def _read_vertices(stored: _Npz, model: str, unit: float, rate: float | None) -> BodySequence:
     import ipman_rs as ip
 
     vertices, faces = stored.first(*_VERTICES), stored.first("faces", "f")
@@ -179,13 +179,13 @@ def _read_vertices(stored: _Npz, model: str, unit: float, rate: float | None) ->
     elif mesh.vertex_map is not None:
         vertices = vertices[:, mesh.vertex_map >= 0]
     seconds, findings = _seconds(stored, len(vertices), rate)
-    return Recording(
+    return BodySequence(
         stored.path, vertices, mesh.faces, vertex_map=mesh.vertex_map, face_map=mesh.face_map, seconds=seconds,
         up=Y_UP, notes=mesh.notes, findings=tuple(findings),
     )  # fmt: skip
 
 
-def _read_parameters(stored: _Npz, model: str, unit: float, degrees: bool, rate: float | None) -> Recording:
+def _read_parameters(stored: _Npz, model: str, unit: float, degrees: bool, rate: float | None) -> BodySequence:
     easymocap = "Rh" in stored.names
     amass = not easymocap and bool(stored.names & {"poses", "root_orient"})
     body = _body(stored, model, amass)
@@ -211,7 +211,7 @@ def _read_parameters(stored: _Npz, model: str, unit: float, degrees: bool, rate:
 
     vertices = PosedSequence(body, len(pose), parameters)
     said = f"body: {body.name}, posed by {len(pose.names)} joints of the file"
-    return Recording(
+    return BodySequence(
         stored.path, vertices[:].astype(np.float64) if len(pose) == 1 else vertices, body.faces, body.template,
         seconds=seconds, up=Z_UP if amass else Y_UP, up_why=", as AMASS has it" if amass else "",
         notes=(said, *pose.notes(), *shape, *face), findings=tuple(findings),

@@ -18,7 +18,7 @@ from ..body import embedded
 from ..files import safe_npz
 from ..files.errors import FileError
 from ..fitting.jobs.outputs import RECORD
-from ..io.recording import Recording
+from ..io.body_sequence import BodySequence
 from ..progress import Progress, silent
 from ..study.from_file import Request, add_unit_warning, collect_unit_warnings, on_ground
 
@@ -32,7 +32,7 @@ class GroundedBodies:
     warnings about them."""
 
     path: Path
-    recording: Recording
+    recording: BodySequence
     template: Any
     ground: ip.Ground
     names: tuple[str, ...] | None

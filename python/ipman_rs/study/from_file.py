@@ -19,10 +19,10 @@ from ..data import check, judge, separate_pieces
 from ..data.check import Finding
 from ..files import regular_file, safe_npz
 from ..files.errors import FileError
+from ..io.body_sequence import BodySequence
 from ..io.meshes import read_mesh
 from ..io.parameters import read_npz
 from ..io.parts import match_body, read_parts
-from ..io.recording import Recording
 from ..progress import Progress, silent
 from .study import Study, study
 
@@ -108,7 +108,7 @@ def on_ground(
     read_elsewhere: Collection[str] = (),
     progress: Progress = silent,
     arrays: Arrays | None = None,
-) -> tuple[Recording, Any, ip.Ground, list[str]]:
+) -> tuple[BodySequence, Any, ip.Ground, list[str]]:
     """The bodies of a file, checked, their template and ground, and what was assumed. Raises FileError.
 
     own: the ground that the file itself gives. read_elsewhere: arrays of the file that the caller reads. arrays: as for
@@ -136,7 +136,7 @@ def on_ground(
     return recording, template, ip.Ground(normal, height), notes
 
 
-def _judged(recording: Recording, template: Any, normal: np.ndarray, up_is_said: bool) -> list[Finding]:
+def _judged(recording: BodySequence, template: Any, normal: np.ndarray, up_is_said: bool) -> list[Finding]:
     """Of some bodies of a file, evenly spaced."""
     count, size = recording.vertices.shape[:2]
     few = np.asarray(recording.vertices[check.evenly(count, max(1, min(check.SAMPLE, SAMPLED_VERTICES // size)))])
@@ -150,12 +150,12 @@ def _judged(recording: Recording, template: Any, normal: np.ndarray, up_is_said:
     return findings
 
 
-def _not_used(recording: Recording, read_elsewhere: Collection[str]) -> list[str]:
+def _not_used(recording: BodySequence, read_elsewhere: Collection[str]) -> list[str]:
     names = [name for name in recording.unused if name not in read_elsewhere]
     return [f"not used: {safe_npz.first_arrays(names, LISTED)}"] if names else []
 
 
-def read(path: Path, request: Request) -> Recording:
+def read(path: Path, request: Request) -> BodySequence:
     """The bodies in a file, by the ending of its name."""
     try:
         regular_file(path)
@@ -169,11 +169,11 @@ def read(path: Path, request: Request) -> Recording:
     return recording if request.units == 1.0 else replace(recording, vertices=recording.vertices[:] * request.units)
 
 
-def _parameters(path: Path, request: Request, arrays: Arrays | None = None) -> Recording:
+def _parameters(path: Path, request: Request, arrays: Arrays | None = None) -> BodySequence:
     return read_npz(path, request.model, unit=request.units, degrees=request.degrees, rate=request.rate, arrays=arrays)
 
 
-def _lowest(recording: Recording, normal: np.ndarray, progress: Progress) -> float:
+def _lowest(recording: BodySequence, normal: np.ndarray, progress: Progress) -> float:
     """The least finite height along the normal; infinite if there is none."""
     lowest = np.inf
     with progress(f"finding the ground of {recording.path.name}", len(recording.vertices)) as step:
@@ -198,7 +198,7 @@ def _heights(vertices: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return x + y + z
 
 
-def _template(recording: Recording, request: Request) -> tuple[Any, list[str]]:
+def _template(recording: BodySequence, request: Request) -> tuple[Any, list[str]]:
     """The template of a recording, and where its parts come from."""
     faces = recording.faces
     if recording.template is not None and request.parts is None:

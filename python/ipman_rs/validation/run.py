@@ -22,7 +22,7 @@ from ..files.errors import FileError
 from ..fitting import config
 from ..fitting.jobs.options import FitOptions
 from ..fitting.jobs.outputs import npz
-from ..fitting.jobs.recordings import FittedRecording, Pace, Recording, fit_recording
+from ..fitting.jobs.recordings import FittedRecording, MotionInput, Pace, fit_recording
 from ..io.parameters import read_npz
 from ..progress import Progress, silent
 from . import MeasuredComparison, computed, figures, measured, pictures, report
@@ -279,7 +279,7 @@ def _reference(plan: Plan, trial: Trial, tracks: Tracks) -> NDArray[np.float64]:
 
 def _fit(plan: Plan, measurement: MeasuredTrial, person: str | None, progress: Progress) -> FittedRecording:
     every = max(1, round((measurement.tracks.rate or 1.0) / plan.pace))
-    recording = Recording(measurement.trial.name, str(measurement.trial.markers), [measurement.trial.markers])
+    recording = MotionInput(measurement.trial.name, str(measurement.trial.markers), [measurement.trial.markers])
     return fit_recording(recording, plan.settings, Pace(every), plan.output, plan.resume, person, progress)
 
 

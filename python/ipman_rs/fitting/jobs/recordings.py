@@ -30,7 +30,7 @@ MAX_FRAME_FLAGS = 3  # flags of single frames in the record of a recording
 
 
 @dataclass
-class Recording:
+class MotionInput:
     """One person over time: a marker file, or the frames of keypoint files or photos in their order."""
 
     name: str
@@ -58,7 +58,7 @@ class FittedRecording:
 
 
 def fit_recording(
-    recording: Recording,
+    recording: MotionInput,
     options: FitOptions,
     pace: Pace,
     output: Path,
@@ -120,7 +120,7 @@ def _record(folder: Path) -> dict[str, Any]:
     return read_json(folder / RECORD)
 
 
-def _preset(recording: Recording, options: FitOptions) -> str:
+def _preset(recording: MotionInput, options: FitOptions) -> str:
     """Markers have a preset of their own, unless another was asked for."""
     return "markers" if recording.frames is None and options.config.name == "fast" else options.config.name
 
@@ -131,7 +131,7 @@ Fitted = tuple[
 
 
 def _fit_markers(
-    recording: Recording, options: FitOptions, pace: Pace, person: Person | None, progress: Progress
+    recording: MotionInput, options: FitOptions, pace: Pace, person: Person | None, progress: Progress
 ) -> Fitted:
     import ipman_rs.torch as ipt
 
@@ -199,7 +199,7 @@ def _mean(errors: np.ndarray) -> float | None:
     return float(known.mean()) if len(known) else None
 
 
-def _fit_frames(recording: Recording, options: FitOptions, pace: Pace, progress: Progress) -> Fitted:
+def _fit_frames(recording: MotionInput, options: FitOptions, pace: Pace, progress: Progress) -> Fitted:
     import ipman_rs.torch as ipt
 
     from ...data.keypoints.detections import join
@@ -284,7 +284,7 @@ def study_of(fitted: FittedRecording, model: str) -> Study:
     )
 
 
-def _identity(recording: Recording, options: FitOptions, pace: Pace, person: str | None) -> str:
+def _identity(recording: MotionInput, options: FitOptions, pace: Pace, person: str | None) -> str:
     """A hash of all that a fit depends on; `person`: that of the fit whose shape is kept."""
     digest = hashlib.sha256(json.dumps([options.identity(), repr(pace), person]).encode())
     for path in recording.paths:
@@ -296,10 +296,10 @@ def _number(value: Any) -> float | None:
     return float(value) if np.isfinite(float(value)) else None
 
 
-def recordings(tracks: Sequence[Path], items: Sequence[Item]) -> list[Recording]:
+def recordings(tracks: Sequence[Path], items: Sequence[Item]) -> list[MotionInput]:
     """One of each marker file, and one of all the items, in their order."""
-    found = [Recording(path.stem, str(path), [path]) for path in tracks]
+    found = [MotionInput(path.stem, str(path), [path]) for path in tracks]
     if items:
         folder = items[0].path.resolve().parent
-        found.append(Recording(folder.name, str(folder), [item.path for item in items], [*items]))
+        found.append(MotionInput(folder.name, str(folder), [item.path for item in items], [*items]))
     return found

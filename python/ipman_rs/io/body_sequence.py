@@ -15,7 +15,7 @@ Y_UP, Z_UP = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
-class Recording:
+class BodySequence:
     """``vertices`` (T, V, 3) m, or bodies that are posed when they are needed, and ``faces`` (F, 3).
 
     ``template`` when the file's body model has one; ``vertex_map`` (N,) the vertex that each vertex of the file became,
