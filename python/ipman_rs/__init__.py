@@ -9,7 +9,6 @@ from ipman_rs._core import __version__, get_num_threads, set_num_threads
 from ipman_rs.analysis import Analysis, analyze, analyze_poses
 from ipman_rs.body import load_body
 from ipman_rs.ground import Ground
-from ipman_rs.losses import *  # noqa: F403 - its __all__
 from ipman_rs.mass import center_of_mass
 from ipman_rs.pressure import binary_center_of_pressure, center_of_pressure, pressure
 from ipman_rs.sampling import sample_surface
@@ -19,6 +18,8 @@ from ipman_rs.support import BaseOfSupport, base_of_support, bose, support_margi
 from ipman_rs.template import BodyTemplate
 from ipman_rs.units import UnitsWarning
 from ipman_rs.volume import MassProperties, mass_properties, part_volumes
+
+from .losses import *  # noqa: F403 - its __all__
 
 __all__ = [
     "Analysis",
@@ -51,5 +52,5 @@ __all__ = [
     "self_penetration",
     "set_num_threads",
     "support_margin",
-    *losses.__all__,
 ]
+__all__ += losses.__all__

@@ -65,11 +65,11 @@ class Skin:
         self.owner = np.array(body.joint_names)[body.weights.argmax(1)]
 
     def points(self) -> dict[str, int]:
-        found = self.head()
+        landmarks = self.head()
         for side in SIDES:
             points = {**self.foot(side), **self.hand(side)}
-            found |= {f"{side}_{name}": vertex for name, vertex in points.items()}
-        return found
+            landmarks |= {f"{side}_{name}": vertex for name, vertex in points.items()}
+        return landmarks
 
     def of(self, *joints: str) -> NDArray[np.bool_]:
         """Which vertices (V,) move mostly with one of these joints."""
@@ -87,16 +87,16 @@ class Skin:
         if not head.any():
             return {}
         x, y, z = self.vertices.T
-        found = {"head_top": self.farthest(head, y=1)}
-        found["nose"] = self.farthest(head & (abs(x) < 0.02), z=1)
-        nose = self.vertices[found["nose"]]
-        scale = self.vertices[found["head_top"], 1] - nose[1]
+        landmarks = {"head_top": self.farthest(head, y=1)}
+        landmarks["nose"] = self.farthest(head & (abs(x) < 0.02), z=1)
+        nose = self.vertices[landmarks["nose"]]
+        scale = self.vertices[landmarks["head_top"], 1] - nose[1]
         for side, sign in SIDES.items():
             eye = nose[:2] + scale * np.array([0.21 * sign, 0.24])
             off = np.linalg.norm(self.vertices[:, :2] - eye, axis=1)
-            found[f"{side}_eye"] = best(head, z - 3 * off)  # in front, not the socket behind it
-            found[f"{side}_ear"] = self.farthest(head & (abs(y - nose[1] - 0.1 * scale) < 0.12 * scale), x=sign)
-        return found
+            landmarks[f"{side}_eye"] = best(head, z - 3 * off)  # in front, not the socket behind it
+            landmarks[f"{side}_ear"] = self.farthest(head & (abs(y - nose[1] - 0.1 * scale) < 0.12 * scale), x=sign)
+        return landmarks
 
     def foot(self, side: str) -> dict[str, int]:
         ankle, ball = self.joints[f"{side}_ankle"], self.joints[f"{side}_foot"]
@@ -120,18 +120,18 @@ class Skin:
         hand = np.char.startswith(self.owner, side) & (SIDES[side] * (self.vertices[:, 0] - wrist[0]) > 0)
         if not hand.any():
             return {}
-        found = {}
+        landmarks = {}
         for finger, (out, forwards) in FINGERTIPS.items():
             last = f"{side}_{finger}3"
             if self.of(last).any():
                 away = np.linalg.norm(self.vertices - self.joints[last], axis=1)
-                found[f"{finger}_tip"] = best(self.of(last), away)
+                landmarks[f"{finger}_tip"] = best(self.of(last), away)
             else:
-                found[f"{finger}_tip"] = self.farthest(hand, x=out * SIDES[side], z=forwards)
+                landmarks[f"{finger}_tip"] = self.farthest(hand, x=out * SIDES[side], z=forwards)
         for finger, share in KNUCKLES.items():
-            tip = self.vertices[found[f"{finger}_tip"]]
-            found[finger] = self.nearest(hand, wrist + share * (tip - wrist))
-        return found
+            tip = self.vertices[landmarks[f"{finger}_tip"]]
+            landmarks[finger] = self.nearest(hand, wrist + share * (tip - wrist))
+        return landmarks
 
 
 def best(among: NDArray[np.bool_], score: NDArray[np.floating]) -> int:

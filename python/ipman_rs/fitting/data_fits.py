@@ -211,21 +211,21 @@ class DataFit(Resumable):
     def _piece(self, number: int) -> dict[str, Any]:
         rows = self.rows[number * self.piece : (number + 1) * self.piece]
         frames = self.data[rows]
-        seen, left_out = self._seen([frames[slice(k, k + 1)] for k in range(len(frames))])
-        found: list[dict[str, Any]] = [{}] * len(seen)
-        for gender in sorted({each.gender for each in seen}):
-            index = [k for k, each in enumerate(seen) if each.gender == gender]
-            for k, row in zip(index, self._fitted([seen[k] for k in index], gender), strict=True):
-                found[k] = row
-        bad = {row["names"]: "the fit found no finite body" for row in found if not row["finite"]}
-        kept = [row for row in found if row["finite"]]
+        detected, left_out = self._detect([frames[slice(k, k + 1)] for k in range(len(frames))])
+        rows_of_fits: list[dict[str, Any]] = [{}] * len(detected)
+        for gender in sorted({each.gender for each in detected}):
+            index = [k for k, each in enumerate(detected) if each.gender == gender]
+            for k, row in zip(index, self._fitted([detected[k] for k in index], gender), strict=True):
+                rows_of_fits[k] = row
+        bad = {row["names"]: "the fit found no finite body" for row in rows_of_fits if not row["finite"]}
+        finite = [row for row in rows_of_fits if row["finite"]]
         lost = {**left_out, **bad}
-        columns = {name: np.array([row[name] for row in kept]) for name in (kept[0] if kept else ())}
+        columns = {name: np.array([row[name] for row in finite]) for name in (finite[0] if finite else ())}
         return {**columns, "left_out": np.array([*lost], np.str_), "why": np.array([*lost.values()], np.str_)}
 
-    def _seen(self, frames: Sequence[Frames]) -> tuple[list[DetectedFrame], dict[str, str]]:
+    def _detect(self, frames: Sequence[Frames]) -> tuple[list[DetectedFrame], dict[str, str]]:
         """The frames with keypoints, and why others are left out."""
-        seen: list[DetectedFrame] = []
+        detected: list[DetectedFrame] = []
         left_out: dict[str, str] = {}
         with ExitStack() as opened:
             detect: Callable[[Path], Detections] | None = None
@@ -233,16 +233,16 @@ class DataFit(Resumable):
                 name = str(frame.names[0])
                 try:
                     _check_camera(frame, self.config.moves_camera)
-                    found = self._keypoints(frame)
-                    if found is None:
+                    detections = self._keypoints(frame)
+                    if detections is None:
                         if frame.images is None or not str(frame.images[0]):
                             raise ValueError("has no keypoints and no image")
                         detect = detect or opened.enter_context(photo.detector())
-                        found = detect(self.images / str(frame.images[0]))
+                        detections = detect(self.images / str(frame.images[0]))
                     there = landmark_names(self.model(self._gender(frame)))
-                    shared = [name for name in found.names if name in there]
-                    why = missing_keypoints(shared, found.select(shared).confidence[0])
-                    if why is not None or found.image_size is None:
+                    shared = [name for name in detections.names if name in there]
+                    why = missing_keypoints(shared, detections.select(shared).confidence[0])
+                    if why is not None or detections.image_size is None:
                         raise ValueError(why or "the size of its image is not known")
                 except ImportError as error:
                     left_out[name] = f"{error}; or give keypoint files (--keypoints)"
@@ -250,8 +250,8 @@ class DataFit(Resumable):
                 except ValueError as error:
                     left_out[name] = str(error)
                     continue
-                seen.append(DetectedFrame(frame, found, self._gender(frame)))
-        return seen, left_out
+                detected.append(DetectedFrame(frame, detections, self._gender(frame)))
+        return detected, left_out
 
     def _keypoints(self, frame: Frames) -> Detections | None:
         """Of the folder of keypoint files, or else those that the data set ships."""
@@ -265,25 +265,25 @@ class DataFit(Resumable):
             raise ValueError(f"no keypoint file {places[0]}")
         size = data_frames.image_size(frame)
         given = None if size is None else (float(size[0]), float(size[1]))
-        found = keypoints.read(place, image_size=given)
-        if len(found) > 1:
-            raise ValueError(f"{place}: expected the keypoints of one frame, got {len(found)} images")
-        return found
+        detections = keypoints.read(place, image_size=given)
+        if len(detections) > 1:
+            raise ValueError(f"{place}: expected the keypoints of one frame, got {len(detections)} images")
+        return detections
 
-    def _fitted(self, seen: Sequence[DetectedFrame], gender: str) -> Iterator[dict[str, Any]]:
+    def _fitted(self, detected: Sequence[DetectedFrame], gender: str) -> Iterator[dict[str, Any]]:
         body = self.model(gender)
-        frames = [each.frame for each in seen]
+        frames = [each.frame for each in detected]
         shown, worlds = self._presented(frames, body)
         sizes = [self.size(frame) for frame in frames] if uses_terms(self.config, "measured_shape") else None
         model = ipt.BodyModel(body)
-        problem = data_frames.problem_of(model, frames, join([each.detections for each in seen]), worlds, sizes)
+        problem = data_frames.problem_of(model, frames, join([each.detections for each in detected]), worlds, sizes)
         if shown is not None:
             problem = presented.present(problem, shown, self.config.moves_camera)
         problem, variables = start.initial_state(problem, self.config.start)
-        found = fit(problem, variables, self.config)
-        for row, result in enumerate(fit_results(found, self.config, variables)):
+        fitted = fit(problem, variables, self.config)
+        for row, result in enumerate(fit_results(fitted, self.config, variables)):
             contacts = len(shown[row].contact) if shown is not None else 0
-            yield self._row(result, problem, worlds[row], seen[row], contacts)
+            yield self._row(result, problem, worlds[row], detected[row], contacts)
 
     def _presented(
         self, frames: Sequence[Frames], body: BodyModel
@@ -296,9 +296,9 @@ class DataFit(Resumable):
                                            for world, frame in zip(whole, frames, strict=True)]  # fmt: skip
         if not self.imitates:
             return None, whole
-        found = [data_frames.presented_of(frame, self.bodies.posed(frame), body) for frame in frames]
-        worlds = [world for _, world in found]
-        return [each for each, _ in found], worlds if self.config.moves_camera else whole
+        presented_frames = [data_frames.presented_of(frame, self.bodies.posed(frame), body) for frame in frames]
+        worlds = [world for _, world in presented_frames]
+        return [each for each, _ in presented_frames], worlds if self.config.moves_camera else whole
 
     def _presented_to_all(self, body: BodyModel) -> presented.PresentedBody | None:
         """The pose that all are presented, if there is one. Raises ValueError."""
@@ -322,15 +322,15 @@ class DataFit(Resumable):
         return height, DENSITY * volume if self.mass is None else self.mass
 
     def _row(
-        self, result: FitResult, problem: Problem, world: FitToWorld, seen: DetectedFrame, contacts: int
+        self, result: FitResult, problem: Problem, world: FitToWorld, detected: DetectedFrame, contacts: int
     ) -> dict[str, Any]:
         body = problem.body.body
         variables = result.candidate.variables
         arrays = {**parameters(body, variables), "full_pose": full_pose(variables, body).numpy()}
         errors = result.reprojection()
         row = {
-            "names": str(seen.frame.names[0]),
-            "genders": seen.gender,
+            "names": str(detected.frame.names[0]),
+            "genders": detected.gender,
             **data_frames.prediction(arrays, world, body),
             "finite": result.finite,
             "converged": result.converged,

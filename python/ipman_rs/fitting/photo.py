@@ -88,17 +88,17 @@ def _landmarks(
     return _four(result.pose_landmarks), _four(result.pose_world_landmarks), (width, height)
 
 
-def _four(found: Any) -> Array:
-    return np.array([[point.x, point.y, point.z, point.visibility] for point in found.landmark])
+def _four(landmarks: Any) -> Array:
+    return np.array([[point.x, point.y, point.z, point.visibility] for point in landmarks.landmark])
 
 
-def _detections(path: str | os.PathLike[str], found: Array, world: Array, size: tuple[int, int]) -> Detections:
-    kept = [index for index, name in enumerate(mediapipe.NAMES) if name is not None]
-    found, world = found[kept], world[kept]
+def _detections(path: str | os.PathLike[str], landmarks: Array, world: Array, size: tuple[int, int]) -> Detections:
+    rows = [index for index, name in enumerate(mediapipe.NAMES) if name is not None]
+    landmarks, world = landmarks[rows], world[rows]
     return Detections(
         tuple(name for name in mediapipe.NAMES if name is not None),
-        found[None, :, :2] * size,
-        found[None, :, 3].clip(0, 1),
+        landmarks[None, :, :2] * size,
+        landmarks[None, :, 3].clip(0, 1),
         (str(path),),
         np.array([size], float),
         world[None, :, :3],

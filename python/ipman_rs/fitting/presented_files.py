@@ -101,16 +101,16 @@ def read_contact(path: Path, body: BodyModel) -> NDArray[np.int64]:
         raise ValueError(f"{path}: expected contact in .json, .npz or .pkl, got {path.suffix or 'no ending'}")
     if path.suffix.lower() in ENDINGS:
         stored = _Stored.open(path)
-        found = stored.first("contact")
-        if found is None:
+        contact = stored.first("contact")
+        if contact is None:
             raise ValueError(f"{path}: expected an array contact, it has {safe_npz.list_arrays(stored.names)}")
-        return _indices(found, f"{path}: contact", body)
+        return _indices(contact, f"{path}: contact", body)
     content = read_json(path)
     try:
-        found = np.array(content["contact"] if isinstance(content, dict) else content)
+        contact = np.array(content["contact"] if isinstance(content, dict) else content)
     except (ValueError, KeyError) as error:
         raise ValueError(f"{path}: expected a list of vertices (.json), or contact in .npz or .pkl: {error}") from None
-    return _indices(found, f"{path}: contact", body)
+    return _indices(contact, f"{path}: contact", body)
 
 
 def y_up(normal: Array) -> Rotation:
@@ -297,12 +297,12 @@ def _pelvis(body: BodyModel, betas: Array | None = None, row: int = 0) -> Array:
     return body.J_template[0] + body.J_shapedirs[0, :, :count] @ betas[row if len(betas) > row else 0, :count]
 
 
-def _indices(found: Array | None, place: str, body: BodyModel) -> NDArray[np.int64]:
+def _indices(contact: Array | None, place: str, body: BodyModel) -> NDArray[np.int64]:
     """Vertices as ascending indices, from indices, pairs of them, or a flag for each vertex."""
-    if found is None or found.size == 0:
+    if contact is None or contact.size == 0:
         return np.zeros(0, np.int64)
     count = body.num_vertices
-    values: Array = found[0] if found.shape == (1, count) else found  # a flag for each vertex of a batch of one
+    values: Array = contact[0] if contact.shape == (1, count) else contact  # a flag for each vertex of a batch of one
     if values.dtype.kind == "b" or (values.shape == (count,) and np.isin(values, (0, 1)).all()):
         if values.shape != (count,):
             raise ValueError(f"{place}: expected a flag for each of {count} vertices, got shape {values.shape}")

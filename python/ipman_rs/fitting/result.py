@@ -54,10 +54,10 @@ class FitResult:
         model (). Parameters before the physics terms are named before_global_orient and so on.
         """
         problem, camera, body = self.candidate.problem, self.candidate.camera, self.candidate.problem.body.body
-        found = parameters(body, self.candidate.variables)
+        arrays = parameters(body, self.candidate.variables)
         if self.before is not None:
-            found |= {f"before_{name}": value for name, value in parameters(body, self.before).items()}
-        found |= {
+            arrays |= {f"before_{name}": value for name, value in parameters(body, self.before).items()}
+        arrays |= {
             "camera_rotation": _array(camera.rotation),
             "camera_translation": _array(camera.translation),
             "focal": _array(camera.focal),
@@ -67,13 +67,13 @@ class FitResult:
             "model": np.array(body.name),
         }
         if problem.image_size is not None:
-            found["image_size"] = _array(problem.image_size)
+            arrays["image_size"] = _array(problem.image_size)
         if problem.points is not None and problem.confidence is not None:
-            found["keypoints"] = _array(torch.cat([problem.points, problem.confidence[..., None]], dim=-1))
+            arrays["keypoints"] = _array(torch.cat([problem.points, problem.confidence[..., None]], dim=-1))
         if problem.ground is not None:
-            found["ground_normal"] = _array(problem.ground.normal.reshape(1, 3))
-            found["ground_height"] = _array(problem.ground.height.reshape(1))
-        return found
+            arrays["ground_normal"] = _array(problem.ground.normal.reshape(1, 3))
+            arrays["ground_height"] = _array(problem.ground.height.reshape(1))
+        return arrays
 
     def record(self) -> dict[str, Any]:
         """How the fit went: plain values for JSON. The reason is the last stage's that did not converge, if any."""
@@ -137,10 +137,10 @@ def fit_results(fit: Fit, config: Config, start: Variables) -> list[FitResult]:
 def parameters(body: BodyModel, variables: Variables) -> Arrays:
     """SMPL's names for the pose, shape and place of bodies, and the expression where they have one, a row each."""
     pose = _array(full_pose(variables, body))
-    found: Arrays = pose_arrays.split(pose, body)
+    arrays: Arrays = pose_arrays.split(pose, body)
     if body.num_expressions:
-        found["expression"] = _array(variables["expression"])
-    return {**found, "betas": _array(variables["betas"]), "transl": _array(variables["transl"])}
+        arrays["expression"] = _array(variables["expression"])
+    return {**arrays, "betas": _array(variables["betas"]), "transl": _array(variables["transl"])}
 
 
 def _before_physics(fit: Fit, config: Config, start: Variables) -> Variables | None:
@@ -153,10 +153,10 @@ def _before_physics(fit: Fit, config: Config, start: Variables) -> Variables | N
 
 def _stage(stage: StageReport, row: int) -> dict[str, Any]:
     terms = {name: jsonable(cost[row]) for name, cost in stage.terms.items()}
-    told = {"name": stage.name, "reason": stage.reasons[row], "iterations": stage.iterations[row], "terms": terms}
+    record = {"name": stage.name, "reason": stage.reasons[row], "iterations": stage.iterations[row], "terms": terms}
     if stage.trace is not None:
-        told["trace"] = {name: jsonable(costs) for name, costs in stage.trace[row].items()}
-    return told
+        record["trace"] = {name: jsonable(costs) for name, costs in stage.trace[row].items()}
+    return record
 
 
 def _row(variables: Variables, row: int) -> dict[str, Tensor]:

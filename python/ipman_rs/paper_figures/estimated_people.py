@@ -44,16 +44,16 @@ class FittedFolder:
 
     def names(self) -> list[str]:
         """Names of the people, in the order of their folders. ValueError if there are none."""
-        found = [record.parent.name for record in sorted(self.path.glob(f"*/{RECORD}"))] if self.path.is_dir() else []
-        if not found and (self.path / PREDICTIONS).is_file():
+        names = [record.parent.name for record in sorted(self.path.glob(f"*/{RECORD}"))] if self.path.is_dir() else []
+        if not names and (self.path / PREDICTIONS).is_file():
             raise ValueError(
                 f"{self.path}: holds the predictions for a data set; name that with --data and --path, for its images "
                 "and cameras"
             )
-        if not found:
+        if not names:
             what = "no fitted body in this folder" if self.path.is_dir() else "there is no such folder"
             raise ValueError(f"{self.path}: {what}; expected the output of ipman fit or ipman predict (NAME/{RECORD})")
-        return found
+        return names
 
     def study(self, name: str, preset: str = "paper-r") -> Study:
         """The measured body of one person. ValueError, naming the file, for what is damaged or missing."""
@@ -176,14 +176,14 @@ class Predicted:
         size = (2.0 * matrix[0, 2], 2.0 * matrix[1, 2]) if photo is None else (photo.shape[1], photo.shape[0])
         fitted = view.Fitted(camera=camera, size=size, seen=points, projected=points[:, :2], photo=photo)
         vertices = np.asarray(bodies.vertices[0], np.float64)
-        found = view.study(name, vertices, bodies.model.template, ground, preset, notes=["ground: of the data set"])
-        return replace(found, fitted=fitted)
+        analyzed = view.study(name, vertices, bodies.model.template, ground, preset, notes=["ground: of the data set"])
+        return replace(analyzed, fitted=fitted)
 
     def _frame(self, name: str) -> tuple[int, Frames]:
         for start in range(0, len(self.data), 4096):
-            found = np.flatnonzero(self.data[slice(start, start + 4096)].names == name)
-            if len(found):
-                row = start + int(found[0])
+            rows = np.flatnonzero(self.data[slice(start, start + 4096)].names == name)
+            if len(rows):
+                row = start + int(rows[0])
                 return row, self.data[slice(row, row + 1)]
         raise ValueError(f"{self.path}: predicts {name!r}, but the data set has no such frame")
 

@@ -81,9 +81,9 @@ def _row(name: str, data: DataSet, frame: str | int | None) -> int:
             raise ValueError(f"{name}: has {len(data)} frames, from 0; there is no frame {frame}")
         return frame
     for start in range(0, len(data), 4096):
-        found = np.flatnonzero(data[slice(start, start + 4096)].names == frame)
-        if len(found):
-            return start + int(found[0])
+        rows = np.flatnonzero(data[slice(start, start + 4096)].names == frame)
+        if len(rows):
+            return start + int(rows[0])
     raise ValueError(f"{name}: no frame is called {frame!r}; its first is {str(data[slice(0, 1)].names[0])!r}")
 
 
@@ -107,7 +107,7 @@ def pressure(pressed: MatBody, preset: str = "paper-r") -> PaperFigure:
     study = view.study(pressed.name, pressed.vertices, template, pressed.ground, preset)
     samples = np.asarray(ip.sample_surface(pressed.vertices, template))
     mat = pressed.measured
-    found = moyo(
+    scores = moyo(
         samples[None], pressed.ground, PressureMaps(mat.values[None], mat.origin, mat.e1, mat.e2, mat.cell),
         pressed.center[None], constants.alpha, constants.gamma,
     )  # fmt: skip
@@ -121,13 +121,13 @@ def pressure(pressed: MatBody, preset: str = "paper-r") -> PaperFigure:
         "preset": preset,
         "alpha_per_m": constants.alpha,
         "gamma_per_m": constants.gamma,
-        "iou": found.fixed.iou[0],
-        "cop_error_m": found.fixed.cop_error[0],
+        "iou": scores.fixed.iou[0],
+        "cop_error_m": scores.fixed.cop_error[0],
         "best_of_the_grid": {
-            "iou": found.best_iou.iou[0],
-            "alpha_per_m": found.best_iou.alpha[0],
-            "gamma_per_m": found.best_iou.gamma[0],
-            "cop_error_m": found.best_cop_error.cop_error[0],
+            "iou": scores.best_iou.iou[0],
+            "alpha_per_m": scores.best_iou.alpha[0],
+            "gamma_per_m": scores.best_iou.gamma[0],
+            "cop_error_m": scores.best_cop_error.cop_error[0],
         },
         "com_error_m": float(np.linalg.norm(mass - pressed.mass)),
         "center_of_mass": {"estimated": mass, "measured": pressed.mass},

@@ -83,9 +83,9 @@ def of_built_people(people: int, preset: str = "paper-r", progress: Progress = l
 
     constants = ip.presets.get(preset)
     scenes = draw_people(people, 0, progress=progress)
-    found = [_losses(scene.vertices[None], scene.template, ip.Ground.y_up(), constants) for scene in scenes]
+    columns = [_losses(scene.vertices[None], scene.template, ip.Ground.y_up(), constants) for scene in scenes]
     names = np.array([f"{number:05d}/{scene.name}" for number, scene in enumerate(scenes)])
-    values, touching = (np.concatenate(column) for column in zip(*found, strict=True))
+    values, touching = (np.concatenate(column) for column in zip(*columns, strict=True))
     return Losses("built people at rest", values, names, touching.astype(bool), preset)
 
 
@@ -122,17 +122,19 @@ def stability_distribution(losses: Sequence[Losses]) -> PaperFigure:
     if not losses:
         raise ValueError("losses: expected those of at least one data set")
     width = 0.01 if min(len(each.values) for each in losses) >= MANY else 0.02
-    found = [summary(each, width) for each in losses]
+    summaries = [summary(each, width) for each in losses]
     table = [
         {"data": each["name"], "from_mm": round(1e3 * low), "to_mm": round(1e3 * (low + width)), "share": share}
-        for each in found
+        for each in summaries
         for low, share in zip(each["bin_edges_m"], each["shares"], strict=False)
     ]
     arrays = {
         f"{key}_{number}": getattr(each, key) for number, each in enumerate(losses) for key in ("values", "frames")
     }
-    numbers = {"preset": losses[0].preset, "bin_width_m": width, "claim": "the paper: peaks at 0", "data": found}
-    return PaperFigure("stability", _draw(losses, found, width), numbers, arrays, table, [*map(_in_words, found)])
+    numbers = {"preset": losses[0].preset, "bin_width_m": width, "claim": "the paper: peaks at 0", "data": summaries}
+    return PaperFigure(
+        "stability", _draw(losses, summaries, width), numbers, arrays, table, [*map(_in_words, summaries)]
+    )
 
 
 def _in_words(about: dict[str, Any]) -> str:
@@ -163,10 +165,10 @@ def summary(losses: Losses, width: float) -> dict[str, Any]:
     }
 
 
-def _draw(losses: Sequence[Losses], found: Sequence[dict[str, Any]], width: float) -> Figure:
+def _draw(losses: Sequence[Losses], summaries: Sequence[dict[str, Any]], width: float) -> Figure:
     figure = new_figure(6.4, 3.8)
     axes = figure.subplots()
-    for number, (each, about) in enumerate(zip(losses, found, strict=True)):
+    for number, (each, about) in enumerate(zip(losses, summaries, strict=True)):
         color = SERIES[number % len(SERIES)]
         low, high = (1e3 * edge for edge in about["peak_m"])
         label = (

@@ -34,10 +34,10 @@ def compare_falls(first: Fall, second: Fall) -> tuple[MethodComparison, Simulati
     rows, others, alone = pairs(first, second)
     one, other = _rows(first.run, rows), _rows(second.run, others)
     try:
-        found = compare(one, other)
+        comparison = compare(one, other)
     except ValueError as error:
         raise FileError(second.path, f"cannot be compared with {first.path}: {error}") from error
-    return replace(found, left_out=found.left_out + alone), one, other
+    return replace(comparison, left_out=comparison.left_out + alone), one, other
 
 
 def pairs(first: GroundedBodies | Fall, second: GroundedBodies | Fall) -> tuple[list[int], list[int], int]:
@@ -64,7 +64,7 @@ def _rows(run: Simulation, rows: Sequence[int]) -> Simulation:
     return Simulation(**{name: value if name in for_all else value[list(rows)] for name, value in columns.items()})
 
 
-def comparison_record(found: MethodComparison, first: Fall, second: Fall) -> dict[str, Any]:
+def comparison_record(comparison: MethodComparison, first: Fall, second: Fall) -> dict[str, Any]:
     """Plain values for JSON: metres, shares; null where there is no verdict or no interval."""
 
     def means(value: Means) -> dict[str, Any]:
@@ -78,12 +78,12 @@ def comparison_record(found: MethodComparison, first: Fall, second: Fall) -> dic
         {
             "first": str(first.path),
             "second": str(second.path),
-            "bodies": found.bodies,
-            "left_out": found.left_out,
-            "times": found.times,
-            "stable": None if found.stable is None else means(found.stable),
-            "displacement": [means(value) for value in found.displacement],
-            "more_stable_percent": None if found.stable is None else _percent(found.stable.ratio),
+            "bodies": comparison.bodies,
+            "left_out": comparison.left_out,
+            "times": comparison.times,
+            "stable": None if comparison.stable is None else means(comparison.stable),
+            "displacement": [means(value) for value in comparison.displacement],
+            "more_stable_percent": None if comparison.stable is None else _percent(comparison.stable.ratio),
             "more_stable_percent_in_the_paper": MORE_STABLE_IN_THE_PAPER,
             "interval": "95 %, paired bootstrap over bodies, 10,000 resamples",
         }
@@ -94,14 +94,14 @@ def _percent(ratio: Interval) -> list[float]:
     return [100 * (value - 1) for value in ratio]
 
 
-def comparison_table(found: MethodComparison) -> tuple[list[str], list[list[str]]]:
+def comparison_table(comparison: MethodComparison) -> tuple[list[str], list[list[str]]]:
     """Head and lines."""
     head = ["", "A", "B", "A − B", "A / B"]
-    if found.stable is None:
+    if comparison.stable is None:
         lines = [[f"stable, %: no verdict before {VERDICT:g} s", *["–"] * 4]]
     else:
-        lines = [[f"stable after {found.times[-1]:.3g} s, %", *_cells(found.stable, 100, 0, " points")]]
-    for seconds, value in zip(found.times, found.displacement, strict=True):
+        lines = [[f"stable after {comparison.times[-1]:.3g} s, %", *_cells(comparison.stable, 100, 0, " points")]]
+    for seconds, value in zip(comparison.times, comparison.displacement, strict=True):
         lines.append([f"moved in {seconds:.3g} s, mean, mm", *_cells(value, 1e3, 1, " mm")])
     return head, lines
 
@@ -117,16 +117,16 @@ def _shown(interval: Interval, form: str, unit: str = "") -> str:
     return f"{mean}{unit}" if (low, high) == ("–", "–") else f"{mean} [{low}, {high}]{unit}"
 
 
-def comparison_lines(found: MethodComparison, first: Fall, second: Fall) -> list[str]:
+def comparison_lines(comparison: MethodComparison, first: Fall, second: Fall) -> list[str]:
     """What stands under the table."""
-    left_out = f", {found.left_out} left out: not in both, or not simulated" if found.left_out else ""
+    left_out = f", {comparison.left_out} left out: not in both, or not simulated" if comparison.left_out else ""
     lines = [
         f"A: {first.path}",
         f"B: {second.path}",
-        f"{found.bodies} bodies in both{left_out}; 95 % intervals, paired bootstrap over bodies",
+        f"{comparison.bodies} bodies in both{left_out}; 95 % intervals, paired bootstrap over bodies",
     ]
-    known = found.stable is not None and np.isfinite(found.stable.ratio.mean)
-    more = f"{_shown(Interval(*_percent(found.stable.ratio)), '+.1f')} %" if found.stable and known else "–"
+    known = comparison.stable is not None and np.isfinite(comparison.stable.ratio.mean)
+    more = f"{_shown(Interval(*_percent(comparison.stable.ratio)), '+.1f')} %" if comparison.stable and known else "–"
     paper = f"+{MORE_STABLE_IN_THE_PAPER} % (IPMAN-O against SMPLify-XMC on MoYo: a small displacement in 100 steps)"
     return [*lines, f"how many more of A's bodies are stable than of B's: {more}; printed in the paper: {paper}"]
 

@@ -52,17 +52,17 @@ CLAIMED = ("MPJPE", "PA-MPJPE", "PVE", "BoSE 10 cm", "BoSE 3 cm")  # columns of 
 PAPERS_FOUR = ("baseline", "+ ground", "+ stability", "both")
 
 
-def write(found: Found, run: Benchmark) -> Path:
+def write(blocks: Found, run: Benchmark) -> Path:
     """The files into the folder of the run; the page's path."""
     record = jsonable(
         {
             "run": {**asdict(run), "folder": None},
-            "floors": error_floors(found[0][1]),
-            "blocks": [_record(*block) for block in found],
+            "floors": error_floors(blocks[0][1]),
+            "blocks": [_record(*block) for block in blocks],
         }
     )
     write_whole(run.folder / f"{NAME}.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
-    _write_csv(found, run.folder / f"{NAME}.csv")
+    _write_csv(blocks, run.folder / f"{NAME}.csv")
     return render(run.folder)
 
 
@@ -155,26 +155,26 @@ def _differences(own: dict[str, Array], other: dict[str, Array]) -> dict[str, In
 
 def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
     """What was to be shown of this project's presets: the claim, whether the intervals say so, and the numbers."""
-    judged = []
+    lines = []
     for block in blocks:
         rows = {row["name"]: row for row in block["rows"]}
         if block["kind"] != "balanced":
             for other in ("baseline", "ours without physics"):
                 pve = rows["ours"][f"against {other}"]["PVE"]
                 claim = f"{block['name']}: ours no worse than {other}"
-                judged.append((claim, _direction(pve) in (-1, 0), f"PVE {_interval(pve)} mm"))
+                lines.append((claim, _direction(pve) in (-1, 0), f"PVE {_interval(pve)} mm"))
             continue
         row = "both" if not isinstance(block["told"], float) else "ours"
         pve, bose = (rows[row]["against baseline"][key] for key in ("PVE", "BoSE 3 cm"))
         said = f"PVE {_interval(pve)} mm, BoSE 3 cm {_interval(bose, 0)} points"
         balanced = _direction(bose) == 1
         if not isinstance(block["told"], float):
-            judged.append((f"{block['name']}: both terms better", _direction(pve) == -1 and balanced, said))
+            lines.append((f"{block['name']}: both terms better", _direction(pve) == -1 and balanced, said))
         else:
-            judged.append(
+            lines.append(
                 (f"{block['name']}: ours more balanced, PVE no worse", _direction(pve) in (-1, 0) and balanced, said)
             )
-    return judged
+    return lines
 
 
 def claims(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, str, str, list[str]]]:
@@ -189,9 +189,9 @@ def claims(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, str, str, list[s
             continue
         printed = PRINTED[rows["both"]["preset"]]
         for name, changes in printed.items():
-            told = ", ".join(f"{_number(own - baseline, 1)}" for baseline, own in changes.values())
+            differences = ", ".join(f"{_number(own - baseline, 1)}" for baseline, own in changes.values())
             cells = [_claim(_signed(changes, key), _against(rows[name], rows["baseline"], key), key) for key in CLAIMED]
-            lines.append((block["name"], f"{name} against the baseline", told, cells))
+            lines.append((block["name"], f"{name} against the baseline", differences, cells))
         if "as published" in rows:
             both = printed["both"]
             cells = [
@@ -212,17 +212,17 @@ def _signed(changes: dict[str, tuple[float, float]], key: str) -> int:
 
 def _against(row: dict[str, Any], other: dict[str, Any], key: str) -> Sequence[float | None]:
     """The difference with its interval, or without where the record has none."""
-    found = row.get(f"against {other['name']}", {}).get(key)
-    return found or [row["mean"][key] - other["mean"][key], None, None]
+    interval = row.get(f"against {other['name']}", {}).get(key)
+    return interval or [row["mean"][key] - other["mean"][key], None, None]
 
 
-def _claim(sign: int, found: Sequence[float | None], key: str) -> str:
+def _claim(sign: int, interval: Sequence[float | None], key: str) -> str:
     """The paper's word for its change, whether it is so here, and by how much."""
-    numbers = _interval(found, COMPARED[key])
+    numbers = _interval(interval, COMPARED[key])
     if sign == 0:
         return numbers
     word = "better" if (sign > 0) == key.startswith("BoSE") else "worse"
-    answer = {sign: "**yes**", -sign: "no", 0: "not shown", None: "–"}[_direction(found)]
+    answer = {sign: "**yes**", -sign: "no", 0: "not shown", None: "–"}[_direction(interval)]
     return f"{word}? {answer}, {numbers}"
 
 
@@ -250,12 +250,12 @@ def _number(value: float, digits: int) -> str:
     return f"{value:+.{digits}f}".replace("-", "−")
 
 
-def _write_csv(found: Found, path: Path) -> None:
+def _write_csv(blocks: Found, path: Path) -> None:
     """A line a body and row."""
     file = io.StringIO(newline="")
     lines = csv.writer(file)
     head: list[str] | None = None
-    for block, truth, results in found:
+    for block, truth, results in blocks:
         for result in results:
             numbers = columns(result.figures, results[0].figures)
             if head is None:

@@ -84,9 +84,9 @@ class Benchmark:
             task = task or self.task(block, truth)
             if not place.exists():
                 self.fit(task, preset, place)
-            found, seconds = load_fit(task, place)
+            bodies, seconds = load_fit(task, place)
             results.append(
-                VariantResult(row, fit_metrics(snap_to_floor(found) if row.snap else found, task, truth), seconds)
+                VariantResult(row, fit_metrics(snap_to_floor(bodies) if row.snap else bodies, task, truth), seconds)
             )
             progress()
         return truth, results
@@ -113,16 +113,16 @@ class Benchmark:
 
     def fit(self, task: Task, preset: Config, place: Path) -> None:
         begun = time.process_time()
-        found = fit(task.problem, task.starts, preset)
+        fitted = fit(task.problem, task.starts, preset)
         seconds = (time.process_time() - begun) / task.problem.num_bodies
-        reasons = np.array([stage.reasons for stage in found.stages])
-        variables: dict[str, Any] = {name: value.numpy() for name, value in found.variables.items()}
+        reasons = np.array([stage.reasons for stage in fitted.stages])
+        variables: dict[str, Any] = {name: value.numpy() for name, value in fitted.variables.items()}
         with atomic_write(place) as file:
             np.savez(file, seconds=seconds, reasons=reasons, **variables)
 
     def place(self, block: Block, preset: Config) -> Path:
         """The file of a fit: named by all that decides it."""
-        told = [
+        settings = [
             self.split,
             self.count(block.kind),
             block.kind,
@@ -130,7 +130,7 @@ class Benchmark:
             preset.terms,
             [asdict(stage) for stage in preset.stages],
         ]
-        key = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+        key = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:16]
         return self.folder / f"fit-{key}.npz"
 
 

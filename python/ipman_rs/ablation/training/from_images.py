@@ -82,19 +82,19 @@ class ImageTask:
         )
         generator = torch.Generator().manual_seed(seed)
         parts = (crops[start : start + AT_ONCE] for start in range(0, len(crops), AT_ONCE))
-        found = torch.cat([detect_keypoints(eye, tint(part, generator)) for part in parts])
-        torch.save({"backbone": eye.state_dict(), "keypoints": found}, file)
+        keypoints = torch.cat([detect_keypoints(eye, tint(part, generator)) for part in parts])
+        torch.save({"backbone": eye.state_dict(), "keypoints": keypoints}, file)
 
     def training(self, seen: Path | None = None) -> Batch:
         """With what was seen as inputs, else with crops."""
-        kept = _kept(self._place())
-        return kept if seen is None else dataclasses.replace(kept, inputs=_read(seen)["keypoints"])
+        batch = _kept(self._place())
+        return batch if seen is None else dataclasses.replace(batch, inputs=_read(seen)["keypoints"])
 
     def truth(self, seen: Path | None = None) -> Batch:
         """Of the static people: the others have no balance to be judged. Crops are turned as those that are trained on,
         or their frame would say where up is; and normalised."""
-        kept = _kept(self._test_place())
-        static = kept[kept.standing]
+        batch = _kept(self._test_place())
+        static = batch[batch.standing]
         crops = dataclasses.replace(static, inputs=normalised(static.inputs, torch.ones(len(static), 3)))
         if seen is None:
             return crops

@@ -93,7 +93,7 @@ def _stacked(figures: Sequence[PoseMetrics]) -> dict[str, Array]:
 
 def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
     """What was to be shown of our own preset: the claim, whether the figures say so, and the numbers."""
-    found = []
+    lines = []
     for block in blocks:
         rows = {row["name"]: row for row in block["rows"]}
         ours, control, baseline = rows[OURS], rows[CONTROL], rows[BASELINE]
@@ -101,22 +101,22 @@ def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
         pve, bose = difference["PVE"], difference["BoSE"]
         if block["tilt"] == 0:
             share = 100 * pve[0] / baseline["mean"]["PVE"]
-            found.append(("clean labels: PVE within +2 %", share <= 2, f"{share:+.1f} % ({_interval(pve)} mm)"))
+            lines.append(("clean labels: PVE within +2 %", share <= 2, f"{share:+.1f} % ({_interval(pve)} mm)"))
             for key in ("hover", "penetration"):
-                found.append(
+                lines.append(
                     (f"clean labels: {key} no worse", difference[key][1] <= 0, f"{_interval(difference[key])} mm")
                 )
         elif block["tilt"] == ASKED:
             title = f"labels that lean by {ASKED:g}°"
             each = ", ".join(_signed(value, 2) for value in seeds["BoSE"])  # 3.98 is not 4.0 here
-            found.append((f"{title}: BoSE 4 points up in every seed", min(seeds["BoSE"]) >= 4, each))
-            found.append((f"{title}: PVE not above HMR*'s", pve[0] <= 0, f"{_interval(pve)} mm"))
+            lines.append((f"{title}: BoSE 4 points up in every seed", min(seeds["BoSE"]) >= 4, each))
+            lines.append((f"{title}: PVE not above HMR*'s", pve[0] <= 0, f"{_interval(pve)} mm"))
             for key, gain, unit in (("PVE", pve, "mm"), ("BoSE", bose, "points")):
                 lost = control["against baseline"][key]
                 gone = lost[2] >= 0 if key == "PVE" else lost[1] <= 0
                 said = f"{_interval(lost)}, not {_interval(gain)} {unit}"
-                found.append((f"{title}: the gain in {key} is lost with a shuffled camera", gone, said))
-    return found
+                lines.append((f"{title}: the gain in {key} is lost with a shuffled camera", gone, said))
+    return lines
 
 
 def _interval(interval: Sequence[float], digits: int = 1) -> str:

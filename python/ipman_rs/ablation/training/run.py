@@ -74,8 +74,8 @@ class Benchmark:
 
     @cached_property
     def plan(self) -> Plan:
-        told = ablation_of(self.task.name).plan
-        return Plan(self._shortened(told.base), self._shortened(told.fine), told.first and self._shortened(told.first))
+        plan = ablation_of(self.task.name).plan
+        return Plan(self._shortened(plan.base), self._shortened(plan.fine), plan.first and self._shortened(plan.first))
 
     @property
     def rows(self) -> tuple[Variant, ...]:
@@ -171,14 +171,19 @@ class Benchmark:
 
     def _place(self, job: Job) -> Path:
         """The file of a result: named by all that decides it."""
-        told: list[Any] = [self.task.trained_on(), job.seed, self.plan.first and asdict(self.plan.first)]
+        settings: list[Any] = [self.task.trained_on(), job.seed, self.plan.first and asdict(self.plan.first)]
         if job.tilt is not None:
-            told += [job.tilt, job.tilt and self.lean, asdict(self.plan.base)]
+            settings += [job.tilt, job.tilt and self.lean, asdict(self.plan.base)]
         if job.row is not None:
             row = job.row
-            told += [asdict(self.plan.fine), row.preset and asdict(get(row.preset)), dict(row.weights), row.shuffled]
-            told.append(self.task.tested_on())
-        return self.folder / (f"base-{key_of(told)}.pt" if job.row is None else f"figures-{key_of(told)}.npz")
+            settings += [
+                asdict(self.plan.fine),
+                row.preset and asdict(get(row.preset)),
+                dict(row.weights),
+                row.shuffled,
+            ]
+            settings.append(self.task.tested_on())
+        return self.folder / (f"base-{key_of(settings)}.pt" if job.row is None else f"figures-{key_of(settings)}.npz")
 
 
 # The benchmark of a working process, which keeps the data of its last tilt.

@@ -59,7 +59,7 @@ def read(
     reader, content = _opened(Path(path), format)
     images = reader.images(content, source)
     notes = confidences(images)
-    rows, told = _rows(images, person, source)
+    rows, warnings = _rows(images, person, source)
     sizes, other = _sizes([image for image, _ in rows], given, source)
     points, scaled = reader.pixels([one.points for _, one in rows], sizes, source)
     worlds = [one.world for _, one in rows if one.world is not None]
@@ -78,7 +78,7 @@ def read(
         None if None in sizes else np.array(sizes, float),
         None if deep is None else deep[..., :3],
         None if deep is None else deep[..., 3],
-        (*told, *(f"{source}: {note}" for note in notes)),
+        (*warnings, *(f"{source}: {note}" for note in notes)),
     )
 
 
@@ -132,15 +132,15 @@ def _rows(images: Sequence[Image], person: int | None, source: str) -> tuple[lis
 
 def _tracks(images: Sequence[Image]) -> dict[int | str, float]:
     """How much of each track is to be seen, where a file of several images tells who is who in all of them."""
-    found: dict[int | str, float] = {}
+    presences: dict[int | str, float] = {}
     for image in images:
         tracks = [one.track for one in image.usable.values()]
         if None in tracks or len(set(tracks)) < len(tracks):
             return {}
         for one in image.usable.values():
             assert one.track is not None
-            found[one.track] = found.get(one.track, 0.0) + presence(one.points)
-    return found if len(images) > 1 and len(found) > 1 else {}
+            presences[one.track] = presences.get(one.track, 0.0) + presence(one.points)
+    return presences if len(images) > 1 and len(presences) > 1 else {}
 
 
 def _tracked(
@@ -187,10 +187,10 @@ def _assumed(images: Sequence[Image]) -> list[str]:
 
 def _named(people: Sequence[Array], layouts: Sequence[Layout], wanted: Sequence[str]) -> Array:
     """The points of each person under the names that are wanted, zeros where there is none."""
-    found = np.zeros((len(people), len(wanted), people[0].shape[1]))
+    values = np.zeros((len(people), len(wanted), people[0].shape[1]))
     place = {name: column for column, name in enumerate(wanted)}
     for row, (points, names) in enumerate(zip(people, layouts, strict=True)):
         for name, point in zip(names, points, strict=True):
             if name is not None:
-                found[row, place[name]] = point
-    return found
+                values[row, place[name]] = point
+    return values

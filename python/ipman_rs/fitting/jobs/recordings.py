@@ -178,15 +178,15 @@ def _own_notes(own: Mapping[str, object] | None, names: Sequence[str], options: 
     return [f"no marker is called {', '.join(none[:8])}{more}, as {options.markers} has it (--markers)"]
 
 
-def _marker_notes(found: MarkerFit, options: FitOptions) -> list[str]:
+def _marker_notes(fitted: MarkerFit, options: FitOptions) -> list[str]:
     """What was done with the markers that is not odd."""
     notes = []
     if options.up is not None:
         axis = ", ".join(f"{number:g}" for number in options.up)
         notes.append(f"up: ({axis}) of the file's axes, turned to y: the bodies are y up")
-    if found.unseen:
-        notes.append(f"{len(found.unseen)} markers of the file were never seen: {', '.join(found.unseen)}")
-    usual = [away for name, away in found.skin_distances.items()]
+    if fitted.unseen:
+        notes.append(f"{len(fitted.unseen)} markers of the file were never seen: {', '.join(fitted.unseen)}")
+    usual = [away for name, away in fitted.skin_distances.items()]
     if usual:
         middle = 1e3 * float(np.median(usual))
         notes.append(f"markers: {middle:.0f} mm from the skin in the median, 7 to 15 is usual (all in fit.json)")
@@ -242,7 +242,7 @@ def _fit_frames(recording: MotionInput, options: FitOptions, pace: Pace, progres
     return fitted, {}, record, rate
 
 
-def _stages(found: Fit) -> dict[str, Any]:
+def _stages(fit: Fit) -> dict[str, Any]:
     stages = [
         {
             "name": stage.name,
@@ -250,20 +250,20 @@ def _stages(found: Fit) -> dict[str, Any]:
             "iterations": int(stage.iterations[0]),
             "terms": {name: _number(cost.mean()) for name, cost in stage.terms.items()},
         }
-        for stage in found.stages
+        for stage in fit.stages
     ]
-    return {"converged": bool(found.converged.all()), "stages": stages}
+    return {"converged": bool(fit.converged.all()), "stages": stages}
 
 
-def _arrays(found: Fit, rate: float) -> dict[str, np.ndarray]:
+def _arrays(fit: Fit, rate: float) -> dict[str, np.ndarray]:
     """Parameters over time, as `ipman analyze` reads them."""
     from ..result import parameters
 
-    body = found.problem.body.body
-    arrays = parameters(body, found.variables)
+    body = fit.problem.body.body
+    arrays = parameters(body, fit.variables)
     arrays |= {"betas": arrays["betas"][:1], "mocap_frame_rate": np.array(rate), "model": np.array(body.name)}
-    if found.problem.ground is not None:
-        arrays["ground_height"] = found.problem.ground.height[:1].numpy()
+    if fit.problem.ground is not None:
+        arrays["ground_height"] = fit.problem.ground.height[:1].numpy()
     return arrays
 
 
@@ -298,8 +298,8 @@ def _number(value: Any) -> float | None:
 
 def recordings(tracks: Sequence[Path], items: Sequence[Item]) -> list[MotionInput]:
     """One of each marker file, and one of all the items, in their order."""
-    found = [MotionInput(path.stem, str(path), [path]) for path in tracks]
+    motions = [MotionInput(path.stem, str(path), [path]) for path in tracks]
     if items:
         folder = items[0].path.resolve().parent
-        found.append(MotionInput(folder.name, str(folder), [item.path for item in items], [*items]))
-    return found
+        motions.append(MotionInput(folder.name, str(folder), [item.path for item in items], [*items]))
+    return motions

@@ -23,10 +23,10 @@ def build_model(settings: Config, body: BodyModel, start: bool = True) -> HMR:
 
     ValueError for files that do not fit, and unknown backbones.
     """
-    told = settings.model
+    model_settings = settings.model
     model = _made(settings, body, start)
-    if told.start and start:
-        _go_on_from(model, told.start)
+    if model_settings.start and start:
+        _go_on_from(model, model_settings.start)
     return model
 
 
@@ -35,16 +35,18 @@ def _go_on_from(model: HMR, path: str) -> None:
     try:
         model.load_state_dict(weights)
     except RuntimeError:
-        found = f"{settings['model']['backbone']} for {settings['body']}"
-        raise ValueError(f"{path}: does not fit this model: it has the backbone {found}") from None
+        stored = f"{settings['model']['backbone']} for {settings['body']}"
+        raise ValueError(f"{path}: does not fit this model: it has the backbone {stored}") from None
 
 
 def _made(settings: Config, body: BodyModel, start: bool) -> HMR:
-    told = settings.model
-    mean = MeanParameters.read(Path(told.mean)) if told.mean and start else MeanParameters.of(body)
-    if told.backbone == "keypoints":
-        return HMR(KeypointEncoder(), WIDTH, mean, hidden=WIDTH, dropout=told.dropout)
-    model = HMR(*backbone(told.backbone, told.pretrained and start), mean, dropout=told.dropout)
-    if told.spin and start:
-        load_spin(model, told.spin)
+    model_settings = settings.model
+    mean = MeanParameters.read(Path(model_settings.mean)) if model_settings.mean and start else MeanParameters.of(body)
+    if model_settings.backbone == "keypoints":
+        return HMR(KeypointEncoder(), WIDTH, mean, hidden=WIDTH, dropout=model_settings.dropout)
+    model = HMR(
+        *backbone(model_settings.backbone, model_settings.pretrained and start), mean, dropout=model_settings.dropout
+    )
+    if model_settings.spin and start:
+        load_spin(model, model_settings.spin)
     return model

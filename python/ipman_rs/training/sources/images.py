@@ -127,18 +127,18 @@ class Images:
             if (of_regressed := _middle(joints, rows)) is not None:
                 return of_regressed, True
         of_joints = _middle(joints, HIPS)
-        found = of_body if of_joints is None else of_joints
-        if found is not None and frame.ground is not None:
+        hips = of_body if of_joints is None else of_joints
+        if hips is not None and frame.ground is not None:
             self._warn(frame, "of its joints" if of_joints is not None else f"of a {gender} body")
-        return found, False
+        return hips, False
 
     def _hips_of_body(self, frame: Frames) -> Array | None:
         """Of the labelled body; None where it has no place or is not finite."""
         if frame.pose is None or frame.betas is None or frame.transl is None:
             return None
         betas = frame.betas[0, : self.body.num_betas]
-        found = np.asarray(self.body(frame.pose[0], betas, frame.transl[0]).joints, float)[list(HIPS)]
-        return found.mean(axis=0) if np.isfinite(found).all() else None
+        hips = np.asarray(self.body(frame.pose[0], betas, frame.transl[0]).joints, float)[list(HIPS)]
+        return hips.mean(axis=0) if np.isfinite(hips).all() else None
 
     def _warn(self, frame: Frames, which: str) -> None:
         if not self._warned:
@@ -185,16 +185,16 @@ def _named(
 ) -> Array:
     """The wanted points of a frame (len(wanted), size + 1), confidence last, 0 for those it lacks or that are not
     `among`."""
-    found = np.zeros((len(wanted), size + 1))
+    values = np.zeros((len(wanted), size + 1))
     if points is None or names is None:
-        return found
+        return values
     rows = {name: row for row, name in enumerate(names)}
     for index, name in enumerate(wanted):
         if name in rows and (among is None or name in among):
             point = np.asarray(points[0, rows[name]], float)
-            found[index, :size] = point[:size]
-            found[index, size] = point[size] if len(point) > size else 1.0
-    return found
+            values[index, :size] = point[:size]
+            values[index, size] = point[size] if len(point) > size else 1.0
+    return values
 
 
 def _middle(joints: Array, rows: Sequence[int]) -> Array | None:

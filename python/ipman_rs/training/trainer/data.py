@@ -33,24 +33,24 @@ def regressor(settings: config.Config) -> JointRegressor | None:
     return read(os.path.expanduser(path)) if path else None
 
 
-def source(told: config.DataSet, settings: config.Config, body: BodyModel, seed: int = PEOPLE_SEED) -> Source:
+def source(data_set: config.DataSet, settings: config.Config, body: BodyModel, seed: int = PEOPLE_SEED) -> Source:
     """One data set. ValueError, naming it, if it cannot be opened or does not fit the model."""
     of_keypoints = settings.model.backbone == "keypoints"
-    if told.name == "people":
+    if data_set.name == "people":
         if not of_keypoints:
             raise ValueError("data: 'people' are keypoints; they need model.backbone: keypoints")
-        if not told.path.isdigit() or int(told.path) < 1:
-            raise ValueError(f"data: people: path: expected their number, got {told.path!r}")
-        return People(int(told.path), seed, **told.options)
+        if not data_set.path.isdigit() or int(data_set.path) < 1:
+            raise ValueError(f"data: people: path: expected their number, got {data_set.path!r}")
+        return People(int(data_set.path), seed, **data_set.options)
     if of_keypoints:
-        raise ValueError(f"data: {told.name}: model.backbone 'keypoints' is for 'people' alone")
+        raise ValueError(f"data: {data_set.name}: model.backbone 'keypoints' is for 'people' alone")
     import ipman_rs.data
 
     try:
-        data = ipman_rs.data.open(told.name, Path(os.path.expanduser(told.path)), **told.options)
+        data = ipman_rs.data.open(data_set.name, Path(os.path.expanduser(data_set.path)), **data_set.options)
     except (OSError, TypeError, ValueError) as error:
-        raise ValueError(f"data: {told.name}: {error}") from None
-    folder = Path(os.path.expanduser(told.images))
+        raise ValueError(f"data: {data_set.name}: {error}") from None
+    folder = Path(os.path.expanduser(data_set.images))
     regressed = bool(settings.model.regressor)
     names = keypoint_names(regressed)
     return Images(data, body, names, settings.model.size, settings.augment, folder, regressed)
@@ -58,7 +58,7 @@ def source(told: config.DataSet, settings: config.Config, body: BodyModel, seed:
 
 def training_loader(settings: config.Config, body: BodyModel, start: int, rank: int, processes: int) -> DataLoader:
     """Batches of one process from step `start` on."""
-    shares = [Share(told.name, source(told, settings, body), told.share) for told in settings.data]
+    shares = [Share(data_set.name, source(data_set, settings, body), data_set.share) for data_set in settings.data]
     steps = Steps(start, settings.steps, settings.batch, rank, processes)
     return ResumableLoader(
         Mixture(shares, settings.seed), batch_sampler=steps, collate_fn=Batch.of, num_workers=settings.workers
@@ -78,8 +78,8 @@ class ResumableLoader(DataLoader):
 def validation_loaders(settings: config.Config, body: BodyModel, rank: int, processes: int) -> list[DataLoader]:
     """A loader for each set: this process' part of it, as it is."""
     loaders = []
-    for told in settings.validation:
-        rows = ValidationSamples(source(told, settings, body, VALIDATION_SEED), rank, processes)
+    for data_set in settings.validation:
+        rows = ValidationSamples(source(data_set, settings, body, VALIDATION_SEED), rank, processes)
         loaders.append(DataLoader(rows, settings.batch, collate_fn=_good, num_workers=settings.workers))
     return loaders
 
@@ -101,5 +101,5 @@ class ValidationSamples(Dataset):
 
 
 def _good(samples: Sequence) -> Batch | None:
-    found = [sample for sample in samples if sample is not None]
-    return Batch.of(found) if found else None
+    usable = [sample for sample in samples if sample is not None]
+    return Batch.of(usable) if usable else None

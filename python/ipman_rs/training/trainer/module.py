@@ -77,13 +77,13 @@ class Training(lightning.LightningModule):
         if batch is None:
             return
         batch = batch.sound()
-        found = columns(
+        metrics = columns(
             pose_metrics(
                 self.model(batch.inputs), batch, Posing(ipt.BodyModel(self.body), (), self.loss.posing.regressor)
             )
         )
         for number, key in enumerate(COLUMNS):
-            values = torch.from_numpy(found[key][np.isfinite(found[key])])
+            values = torch.from_numpy(metrics[key][np.isfinite(metrics[key])])
             self._sums[dataloader_idx, number] += torch.tensor([values.sum(), len(values)], dtype=torch.float64)
 
     def on_validation_epoch_end(self) -> None:
@@ -91,14 +91,16 @@ class Training(lightning.LightningModule):
         sums = self.trainer.strategy.reduce(self._sums.to(self.device), reduce_op="sum")
         assert isinstance(sums, Tensor)
         means = (sums[..., 0] / sums[..., 1]).cpu()
-        for row, told in enumerate(self.settings.validation):
+        for row, data_set in enumerate(self.settings.validation):
             for number, key in enumerate(COLUMNS):
-                self.log(f"{told.name}/{row}/{key}", means[row, number].float(), rank_zero_only=False, sync_dist=False)
+                self.log(
+                    f"{data_set.name}/{row}/{key}", means[row, number].float(), rank_zero_only=False, sync_dist=False
+                )
         self.log("PVE", means[0, list(COLUMNS).index("PVE")].float())
 
 
 def _physics(settings: config.Config, posing: Posing) -> PhysicsLoss | None:
-    told = settings.physics
-    if told.preset == "none":
+    physics = settings.physics
+    if physics.preset == "none":
         return None
-    return PhysicsLoss(posing.body.template, told.preset, told.weights, told.counted)  # type: ignore[arg-type]
+    return PhysicsLoss(posing.body.template, physics.preset, physics.weights, physics.counted)  # type: ignore[arg-type]
