@@ -1,10 +1,11 @@
-"""Old names of a package, which still work and warn."""
+"""Old names of packages and modules, which still work and warn."""
 
 from __future__ import annotations
 
 import sys
 import warnings
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from typing import Any
 
 
@@ -18,3 +19,9 @@ def old_names(module: str, names: Mapping[str, str]) -> Callable[[str], Any]:
         return getattr(sys.modules[module], names[name])
 
     return __getattr__
+
+
+def old_module(name: str, new: str) -> None:
+    """Called by the module `name`: from now on the module `new` stands for it, with a DeprecationWarning."""
+    warnings.warn(f"{name} is now {new}", DeprecationWarning, stacklevel=3)
+    sys.modules[name] = import_module(new)

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import importlib
+import subprocess
+import sys
 
 import pytest
 
 import ipman_rs.data.keypoints
 import ipman_rs.data.markers
-from ipman_rs import fitting
 from ipman_rs.fitting import detection_problem
 
+MOVED = {"keypoints": ipman_rs.data.keypoints, "markers": ipman_rs.data.markers, "detected": detection_problem}
 
-@pytest.mark.parametrize(("name", "now"), [("keypoints", ipman_rs.data.keypoints), ("markers", ipman_rs.data.markers)])
-def test_moved_modules(name, now):
-    with pytest.warns(DeprecationWarning, match=f"fitting.{name} is now ipman_rs.data.{name}"):
-        assert getattr(fitting, name) is now
+
+@pytest.mark.parametrize("name", MOVED)
+@pytest.mark.parametrize("words", ["import ipman_rs.fitting.{0}", "from ipman_rs.fitting import {0}"])
+def test_moved_modules(name, words):
+    """Imported once, in any way, a module warns once."""
+    shown = f"print(sys.modules['ipman_rs.fitting.{name}'].__name__)"
+    script = f"import warnings, sys; warnings.simplefilter('always'); {words.format(name)}; {shown}"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == MOVED[name].__name__
+    said = [line for line in done.stderr.splitlines() if "DeprecationWarning" in line]
+    assert len(said) == 1
+    assert f"ipman_rs.fitting.{name} is now {MOVED[name].__name__}" in said[0]
 
 
 @pytest.mark.parametrize(
@@ -34,13 +44,3 @@ def test_changed_names(module, old, now):
     package = importlib.import_module(module)
     with pytest.warns(DeprecationWarning, match=f"{module}.{old} is now {module}.{now}"):
         assert getattr(package, old) is getattr(package, now)
-
-
-def test_the_former_module_of_detections():
-    with pytest.warns(DeprecationWarning, match="fitting.detected is now ipman_rs.fitting.detection_problem"):
-        assert fitting.detected is detection_problem
-
-
-def test_other_names_are_not_there():
-    with pytest.raises(AttributeError, match="no attribute 'key_points'"):
-        fitting.key_points  # noqa: B018

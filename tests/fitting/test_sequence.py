@@ -15,7 +15,7 @@ from ipman_rs.fitting.camera import Camera  # noqa: E402
 from ipman_rs.fitting.candidate import Candidate  # noqa: E402
 from ipman_rs.fitting.config import load  # noqa: E402
 from ipman_rs.fitting.rotations import vector  # noqa: E402
-from ipman_rs.fitting.solvers import Evaluation  # noqa: E402
+from ipman_rs.fitting.solvers import ValueAndGradient  # noqa: E402
 from ipman_rs.fitting.solvers.arrow import Arrow, solve  # noqa: E402
 from ipman_rs.fitting.terms.smoothness import Smoothness  # noqa: E402
 from tests.helpers.fit_terms_cases import body_model  # noqa: E402
@@ -162,12 +162,12 @@ def test_the_gradient_is_that_of_the_value(problem):
         values[name] = values[name][:1].expand_as(values[name]).clone()
     smooth = Smoothness(problem.body, problem.num_bodies, 5.0)
     together = sequence.SequenceObjective(problem, values, MARKERS.stages[0], MARKERS, smooth)
-    look = together.look(together.start)
+    look = together.evaluation(together.start)
     rng = np.random.default_rng(0)
     for place in [0, 4, together.size + 5, 5 * together.size + 70, -1, -8, *rng.integers(len(together.start), size=4)]:
         step = np.zeros_like(together.start)
         step[place] = 1e-5
-        ends = [together.look(together.start + sign * step).value for sign in (1, -1)]
+        ends = [together.evaluation(together.start + sign * step).value for sign in (1, -1)]
         assert look.gradient[place] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-6, abs=1e-4)
 
 
@@ -213,7 +213,7 @@ def test_the_arrow_is_solved_like_the_whole_matrix(reach, shared, rng):
 def test_the_promised_decrease_is_the_models(rng):
     root = rng.normal(size=(2, 3, 3))
     arrow = Arrow((root @ root.swapaxes(1, 2))[None], np.zeros((2, 3, 1)), np.ones((1, 1)))
-    look = Evaluation(1.0, rng.normal(size=7), arrow)
+    look = ValueAndGradient(1.0, rng.normal(size=7), arrow)
     step, promised = solve(look, 0.1)
     assert promised == pytest.approx(-look.gradient @ step - 0.5 * step @ arrow.dense() @ step)
     hopeless = replace(look, hessian=replace(arrow, corner=-np.ones((1, 1))))

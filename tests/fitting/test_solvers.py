@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from ipman_rs.fitting.solvers import SOLVERS, Evaluation, Options, minimise
+from ipman_rs.fitting.solvers import SOLVERS, Options, ValueAndGradient, minimise
 
 TIMES = np.linspace(0, 3, 20)
 VALUES = 2 * np.exp(-1.3 * TIMES) + 0.1 * np.cos(9 * TIMES)
@@ -17,7 +17,7 @@ def rosenbrock(x):
     """As residuals, so that 2 JᵀJ is a model of the Hessian."""
     r = np.array([10 * (x[1] - x[0] ** 2), 1 - x[0]])
     j = np.array([[-20 * x[0], -1.0], [10.0, 0.0]])
-    return Evaluation(float(r @ r), 2 * j @ r, 2 * j @ j.T)
+    return ValueAndGradient(float(r @ r), 2 * j @ r, 2 * j @ j.T)
 
 
 def exponential(x):
@@ -25,7 +25,7 @@ def exponential(x):
     e = np.exp(-x[1] * TIMES)
     r = x[0] * e - VALUES
     j = np.stack([e, -x[0] * TIMES * e])
-    return Evaluation(float(r @ r), 2 * j @ r, 2 * j @ j.T)
+    return ValueAndGradient(float(r @ r), 2 * j @ r, 2 * j @ j.T)
 
 
 def everywhere(function):
@@ -58,7 +58,7 @@ def test_a_step_into_the_undefined_is_undone(name):
             root = np.sqrt(x[0] - 1)
         r = np.array([root, x[0] - 1.5])
         j = np.array([[0.5 / root, 1.0]])
-        return Evaluation(float(r @ r), 2 * j @ r, 2 * j @ j.T)
+        return ValueAndGradient(float(r @ r), 2 * j @ r, 2 * j @ j.T)
 
     (outcome,) = minimise(SOLVERS[name], np.array([[9.0]]), everywhere(walled), STRICT)
     assert np.isfinite(outcome.value)
@@ -68,7 +68,7 @@ def test_a_step_into_the_undefined_is_undone(name):
 @pytest.mark.parametrize("name", SOLVERS)
 def test_an_undefined_start_is_handed_back(name):
     (outcome,) = minimise(
-        SOLVERS[name], np.array([[3.0]]), everywhere(lambda x: Evaluation(np.nan, x, np.eye(1))), STRICT
+        SOLVERS[name], np.array([[3.0]]), everywhere(lambda x: ValueAndGradient(np.nan, x, np.eye(1))), STRICT
     )
     assert (outcome.reason, outcome.converged, outcome.point) == ("not finite", False, 3.0)
 

@@ -73,7 +73,7 @@ def test_a_presented_pose_is_not_replaced():
     assert torch.equal(found["pose"], standing)
 
 
-def stages(*found: bool) -> config.Config:
+def stages(*found: bool) -> config.FitConfig:
     preset = config.load("fast")
     stage = replace(preset.stages[1], options=replace(preset.stages[1].options, iterations=3))
     return replace(preset, stages=tuple(replace(stage, find_ground=find) for find in found))

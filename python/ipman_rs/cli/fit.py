@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .errors import writing
 from .options import FLOOR, METRES, SETTING, SIZE, UNIT, UP, force, needs, of_unknown_camera, rate, subject
 
 if TYPE_CHECKING:
@@ -211,12 +212,11 @@ def _fit(
     reading = InputOptions(options.pop("person"), options.pop("image_size"), image, sequence, options["force"])
     try:
         chosen = fit_options(**options)
-        return fit_files(inputs, output, chosen, reading, Pace(*pace), resume, pictures, console.progress)
+        with writing(output, "outputs"):
+            return fit_files(inputs, output, chosen, reading, Pace(*pace), resume, pictures, console.progress)
+        raise AssertionError  # `writing` ends the command
     except ValueError as error:
         raise click.UsageError(str(error)) from error
-    except OSError as error:
-        what = f"{output}: outputs cannot be written ({error.strerror or error}); choose another folder"
-        raise click.ClickException(what) from error
 
 
 def _list_places(context: click.Context, _: click.Parameter, wanted: bool) -> None:

@@ -2,6 +2,7 @@
 
 from .json_file import parse_json as parse_json
 from .json_file import read_json as read_json
+from .names import path_list as path_list
 from .names import safe_names as safe_names
 from .regular import read_bytes as read_bytes
 from .regular import regular_file as regular_file

@@ -42,7 +42,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Config:
+class FitConfig:
     """A fit: its stages, and the options of its terms by their names."""
 
     name: str
@@ -56,12 +56,12 @@ class Config:
         return self.start.get("search") == "camera"
 
 
-def uses_terms(config: Config, *terms: str) -> bool:
+def uses_terms(config: FitConfig, *terms: str) -> bool:
     """Whether any stage has a weight for any of these terms."""
     return any(stage.weights.get(name, 0) > 0 for stage in config.stages for name in terms)
 
 
-def limit_iterations(config: Config, iterations: int) -> Config:
+def limit_iterations(config: FitConfig, iterations: int) -> FitConfig:
     """Copy of the configuration whose stages end after at most `iterations` iterations."""
     stages = (
         replace(stage, options=replace(stage.options, iterations=min(stage.options.iterations, iterations)))
@@ -70,7 +70,7 @@ def limit_iterations(config: Config, iterations: int) -> Config:
     return replace(config, stages=tuple(stages))
 
 
-def load(name: str | Path) -> Config:
+def load(name: str | Path) -> FitConfig:
     """A built-in preset by its name, or a YAML file by its path.
 
     Raises:
@@ -103,7 +103,7 @@ def search_options(start: Mapping[str, Any]) -> dict[str, Any]:
     return {name: int(value) for name, value in start.items() if name != "search"}
 
 
-def _config(name: str, content: Any) -> Config:
+def _config(name: str, content: Any) -> FitConfig:
     _known("the file", content, ("description", "solver", "start", "stages", "terms", "tolerance"))
     terms, start = _terms("terms", content.get("terms")), content.get("start") or {}
     _known("start", start, ("search", "yaws", "iterations"))
@@ -115,7 +115,7 @@ def _config(name: str, content: Any) -> Config:
     if not listed or not isinstance(listed, (list, tuple)):
         raise ValueError(f"stages: expected a list of at least one, got {_short(listed)}")
     stages = tuple(_stage(number, stage, content) for number, stage in enumerate(listed))
-    return Config(name, stages, terms, start)
+    return FitConfig(name, stages, terms, start)
 
 
 def _stage(number: int, stage: Any, content: Mapping[str, Any]) -> Stage:

@@ -34,7 +34,7 @@ from ipman_rs.files import atomic_write, regular_file, write_whole
 from ..data import keypoints
 from ..data.keypoints.detections import Detections, join
 from . import data_frames, photo, presented, start
-from .config import Config, uses_terms
+from .config import FitConfig, uses_terms
 from .data_frames import FitToWorld
 from .detection_problem import missing_keypoints
 from .fit import fit
@@ -95,7 +95,7 @@ class DataFit(Resumable):
     """
 
     source: Source
-    config: Config
+    config: FitConfig
     folder: Path
     models: Path | None = None
     body: str | None = None

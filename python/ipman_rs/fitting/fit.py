@@ -14,10 +14,10 @@ from ipman_rs.torch.threads import one_thread
 
 from . import static_gate
 from .candidate import Candidate
-from .config import Config, Stage
+from .config import FitConfig, Stage
 from .objective import Objective
 from .problem import Problem
-from .solvers import SOLVERS, Evaluation, Outcome, minimise
+from .solvers import SOLVERS, Outcome, ValueAndGradient, minimise
 from .solvers.outcome import CONVERGED
 from .variables import Variables, pack, unpack
 
@@ -63,7 +63,7 @@ class Fit:
 def fit(
     problem: Problem,
     variables: Variables,
-    config: Config,
+    config: FitConfig,
     progress: Callable[[str, int], None] | None = None,
     trace: bool = False,
 ) -> Fit:
@@ -133,17 +133,17 @@ class _Shrinking:
         self.objective = objective
         self.best: list[list[tuple[float, np.ndarray]]] = [[] for _ in self.bodies]
 
-    def __call__(self, bodies: Sequence[int], points: np.ndarray) -> list[Evaluation]:
+    def __call__(self, bodies: Sequence[int], points: np.ndarray) -> list[ValueAndGradient]:
         if 2 * len(bodies) <= len(self.bodies):
             self.bodies, self.objective = bodies, self.whole.rows(bodies)
         place = [self.bodies.index(body) for body in bodies]
         everywhere = np.repeat(points[:1], len(self.bodies), axis=0)
         everywhere[place] = points
-        looks = self.objective.models(everywhere) if self.wants_models else self.objective.looks(everywhere)
+        evaluations = self.objective.models(everywhere) if self.wants_models else self.objective.evaluations(everywhere)
         for body, point, i in zip(bodies, points, place, strict=True):
-            if looks[i].finite and (not self.best[body] or looks[i].value < self.best[body][-1][0]):
-                self.best[body].append((looks[i].value, point))
-        return [looks[i] for i in place]
+            if evaluations[i].finite and (not self.best[body] or evaluations[i].value < self.best[body][-1][0]):
+                self.best[body].append((evaluations[i].value, point))
+        return [evaluations[i] for i in place]
 
     def trace(self) -> list[dict[str, np.ndarray]]:
         """The weighted costs of each body's points that were the best so far: what its solver accepted."""

@@ -26,7 +26,7 @@ from ..data.markers import judged
 from ..data.markers.sets import Meaning
 from ..data.markers.skin_distance import mean_distances
 from .camera import Camera
-from .config import Config, load
+from .config import FitConfig, load
 from .fit import Fit
 from .landmarks import Landmarks
 from .marker_calibration import calibrate_sites, certainty
@@ -87,7 +87,7 @@ class MarkerFit:
 def fit_tracks(
     body: ipt.BodyModel,
     tracks: markers.Tracks,
-    config: Config | None = None,
+    config: FitConfig | None = None,
     *,
     every: int = 1,
     calibrate: int = 2,
@@ -147,7 +147,7 @@ def check_fit(recorded: MarkerFit) -> list[Finding]:
     return found + judge.masses(np.atleast_1d(mass), vertices.numpy())
 
 
-def _shape_kept(config: Config) -> Config:
+def _shape_kept(config: FitConfig) -> FitConfig:
     stages = [replace(stage, free=tuple(name for name in stage.free if name != "betas")) for stage in config.stages]
     return replace(config, stages=tuple(stages))
 
@@ -157,7 +157,7 @@ def _calibrated(
     tracks: markers.Tracks,
     sites: dict[str, markers.Point],
     ground: float,
-    config: Config,
+    config: FitConfig,
     times: int,
     progress: Callable[[str, int], None] | None,
 ) -> tuple[Tensor | None, dict[str, markers.Point]]:

@@ -12,7 +12,7 @@ from torch.autograd import forward_ad
 
 from .candidate import Candidate
 from .problem import Problem
-from .solvers import Evaluation
+from .solvers import ValueAndGradient
 from .terms import TERMS, LeastSquares, Term
 from .variables import Variables, unpack
 
@@ -60,13 +60,13 @@ class Objective:
         """The weighted cost (B,) of each term."""
         return {name: self._cost(name, candidate) for name in self.weights}
 
-    def looks(self, points: np.ndarray) -> list[Evaluation]:
+    def evaluations(self, points: np.ndarray) -> list[ValueAndGradient]:
         """Value and gradient at the points (B, P)."""
         rows = torch.from_numpy(points).requires_grad_()
         total = sum(self.costs(self.candidate(rows)).values(), torch.zeros(len(points), dtype=torch.float64))
-        return [Evaluation(float(v), g) for v, g in zip(*_with_gradient(total, rows), strict=True)]
+        return [ValueAndGradient(float(v), g) for v, g in zip(*_with_gradient(total, rows), strict=True)]
 
-    def models(self, points: np.ndarray) -> list[Evaluation]:
+    def models(self, points: np.ndarray) -> list[ValueAndGradient]:
         """With a model of the Hessian: 2 JᵀJ of the least squares, and for every other term, a cost c ≥ 0 seen as the
         square of √c, the gradient's ggᵀ / 2c."""
         squares = [name for name, term in self.terms.items() if isinstance(term, LeastSquares) and not term.needs_mesh]
@@ -74,7 +74,7 @@ class Objective:
         rows = torch.from_numpy(points).requires_grad_()
         candidate = self.candidate(rows)  # one for all terms: its mesh is posed once
         others = [_with_gradient(self._cost(name, candidate), rows) for name in self.weights if name not in squares]
-        looks = []
+        evaluations = []
         for body in range(len(points)):
             r, j = residuals[body], jacobians[body]
             value, gradient, hessian = float(r @ r), (2 * j @ r).numpy(), (2 * j @ j.T).numpy()
@@ -83,8 +83,8 @@ class Objective:
                 value, gradient = value + cost, gradient + slope
                 if cost > 0:
                     hessian = hessian + np.outer(slope, slope) / (2 * cost)
-            looks.append(Evaluation(value, gradient, hessian))
-        return looks
+            evaluations.append(ValueAndGradient(value, gradient, hessian))
+        return evaluations
 
     def _cost(self, name: str, candidate: Candidate) -> Tensor:
         """The weighted cost (B,) of one term."""

@@ -16,7 +16,7 @@ from ipman_rs.jsonable import jsonable
 from ipman_rs.renamed import old_names
 
 from .candidate import Candidate
-from .config import Config
+from .config import FitConfig
 from .fit import Fit, StageReport
 from .solvers.outcome import CONVERGED
 from .start import SEEN
@@ -119,7 +119,7 @@ class FitResult:
         return flags
 
 
-def fit_results(fit: Fit, config: Config, start: Variables) -> list[FitResult]:
+def fit_results(fit: Fit, config: FitConfig, start: Variables) -> list[FitResult]:
     """The bodies of a fit that began with `start`, one by one."""
     before = _before_physics(fit, config, start)
     converged = fit.converged
@@ -143,7 +143,7 @@ def parameters(body: BodyModel, variables: Variables) -> Arrays:
     return {**arrays, "betas": _array(variables["betas"]), "transl": _array(variables["transl"])}
 
 
-def _before_physics(fit: Fit, config: Config, start: Variables) -> Variables | None:
+def _before_physics(fit: Fit, config: FitConfig, start: Variables) -> Variables | None:
     """Variables with which the first stage with physics terms began."""
     for number, stage in enumerate(config.stages):
         if any(stage.weights.get(term, 0) > 0 for term in PHYSICS):

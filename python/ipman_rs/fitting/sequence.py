@@ -26,11 +26,11 @@ import ipman_rs.torch as ipt
 from ipman_rs.checks import not_negative
 
 from ..torch.threads import one_thread
-from .config import Config, Stage
+from .config import FitConfig, Stage
 from .fit import CHUNK, Fit, StageReport, run_stage, with_ground_under_body, with_static_mask
 from .objective import Objective
 from .problem import Problem
-from .solvers import Evaluation, Options, minimise
+from .solvers import Options, ValueAndGradient, minimise
 from .solvers.arrow import Arrow, solve
 from .solvers.levenberg import levenberg
 from .terms.smoothness import Smoothness
@@ -44,7 +44,7 @@ Progress = Callable[[str, int], None]
 def fit_sequence(
     problem: Problem,
     variables: Variables,
-    config: Config,
+    config: FitConfig,
     *,
     smoothness: float = 0.1,
     rate: float = 1.0,
@@ -86,7 +86,7 @@ def warm_start(
     problem: Problem,
     variables: Variables,
     stage: Stage,
-    config: Config,
+    config: FitConfig,
     rate: float = 1.0,
     done: Tensor | None = None,
     progress: Progress | None = None,
@@ -158,7 +158,7 @@ class SequenceObjective:
     Frames that are not finite where the stage begins are left out: they follow their neighbours.
     """
 
-    def __init__(self, problem: Problem, variables: Variables, stage: Stage, config: Config, smooth: Smoothness):
+    def __init__(self, problem: Problem, variables: Variables, stage: Stage, config: FitConfig, smooth: Smoothness):
         self.problem, self.variables, self.stage, self.smooth = problem, variables, stage, smooth
         own = [name for name in stage.free if name not in SHARED]
         self.free = (*own, *(name for name in stage.free if name in SHARED))
@@ -167,7 +167,7 @@ class SequenceObjective:
         chunks = [range(first, min(first + CHUNK, self.frames)) for first in range(0, self.frames, CHUNK)]
         self.parts = [(chunk, self.objective.rows(chunk)) for chunk in chunks]
         rows = pack(variables, self.free).numpy()
-        self.sound = np.array([look.finite for look in self.looks(rows)])
+        self.sound = np.array([evaluation.finite for evaluation in self.evaluations(rows)])
         self.start = np.concatenate([rows[:, : self.size].ravel(), rows[0, self.size :]])
 
     def solved(self, progress: Progress | None = None) -> tuple[dict[str, Tensor], StageReport]:
@@ -176,7 +176,7 @@ class SequenceObjective:
         options = Options(options.iterations, options.gradient, options.decrease * self.frames)
         told = None if progress is None else (lambda ended: progress(self.stage.name, ended * self.frames))
         solver = partial(levenberg, solve=solve)
-        (outcome,) = minimise(solver, self.start[None], lambda _, points: [self.look(points[0])], options, told)
+        (outcome,) = minimise(solver, self.start[None], lambda _, points: [self.evaluation(points[0])], options, told)
         rows = torch.from_numpy(self.rows(outcome.point))
         with torch.no_grad():
             costs = self.objective.costs(self.objective.candidate(rows))
@@ -191,26 +191,28 @@ class SequenceObjective:
         own = point[: self.frames * self.size].reshape(self.frames, self.size)
         return np.concatenate([own, np.tile(point[self.frames * self.size :], (self.frames, 1))], axis=1)
 
-    def looks(self, rows: np.ndarray) -> list[Evaluation]:
+    def evaluations(self, rows: np.ndarray) -> list[ValueAndGradient]:
         """Each frame by itself."""
-        return [look for chunk, part in self.parts for look in part.models(rows[chunk.start : chunk.stop])]
+        return [evaluation for chunk, part in self.parts for evaluation in part.models(rows[chunk.start : chunk.stop])]
 
-    def look(self, point: np.ndarray) -> Evaluation:
+    def evaluation(self, point: np.ndarray) -> ValueAndGradient:
         """All frames, with the smoothness between them."""
         rows, own = self.rows(point), slice(None, self.size)
-        looks = [look for look, sound in zip(self.looks(rows), self.sound, strict=True) if sound]
+        evaluations = [
+            evaluation for evaluation, sound in zip(self.evaluations(rows), self.sound, strict=True) if sound
+        ]
         gradient, hessian = np.zeros(rows.shape), np.zeros((*rows.shape, rows.shape[1]))
-        if looks:
-            gradient[self.sound] = [look.gradient for look in looks]
-            hessian[self.sound] = [look.hessian for look in looks]
-        value = sum(look.value for look in looks)
+        if evaluations:
+            gradient[self.sound] = [evaluation.gradient for evaluation in evaluations]
+            hessian[self.sound] = [evaluation.hessian for evaluation in evaluations]
+        value = sum(evaluation.value for evaluation in evaluations)
         blocks = np.zeros((len(self.smooth.band), self.frames, self.size, self.size))
         if self.smooth.band.any():
             value += self._add_smoothness(rows, gradient, hessian, blocks)
         blocks[0] += hessian[:, own, own]
         arrow = Arrow(blocks, hessian[:, own, self.size :], hessian[:, self.size :, self.size :].sum(axis=0))
         whole = np.concatenate([gradient[:, own].ravel(), gradient[:, self.size :].sum(axis=0)])
-        return Evaluation(value, whole, arrow)
+        return ValueAndGradient(value, whole, arrow)
 
     def _add_smoothness(self, rows: np.ndarray, gradient: np.ndarray, hessian: np.ndarray, blocks: np.ndarray) -> float:
         """Its value; its gradient 2 J Q x, and 2 J Q Jᵀ: own numbers into `blocks`, the rest into `hessian`."""

@@ -79,8 +79,8 @@ class _Npz:
         """The embedded body that `ipman fit` wrote down, or anny."""
         from ..body import embedded
 
-        named = self.word("model")
-        return named if named in embedded.NAMES else "anny"
+        named = self._word("model") if "model" in self.names else ""
+        return self.word("model") if named in embedded.NAMES else "anny"
 
     def kind(self) -> str | None:
         """What kind of model the parameters are of, where the file says."""
@@ -90,6 +90,7 @@ class _Npz:
             except ValueError:  # Python objects
                 continue
             if found is not None:
+                self.used.add(name)
                 return found
         return None
 

@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..files import path_list
 from ..files.errors import FileError
+from ..files.names import Paths
 from ..progress import Progress, silent
 from ..study.from_file import Request
 from . import MethodComparison, Simulation
@@ -85,7 +87,7 @@ class Falls:
 
 
 def simulate_files(
-    paths: Sequence[Path], request: Request = AS_IT_IS, films: int = 0, progress: Progress = silent, **options: Any
+    paths: Paths, request: Request = AS_IT_IS, films: int = 0, progress: Progress = silent, **options: Any
 ) -> Falls:
     """Let the bodies of each file go; a file that cannot be read is among the failures.
 
@@ -99,7 +101,7 @@ def simulate_files(
         ImportError: the engine is not installed.
     """
     result = Falls()
-    for path in paths:
+    for path in path_list(paths):
         with result._reported():
             bodies = result._read(path, request, progress)
             result.falls.append(run_falls(bodies, films, **{**OPTIONS, **options}, progress=progress))
@@ -107,8 +109,8 @@ def simulate_files(
 
 
 def compare_files(
-    path: Path,
-    other: Path,
+    path: str | Path,
+    other: str | Path,
     request: Request = AS_IT_IS,
     films: int = 0,
     progress: Progress = silent,
@@ -118,7 +120,7 @@ def compare_files(
     paired, which is among the failures. Arguments as of `simulate_files`; raises as it does."""
     result = Falls()
     both: list[GroundedBodies] = []
-    for each in (path, other):
+    for each in (Path(path), Path(other)):
         with result._reported():
             both.append(result._read(each, request, progress))
     with result._reported():

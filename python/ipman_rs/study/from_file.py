@@ -52,7 +52,7 @@ _DEFAULT = Request()
 
 
 def analyze_file(
-    path: Path, request: Request = _DEFAULT, progress: Progress = silent, arrays: Arrays | None = None
+    path: str | Path, request: Request = _DEFAULT, progress: Progress = silent, arrays: Arrays | None = None
 ) -> Study:
     """The study of the bodies in one file; warnings about them are in its flags.
 
@@ -61,6 +61,7 @@ def analyze_file(
     Raises:
         FileError: the file cannot be read, or what it holds cannot be a person (`Request.force` lets it in).
     """
+    path = Path(path)
     with collect_unit_warnings() as found:
         try:
             analysed = _analyzed(path, request, progress, arrays)

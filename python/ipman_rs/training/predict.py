@@ -28,7 +28,7 @@ from .model.keypoint_encoder import KEYPOINTS
 from .model.trained_weights import read_trained
 from .posed_estimate import HIPS, REGRESSED_HIPS, Posing, check_regressor
 from .sources import BadSample, Images
-from .trainer.config import Config, config_of
+from .trainer.config import TrainingConfig, config_of
 
 Array = NDArray[np.floating]
 
@@ -53,7 +53,7 @@ class TrainedModel:
     """A regressor of images, its configuration, and its body."""
 
     model: HMR
-    settings: Config
+    settings: TrainingConfig
     posing: Posing
 
     @classmethod

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,10 @@ import ipman_rs as ip
 from ipman_rs.body import joint_regressors, pose_arrays
 from ipman_rs.data import judge
 from ipman_rs.data import open as open_data_set
-from ipman_rs.files import image, write_whole
+from ipman_rs.files import image, path_list, write_whole
 from ipman_rs.files.errors import FileError
 from ipman_rs.files.item_folder import npz, write_files
+from ipman_rs.files.names import Paths
 from ipman_rs.io import write_mesh
 from ipman_rs.progress import Progress, silent
 from ipman_rs.study import Fitted, Study, camera_of, study
@@ -37,7 +38,7 @@ def whole_image(path: Path, pixels: NDArray[np.uint8]) -> Box:
 
 def predict_images(
     trained: TrainedModel,
-    paths: Sequence[Path],
+    paths: Paths,
     output: Path,
     box_of: BoxOf = whole_image,
     *,
@@ -61,8 +62,9 @@ def predict_images(
     """
     studies: list[Study] = []
     failures: list[FileError] = []
-    with progress("predicting", len(paths)) as step:
-        for number, path in enumerate(paths):
+    images = path_list(paths)
+    with progress("predicting", len(images)) as step:
+        for number, path in enumerate(images):
             try:
                 studies.append(_predict_image(trained, path, box_of, output, number < pictures, focal, pitch))
             except FileError as error:

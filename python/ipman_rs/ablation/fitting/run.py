@@ -15,7 +15,7 @@ import torch
 
 from ipman_rs.files import atomic_write
 
-from ...fitting.config import Config
+from ...fitting.config import FitConfig
 from ...fitting.fit import Fit, StageReport, fit
 from ...synthetic.at_rest import draw_people
 from ...torch.threads import one_thread
@@ -111,7 +111,7 @@ class Benchmark:
                 return regressed_task(truth, SPLITS[self.split])
             return presented_task(truth, SPLITS[self.split], block.told)
 
-    def fit(self, task: Task, preset: Config, place: Path) -> None:
+    def fit(self, task: Task, preset: FitConfig, place: Path) -> None:
         begun = time.process_time()
         fitted = fit(task.problem, task.starts, preset)
         seconds = (time.process_time() - begun) / task.problem.num_bodies
@@ -120,7 +120,7 @@ class Benchmark:
         with atomic_write(place) as file:
             np.savez(file, seconds=seconds, reasons=reasons, **variables)
 
-    def place(self, block: Block, preset: Config) -> Path:
+    def place(self, block: Block, preset: FitConfig) -> Path:
         """The file of a fit: named by all that decides it."""
         settings = [
             self.split,

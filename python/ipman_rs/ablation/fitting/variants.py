@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
-from ...fitting.config import Config, limit_iterations, load
+from ...fitting.config import FitConfig, limit_iterations, load
 
 PHYSICS = ("stability", "balance", "ground")
 
@@ -38,7 +38,7 @@ CALIBRATED = rows("smplify-x", "ipman-o-star", "fast")
 PRESENTED = rows("smplify-xmc", "ipman-o", "balanced")
 
 
-def config(row: Variant, iterations: int) -> Config:
+def config(row: Variant, iterations: int) -> FitConfig:
     """The preset of a row; stages that would run longer end after `iterations`."""
     preset = limit_iterations(load(row.preset), iterations)
     stages = (replace(stage, weights=_less(stage.weights, row.without)) for stage in preset.stages)

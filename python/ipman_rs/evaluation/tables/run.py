@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ipman_rs.files import path_list
+from ipman_rs.files.names import Paths
 from ipman_rs.progress import Progress, silent
 
 from . import report
@@ -88,7 +90,7 @@ class Evaluation:
 
 
 def evaluation(
-    predictions: Sequence[PathLike],
+    predictions: Paths,
     output: PathLike,
     *,
     path: PathLike,
@@ -132,7 +134,9 @@ def evaluation(
         "models": None if models is None else str(models), "regressors": tuple(map(str, regressors)),
         "preset": preset, "partial": partial, "unit": unit, "degrees": degrees, "force": force,
     }  # fmt: skip
-    files = [Path(file) for file in predictions]
+    files = path_list(predictions)
+    if not files:
+        raise ValueError("predictions: expected one file or more, got none")
     jobs = [
         Job(name, str(file), source, str(output), **shared)
         for name, file in zip(method_names(files), files, strict=True)
@@ -140,9 +144,7 @@ def evaluation(
     return Evaluation(jobs, Path(output), paper)
 
 
-def evaluate(
-    predictions: Sequence[PathLike], output: PathLike, *, progress: Progress = silent, **given: Any
-) -> report.Report:
+def evaluate(predictions: Paths, output: PathLike, *, progress: Progress = silent, **given: Any) -> report.Report:
     """Measure predictions against a data set and write the report; what `ipman evaluate` does.
 
     `given`: as of `evaluation`. Interrupted, the same call continues.

@@ -15,7 +15,7 @@ from ...body import BodyModel
 from ...data.keypoints.detections import Detections
 from .. import camera_file, config, detection_problem, presented
 from ..camera_file import KnownCamera
-from ..config import Config, uses_terms
+from ..config import FitConfig, uses_terms
 from ..presented import PresentedBody
 from ..problem import Problem
 
@@ -31,7 +31,7 @@ class FitOptions:
     markers that cannot be a person's, too). obj: write meshes as .obj, too.
     """
 
-    config: Config
+    config: FitConfig
     model: str
     focal: float | None = None
     pitch: float = 0.0
@@ -91,7 +91,7 @@ def fit_options(
     model: str = "anny-lite",
     iterations: int | None = None,
     camera: str | Path | None = None,
-    markers: Path | None = None,
+    markers: str | Path | None = None,
     **others: Any,
 ) -> FitOptions:
     """The options of a fit by a preset's name or file.
@@ -103,8 +103,11 @@ def fit_options(
 
     chosen = config.load(preset)
     if iterations is not None:
+        if iterations < 1:
+            raise ValueError(f"iterations: expected 1 or more, got {iterations}")
         chosen = config.limit_iterations(chosen, iterations)
-    if markers is not None:
-        own.read(markers, ip.load_body(model))  # before anything is fitted
+    names = None if markers is None else Path(markers)
+    if names is not None:
+        own.read(names, ip.load_body(model))  # before anything is fitted
     known = None if camera is None else camera_file.read(camera)
-    return FitOptions(chosen, model, camera=known, markers=markers, **others)
+    return FitOptions(chosen, model, camera=known, markers=names, **others)

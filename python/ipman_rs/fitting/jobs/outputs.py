@@ -55,27 +55,24 @@ def write_item(
 
 def read_item(item: Item, body: BodyModel, folder: Path, identity: str) -> FittedItem | None:
     """An item that an earlier run finished with the same input and options, or None."""
-    record = complete(folder, identity)
-    if record is None:
+    finished = read_finished(folder / f"{item.name}.npz", identity)
+    if finished is None:
         return None
-    arrays = read_arrays(folder / f"{item.name}.npz")
+    arrays, record = finished
     return FittedItem(item, arrays, posed(body, arrays), record)
 
 
-def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """All arrays of an .npz file. Raises ValueError."""
-    return {name: safe_npz.read(path, name) for name in safe_npz.names(path)}
-
-
-def complete(folder: Path, identity: str) -> dict[str, Any] | None:
-    """The record of a fit that was finished with the same input and options and has all its files, or None."""
+def read_finished(path: Path, identity: str) -> tuple[dict[str, np.ndarray], dict[str, Any]] | None:
+    """The arrays of an .npz and the record beside it, of a fit that was finished with the same input and options; None
+    where there is none, or a file of it is missing or damaged."""
     try:
-        record = read_json(folder / RECORD)
+        record = read_json(path.parent / RECORD)
         fits = record["identity"] == identity
-        there = all((folder / name).is_file() for name in record["files"])
+        there = all((path.parent / name).is_file() for name in record["files"])
+        arrays = {name: safe_npz.read(path, name) for name in safe_npz.names(path)} if fits and there else {}
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return record if fits and there else None
+    return (arrays, record) if arrays else None
 
 
 def posed(body: BodyModel, arrays: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:

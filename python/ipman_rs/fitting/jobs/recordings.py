@@ -15,7 +15,7 @@ from ...data import judge
 from ...files import read_json, safe_npz
 from ...files.errors import FileError
 from ...progress import Progress, silent
-from .outputs import RECORD, complete, read_arrays, write_files
+from .outputs import RECORD, read_finished, write_files
 
 if TYPE_CHECKING:
     from ...data.markers import Point
@@ -46,6 +46,13 @@ class Pace:
     every: int = 1
     fps: float = 30.0
 
+    def check(self) -> None:
+        """ValueError for what is no pace."""
+        if self.every < 1:
+            raise ValueError(f"--every: expected 1 or more, got {self.every}")
+        if not 0 < self.fps < float("inf"):
+            raise ValueError(f"--fps: expected more than 0, got {self.fps}")
+
 
 @dataclass(frozen=True, eq=False)
 class FittedRecording:
@@ -75,9 +82,9 @@ def fit_recording(
     path = folder / f"{recording.name}.npz"
     of_person = None if person is None else _record(output / person)
     identity = _identity(recording, options, pace, None if of_person is None else of_person["identity"])
-    record = complete(folder, identity) if resume else None
-    if record is not None:
-        return FittedRecording(path, read_arrays(path), record)
+    finished = read_finished(path, identity) if resume else None
+    if finished is not None:
+        return FittedRecording(path, *finished)
     try:
         shape = None if person is None else person_of(output / person)
         fit, arrays, record, rate = (

@@ -16,8 +16,9 @@ from typing import Any
 import ipman_rs.torch as ipt
 
 from ...data.keypoints.detections import join
-from ...files import safe_names
+from ...files import path_list, safe_names
 from ...files.errors import FileError
+from ...files.names import Paths
 from ...progress import Progress, silent
 from ...study import Study
 from .. import detection_problem, start
@@ -47,7 +48,7 @@ class Fits:
 
 
 def fit_files(
-    inputs: Sequence[str | Path],
+    inputs: Paths,
     output: str | Path,
     options: FitOptions | None = None,
     reading: InputOptions = _INPUT,
@@ -63,15 +64,20 @@ def fit_files(
 
     Raises:
         ValueError: options that fit no input or contradict each other.
+        TypeError: `options` are not `FitOptions`.
         OSError: `output` cannot be written.
     """
-    output, options = Path(output), options or fit_options()
-    items, markers, failures = read_inputs([Path(path) for path in inputs], reading)
-    needless = next((name for name in ("up", "units", "rate", "markers") if getattr(options, name) is not None), None)
+    output, options = Path(output), fit_options() if options is None else options
+    if not isinstance(options, FitOptions):
+        raise TypeError(f"options: expected FitOptions (of `fit_options`), got {type(options).__name__}")
+    if pictures < 0:
+        raise ValueError(f"pictures: expected 0 or more, got {pictures}")
+    pace.check()
+    items, markers, failures = read_inputs(path_list(inputs), reading)
+    of_markers = ("up", "units", "rate", "markers", "subject")
+    needless = next((name for name in of_markers if getattr(options, name) is not None), None)
     if needless and not markers and not failures:
         raise ValueError(f"--{needless} belongs to marker files (.trc, .c3d), of which there are none")
-    if pace.fps <= 0:
-        raise ValueError(f"--fps: expected more than 0, got {pace.fps}")
     studies: list[Study] = []
     flags: list[tuple[str, tuple[str, ...]]] = []
     for recording in recordings.recordings(markers, items if reading.sequence else []):

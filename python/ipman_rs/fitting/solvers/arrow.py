@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 from torch.linalg import cholesky, solve_triangular
 
-from .outcome import Evaluation, Vector
+from .outcome import ValueAndGradient, Vector
 
 
 @dataclass(frozen=True)
@@ -93,15 +93,15 @@ def _solve_band(factor: Tensor, right: Tensor) -> Tensor:
     return x
 
 
-def solve(look: Evaluation, damping: float) -> tuple[Vector, float]:
+def solve(evaluation: ValueAndGradient, damping: float) -> tuple[Vector, float]:
     """(H + μ diag H) step = −gradient, and the decrease that the model promises, as `levenberg` does for a matrix."""
-    arrow = look.hessian
+    arrow = evaluation.hessian
     if not isinstance(arrow, Arrow):
         raise TypeError(f"arrow.solve: expected the Hessian of a recording, got {type(arrow).__name__}")
     diagonal = arrow.diagonal
     stiff = damping * np.maximum(diagonal, 1e-6 * diagonal.max(initial=0) + 1e-12)
     try:
-        step = arrow.solve(stiff, -look.gradient)
+        step = arrow.solve(stiff, -evaluation.gradient)
     except RuntimeError:  # torch's LinAlgError: not positive definite: more damping
-        return np.zeros_like(look.gradient), 0.0
-    return step, float(0.5 * (step * (stiff * step - look.gradient)).sum())
+        return np.zeros_like(evaluation.gradient), 0.0
+    return step, float(0.5 * (step * (stiff * step - evaluation.gradient)).sum())

@@ -6,11 +6,11 @@ from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
-from .outcome import Evaluation, Options, Outcome, Vector
+from .outcome import Options, Outcome, ValueAndGradient, Vector
 
-Solver = Generator[Vector, Evaluation, Outcome]
-# The bodies' indices and their points (n, P) -> what each looks like.
-Evaluate = Callable[[Sequence[int], Vector], Sequence[Evaluation]]
+Solver = Generator[Vector, ValueAndGradient, Outcome]
+# The bodies' indices and their points (n, P) -> the value and gradient of each.
+Evaluate = Callable[[Sequence[int], Vector], Sequence[ValueAndGradient]]
 
 
 def minimise(
@@ -26,10 +26,10 @@ def minimise(
     outcomes: dict[int, Outcome] = {}
     while points:
         bodies = sorted(points)
-        looks = evaluate(bodies, np.stack([points[body] for body in bodies]))
-        for body, look in zip(bodies, looks, strict=True):
+        evaluations = evaluate(bodies, np.stack([points[body] for body in bodies]))
+        for body, evaluation in zip(bodies, evaluations, strict=True):
             try:
-                points[body] = running[body].send(look)
+                points[body] = running[body].send(evaluation)
             except StopIteration as stop:
                 outcomes[body] = stop.value
                 del points[body]

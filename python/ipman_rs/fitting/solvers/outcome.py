@@ -23,7 +23,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class ValueAndGradient:
     """The objective at a point: value, gradient (P,), and a model of the Hessian for solvers that need it: (P, P), or a
     structured one that has its own `solve`."""
 

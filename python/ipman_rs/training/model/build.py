@@ -15,10 +15,10 @@ from .spin_checkpoint import load_spin
 from .trained_weights import read_trained
 
 if TYPE_CHECKING:
-    from ..trainer.config import Config
+    from ..trainer.config import TrainingConfig
 
 
-def build_model(settings: Config, body: BodyModel, start: bool = True) -> HMR:
+def build_model(settings: TrainingConfig, body: BodyModel, start: bool = True) -> HMR:
     """start: with the weights and mean parameters that it is to start from; without, those of a checkpoint follow.
 
     ValueError for files that do not fit, and unknown backbones.
@@ -39,7 +39,7 @@ def _go_on_from(model: HMR, path: str) -> None:
         raise ValueError(f"{path}: does not fit this model: it has the backbone {stored}") from None
 
 
-def _made(settings: Config, body: BodyModel, start: bool) -> HMR:
+def _made(settings: TrainingConfig, body: BodyModel, start: bool) -> HMR:
     model_settings = settings.model
     mean = MeanParameters.read(Path(model_settings.mean)) if model_settings.mean and start else MeanParameters.of(body)
     if model_settings.backbone == "keypoints":

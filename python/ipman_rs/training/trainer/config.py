@@ -19,7 +19,7 @@ SCHEDULES = ("constant", "cosine")
 
 
 @dataclass(frozen=True)
-class DataSet:
+class DataSettings:
     """One data set. name: of `ipman_rs.data`, or "people" (built ones, seen as keypoints; path is then their number).
     share: of the training samples. images: the folder in which the paths of images begin. options: of the data set,
     such as `split`."""
@@ -58,14 +58,14 @@ class Model:
 
 
 @dataclass(frozen=True)
-class Config:
+class TrainingConfig:
     """batch: of each process. rate: of Adam; schedule: "constant", or "cosine", which lets it fall to a tenth along
     half a cosine until the last step. clip: the largest norm of a gradient; usual ones are about a hundred, and one of
     2,500 was seen to throw a run off for good. devices, nodes, accelerator, precision: Lightning's. workers: processes
     that load data. validate, save, log: every so many steps; validate: 0 for never."""
 
-    data: tuple[DataSet, ...]
-    validation: tuple[DataSet, ...] = ()
+    data: tuple[DataSettings, ...]
+    validation: tuple[DataSettings, ...] = ()
     body: str = "anny-lite"
     model: Model = field(default_factory=Model)
     loss: Weights = field(default_factory=Weights)
@@ -87,7 +87,7 @@ class Config:
     precision: str = "32-true"
 
 
-def load(path: Path, changes: Sequence[str] = ()) -> Config:
+def load(path: Path, changes: Sequence[str] = ()) -> TrainingConfig:
     """A YAML file, changed by `name=value` or `group.name=value`.
 
     ValueError, naming the file and the entry, for what is unknown or of the wrong kind.
@@ -103,9 +103,9 @@ def load(path: Path, changes: Sequence[str] = ()) -> Config:
         raise ValueError(f"{path}: {error}") from None
 
 
-def config_of(content: Mapping[str, Any]) -> Config:
+def config_of(content: Mapping[str, Any]) -> TrainingConfig:
     """A configuration from plain dictionaries. ValueError as `load`."""
-    made = _made(Config, content, "")
+    made = _made(TrainingConfig, content, "")
     if not made.data:
         raise ValueError("data: expected at least one data set to train on, got none")
     if made.physics.preset != "none" and made.physics.preset not in PRESETS:
@@ -130,7 +130,7 @@ def config_of(content: Mapping[str, Any]) -> Config:
     return made
 
 
-def as_dict(settings: Config) -> dict[str, Any]:
+def as_dict(settings: TrainingConfig) -> dict[str, Any]:
     """The configuration as dictionaries and lists, for files."""
     content = dataclasses.asdict(settings)
     return {**content, "data": list(content["data"]), "validation": list(content["validation"])}
@@ -170,10 +170,10 @@ def _made(kind: Any, content: Any, place: str) -> Any:
 def _value(hint: Any, value: Any, place: str) -> Any:
     if dataclasses.is_dataclass(hint):
         return _made(hint, value, place)
-    if hint == tuple[DataSet, ...]:
+    if hint == tuple[DataSettings, ...]:
         if not isinstance(value, (list, tuple)):
             raise ValueError(f"{place}: expected a list of data sets, got {value!r}")
-        return tuple(_made(DataSet, one, f"{place}[{number}]") for number, one in enumerate(value))
+        return tuple(_made(DataSettings, one, f"{place}[{number}]") for number, one in enumerate(value))
     if hint is float and isinstance(value, (int, float)) and not isinstance(value, bool):
         if math.isnan(value) or (math.isinf(value) and place != "clip"):  # a clip of infinity is none
             raise ValueError(f"{place}: expected a finite number, got {value!r}")

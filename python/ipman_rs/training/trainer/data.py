@@ -27,13 +27,15 @@ def keypoint_names(regressed: bool = False) -> tuple[str, ...]:
     return (*KEYPOINTS, *REGRESSED) if regressed else KEYPOINTS
 
 
-def regressor(settings: config.Config) -> JointRegressor | None:
+def regressor(settings: config.TrainingConfig) -> JointRegressor | None:
     """What `model.regressor` names. ValueError, naming the file, if it cannot be read."""
     path = settings.model.regressor
     return read(os.path.expanduser(path)) if path else None
 
 
-def source(data_set: config.DataSet, settings: config.Config, body: BodyModel, seed: int = PEOPLE_SEED) -> Source:
+def source(
+    data_set: config.DataSettings, settings: config.TrainingConfig, body: BodyModel, seed: int = PEOPLE_SEED
+) -> Source:
     """One data set. ValueError, naming it, if it cannot be opened or does not fit the model."""
     of_keypoints = settings.model.backbone == "keypoints"
     if data_set.name == "people":
@@ -56,7 +58,9 @@ def source(data_set: config.DataSet, settings: config.Config, body: BodyModel, s
     return Images(data, body, names, settings.model.size, settings.augment, folder, regressed)
 
 
-def training_loader(settings: config.Config, body: BodyModel, start: int, rank: int, processes: int) -> DataLoader:
+def training_loader(
+    settings: config.TrainingConfig, body: BodyModel, start: int, rank: int, processes: int
+) -> DataLoader:
     """Batches of one process from step `start` on."""
     shares = [Share(data_set.name, source(data_set, settings, body), data_set.share) for data_set in settings.data]
     steps = Steps(start, settings.steps, settings.batch, rank, processes)
@@ -75,7 +79,7 @@ class ResumableLoader(DataLoader):
         pass
 
 
-def validation_loaders(settings: config.Config, body: BodyModel, rank: int, processes: int) -> list[DataLoader]:
+def validation_loaders(settings: config.TrainingConfig, body: BodyModel, rank: int, processes: int) -> list[DataLoader]:
     """A loader for each set: this process' part of it, as it is."""
     loaders = []
     for data_set in settings.validation:

@@ -23,7 +23,7 @@ from . import config, data
 class Training(lightning.LightningModule):
     """Everything that a configuration decides."""
 
-    def __init__(self, settings: config.Config) -> None:
+    def __init__(self, settings: config.TrainingConfig) -> None:
         super().__init__()
         self.settings = settings
         regressor = data.regressor(settings)
@@ -99,7 +99,7 @@ class Training(lightning.LightningModule):
         self.log("PVE", means[0, list(COLUMNS).index("PVE")].float())
 
 
-def _physics(settings: config.Config, posing: Posing) -> PhysicsLoss | None:
+def _physics(settings: config.TrainingConfig, posing: Posing) -> PhysicsLoss | None:
     physics = settings.physics
     if physics.preset == "none":
         return None

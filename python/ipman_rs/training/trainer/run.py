@@ -14,7 +14,7 @@ from lightning.pytorch.loggers import TensorBoardLogger
 from ipman_rs.files import write_whole
 
 from .checkpoints import LastCheckpoint, WholeFiles
-from .config import Config, as_dict, load
+from .config import TrainingConfig, as_dict, load
 from .curve import Curve
 from .module import Training
 
@@ -22,7 +22,7 @@ LAST, BEST, SETTINGS = "last.ckpt", "best", "config.yaml"
 FREE = ("steps", "devices", "nodes", "accelerator", "workers", "validate", "save", "log")  # may change when going on
 
 
-def train(settings: Config, folder: Path) -> Path:
+def train(settings: TrainingConfig, folder: Path) -> Path:
     """Train as configured; the path of the last checkpoint.
 
     A folder with a checkpoint of the same configuration is gone on with: the same losses follow as if nothing had
@@ -64,7 +64,7 @@ def train(settings: Config, folder: Path) -> Path:
     return last
 
 
-def _keep(settings: Config, folder: Path) -> None:
+def _keep(settings: TrainingConfig, folder: Path) -> None:
     """Write down the configuration; ValueError if the folder has a run of another one."""
     import yaml
 
@@ -74,7 +74,7 @@ def _keep(settings: Config, folder: Path) -> None:
         before = load(path)
         same = {name: getattr(before, name) for name in FREE if name != "steps" or before.schedule == "constant"}
         changed = dataclasses.replace(settings, **same)
-        for entry in dataclasses.fields(Config):
+        for entry in dataclasses.fields(TrainingConfig):
             if getattr(changed, entry.name) != getattr(before, entry.name):
                 raise ValueError(
                     f"{folder}: has a run with another {entry.name} ({path}); choose another folder, or remove it"
@@ -82,7 +82,7 @@ def _keep(settings: Config, folder: Path) -> None:
     write_whole(path, yaml.safe_dump(as_dict(settings), sort_keys=False))
 
 
-def _callbacks(settings: Config, folder: Path) -> list[lightning.Callback]:
+def _callbacks(settings: TrainingConfig, folder: Path) -> list[lightning.Callback]:
     found: list[lightning.Callback] = [Curve(folder)]
     validated = settings.validate if settings.validation else 0
     if validated:

@@ -1,0 +1,5 @@
+"""The former place of `ipman_rs.data.markers`."""
+
+from ..renamed import old_module
+
+old_module(__name__, "ipman_rs.data.markers")
