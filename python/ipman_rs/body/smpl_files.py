@@ -1,6 +1,7 @@
 """Model files of SMPL (24 joints), SMPL+H (52) and SMPL-X (55), as `.npz` or `.pkl`.
 
-They have the same arrays and do not name their joints: which of the three a file is, the number of its joints says.
+They have the same arrays and do not name their joints. A file whose first 22 joints are SMPL's tree is one of the three;
+which one, the number of its joints says.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from ..files import safe_npz
 from . import joints
 from .body_format import BodyFormat
 from .hands import JOINTS_PER_HAND, Hands
-from .joints import BODY, LEFT_HAND, RIGHT_HAND
+from .joints import BODY, LEFT_HAND, RIGHT_HAND, SMPL_PARENTS
 from .model import BodyModel
 from .model_file import ModelFile
 
@@ -131,7 +132,8 @@ def _hands(file: ModelFile, flat: bool) -> Hands:
 def _format(name: str, title: str, names: tuple[str, ...], **more: Any) -> BodyFormat:
     def matches(file: ModelFile) -> bool:
         try:
-            return "v_template" in file.keys and len(_parents(file)) == len(names)
+            parents = _parents(file) if "v_template" in file.keys else []
+            return len(parents) == len(names) and (parents[1 : len(BODY)] == SMPL_PARENTS[1 : len(BODY)]).all()
         except ValueError:
             return False
 
