@@ -133,7 +133,7 @@ def _format(name: str, title: str, names: tuple[str, ...], **more: Any) -> BodyF
     def matches(file: ModelFile) -> bool:
         try:
             parents = _parents(file) if "v_template" in file.keys else []
-            return len(parents) == len(names) and (parents[1 : len(BODY)] == SMPL_PARENTS[1 : len(BODY)]).all()
+            return len(parents) == len(names) and tuple(parents[1 : len(BODY)]) == SMPL_PARENTS[1 : len(BODY)]
         except ValueError:
             return False
 

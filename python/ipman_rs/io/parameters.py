@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..body import formats, pose_arrays, rotations
+from ..body import pose_arrays, rotations
 from ..body.joints import LEFT_HAND, RIGHT_HAND
 from ..body.sequence import Index, PosedSequence, rows_of
 from ..data import check, judge
@@ -19,6 +19,7 @@ from ..files.errors import FileError
 from ..files.mesh import repair
 from .body_sequence import Y_UP, Z_UP, BodySequence
 from .parts import match_body
+from .stored_arrays import StoredArrays
 
 _EXPECTED = (
     "expected vertices and faces, or poses/betas/trans (AMASS), or global_orient/body_pose/betas/transl, or "
@@ -28,74 +29,7 @@ _VERTICES = ("vertices", "verts", "v")
 _BETAS = ("betas", "shape", "shapes", "smpl_betas")
 _TRANSLATIONS = ("trans", "transl", "Th", "smpl_trans", "cam_trans")
 _FRAME_RATES = ("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate", "framerate")
-_KINDS = ("model", "model_type", "surface_model_type", "body")
 _MODEL_BETAS = 10  # that a model file is asked for at least
-
-
-class _Npz:
-    """Arrays of a file by name; nothing in it is executed. `arrays`: what the file holds, where that is in memory;
-    `used`: the names of those that were read."""
-
-    def __init__(self, path: Path, arrays: Mapping[str, np.ndarray] | None = None) -> None:
-        self.path, self.arrays = path, arrays
-        self.names = safe_npz.names(path) if arrays is None else {*arrays}
-        self.used: set[str] = set()
-
-    def read(self, name: str) -> np.ndarray:
-        return safe_npz.read(self.path, name) if self.arrays is None else self.arrays[name]
-
-    def shape_of(self, name: str) -> tuple[int, ...]:
-        return safe_npz.shape_of(self.path, name) if self.arrays is None else self.arrays[name].shape
-
-    def first(self, *names: str) -> np.ndarray | None:
-        """The first of these that is there, as numbers."""
-        name = self.name(*names)
-        if name is None:
-            return None
-        array = self.read(name)
-        if array.dtype.kind not in "fiu":
-            raise FileError(self.path, f"{name} holds {array.dtype}, not numbers; save plain numbers")
-        self.used.add(name)
-        return array
-
-    def name(self, *names: str) -> str | None:
-        """The first of these that is there."""
-        return next((name for name in names if name in self.names), None)
-
-    def word(self, name: str) -> str:
-        """A word, which some files have as bytes; empty where there is none."""
-        if name not in self.names:
-            return ""
-        self.used.add(name)
-        return self._word(name)
-
-    def _word(self, name: str) -> str:
-        value = self.read(name).reshape(-1)
-        if value.dtype.kind not in "US" or len(value) != 1:
-            return ""
-        return value[0].decode("latin1") if value.dtype.kind == "S" else str(value[0])
-
-    def model(self) -> str:
-        """The embedded body that `ipman fit` wrote down, or anny."""
-        from ..body import embedded
-
-        named = self._word("model") if "model" in self.names else ""
-        return self.word("model") if named in embedded.NAMES else "anny"
-
-    def kind(self) -> str | None:
-        """What kind of model the parameters are of, where the file says."""
-        for name in (name for name in _KINDS if name in self.names):
-            try:
-                found = formats.kind_named(self._word(name))
-            except ValueError:  # Python objects
-                continue
-            if found is not None:
-                self.used.add(name)
-                return found
-        return None
-
-    def unused(self) -> tuple[str, ...]:
-        return tuple(sorted(self.names - self.used))
 
 
 def read_npz(
@@ -113,7 +47,7 @@ def read_npz(
     arrays: what the file holds, by a caller that has just written it.
     """
     try:
-        stored = _Npz(path, arrays)
+        stored = StoredArrays(path, arrays)
         model = model or stored.model()
         has_pose = bool(stored.names & pose_arrays.names())
         if stored.names & {*_VERTICES} and not (has_pose and _are_of_another_body(stored, model)):
@@ -127,7 +61,7 @@ def read_npz(
     return replace(found, unused=stored.unused())
 
 
-def _no_bodies(stored: _Npz) -> str:
+def _no_bodies(stored: StoredArrays) -> str:
     """What is there instead."""
     for name in sorted(stored.names):
         try:
@@ -138,7 +72,7 @@ def _no_bodies(stored: _Npz) -> str:
     return f"holds {safe_npz.list_arrays(stored.names)}; {_EXPECTED}"
 
 
-def _are_of_another_body(stored: _Npz, model: str) -> bool:
+def _are_of_another_body(stored: StoredArrays, model: str) -> bool:
     """Whether vertices come without faces, and are not those of the model: then the pose beside them is read."""
     import ipman_rs as ip
 
@@ -148,7 +82,7 @@ def _are_of_another_body(stored: _Npz, model: str) -> bool:
     return len(shape) < 2 or shape[-2] != ip.load_body(model).num_vertices
 
 
-def _read_vertices(stored: _Npz, model: str, unit: float, rate: float | None) -> BodySequence:
+def _read_vertices(stored: StoredArrays, model: str, unit: float, rate: float | None) -> BodySequence:
     import ipman_rs as ip
 
     vertices, faces = stored.first(*_VERTICES), stored.first("faces", "f")
@@ -186,7 +120,7 @@ def _read_vertices(stored: _Npz, model: str, unit: float, rate: float | None) ->
     )  # fmt: skip
 
 
-def _read_parameters(stored: _Npz, model: str, unit: float, degrees: bool, rate: float | None) -> BodySequence:
+def _read_parameters(stored: StoredArrays, model: str, unit: float, degrees: bool, rate: float | None) -> BodySequence:
     easymocap = "Rh" in stored.names
     amass = not easymocap and bool(stored.names & {"poses", "root_orient"})
     body = _body(stored, model, amass)
@@ -219,7 +153,7 @@ def _read_parameters(stored: _Npz, model: str, unit: float, degrees: bool, rate:
     )  # fmt: skip
 
 
-def _body(stored: _Npz, model: str, amass: bool) -> Any:
+def _body(stored: StoredArrays, model: str, amass: bool) -> Any:
     """The body model, with as many betas as the file has, if it has so many."""
     import ipman_rs as ip
 
@@ -229,7 +163,7 @@ def _body(stored: _Npz, model: str, amass: bool) -> Any:
     return ip.load_body(model, num_betas=max((_MODEL_BETAS, *width)), flat_hand_mean=amass)
 
 
-def _translations(stored: _Npz, frames: int, unit: float) -> np.ndarray | None:
+def _translations(stored: StoredArrays, frames: int, unit: float) -> np.ndarray | None:
     """Rows (1 or T, 3) m."""
     name = stored.name(*_TRANSLATIONS)
     trans = stored.first(*_TRANSLATIONS)
@@ -241,7 +175,7 @@ def _translations(stored: _Npz, frames: int, unit: float) -> np.ndarray | None:
 
 
 def _about_the_origin(
-    stored: _Npz, body: Any, betas: np.ndarray | None, trans: np.ndarray | None, degrees: bool
+    stored: StoredArrays, body: Any, betas: np.ndarray | None, trans: np.ndarray | None, degrees: bool
 ) -> np.ndarray:
     """EasyMocap turns the posed body about the origin of its world, and SMPL about the pelvis p.
 
@@ -292,7 +226,7 @@ def _kind(joints: list[str]) -> str:
     return " or ".join((["fingers"] if fingers else []) + others)
 
 
-def _betas(stored: _Npz, body: Any, frames: int, of_smpl: bool) -> tuple[np.ndarray | None, list[str]]:
+def _betas(stored: StoredArrays, body: Any, frames: int, of_smpl: bool) -> tuple[np.ndarray | None, list[str]]:
     """The shape, rows (1 or T, B), and what of it was used."""
     import ipman_rs as ip
 
@@ -312,7 +246,7 @@ def _betas(stored: _Npz, body: Any, frames: int, of_smpl: bool) -> tuple[np.ndar
     return rows[:, :used], [f"{said}, taken as those of {body.name}" if embedded else said]
 
 
-def _expression(stored: _Npz, body: Any, frames: int) -> tuple[np.ndarray | None, list[str]]:
+def _expression(stored: StoredArrays, body: Any, frames: int) -> tuple[np.ndarray | None, list[str]]:
     """The face's expression, rows (1 or T, E), and what of it was left out."""
     given = stored.first("expression")
     if given is None or not given.any():
@@ -324,14 +258,14 @@ def _expression(stored: _Npz, body: Any, frames: int) -> tuple[np.ndarray | None
     return rows[:, :used], [f"expression: the first {used} of {rows.shape[1]}"] if used < rows.shape[1] else []
 
 
-def _rows(stored: _Npz, name: str, given: np.ndarray, frames: int) -> np.ndarray:
+def _rows(stored: StoredArrays, name: str, given: np.ndarray, frames: int) -> np.ndarray:
     rows = given.reshape(-1, given.shape[-1]) if given.ndim else given.reshape(1, 1)
     if len(rows) not in (1, frames):
         raise FileError(stored.path, f"{name} has shape {given.shape}; expected one row, or {frames}")
     return rows
 
 
-def _seconds(stored: _Npz, frames: int, rate: float | None) -> tuple[np.ndarray | None, list[Finding]]:
+def _seconds(stored: StoredArrays, frames: int, rate: float | None) -> tuple[np.ndarray | None, list[Finding]]:
     """When the frames are, by the user's rate or else the file's, and what is odd about that."""
     given = stored.first(*_FRAME_RATES)
     if frames < 2 or (given is None and rate is None):
@@ -368,14 +302,14 @@ def _columns(pieces: Sequence[pose_arrays.Piece]) -> list[Finding]:
     return [Finding("odd", said, "save rotation vectors or matrices if these are rows")]
 
 
-def _places(stored: _Npz, trans: np.ndarray | None, seconds: np.ndarray | None) -> list[Finding]:
+def _places(stored: StoredArrays, trans: np.ndarray | None, seconds: np.ndarray | None) -> list[Finding]:
     if trans is None:
         return []
     name = str(stored.name(*_TRANSLATIONS))
     return check.near_origin(name, trans[check.evenly(len(trans))]) or judge.speed(name, trans, seconds)
 
 
-def _gender(stored: _Npz, body: Any, model: str) -> list[Finding]:
+def _gender(stored: StoredArrays, body: Any, model: str) -> list[Finding]:
     """Whether the betas are of the model's gender."""
     from ..body import embedded, smpl_files
 
@@ -389,7 +323,7 @@ def _gender(stored: _Npz, body: Any, model: str) -> list[Finding]:
     return [Finding("odd", what, f"--body with the {said} model")]
 
 
-def _pass_over_repeated(stored: _Npz, pieces: Sequence[pose_arrays.Piece]) -> None:
+def _pass_over_repeated(stored: StoredArrays, pieces: Sequence[pose_arrays.Piece]) -> None:
     """Pieces of a pose that are in the whole pose beside them, too, are not missed."""
     for piece in pieces:
         known = pose_arrays.pieces_of()
