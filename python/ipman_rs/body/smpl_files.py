@@ -1,7 +1,7 @@
 """Model files of SMPL (24 joints), SMPL+H (52) and SMPL-X (55), as `.npz` or `.pkl`.
 
-They have the same arrays and do not name their joints. A file whose first 22 joints are those of SMPL's tree is one of the
-three; which one, the number of its joints says.
+They have the same arrays and do not name their joints. A file whose first 22 joints are those of SMPL's tree is one of
+the three; which one, the number of its joints says.
 """
 
 from __future__ import annotations
