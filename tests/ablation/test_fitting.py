@@ -64,6 +64,7 @@ def test_balanced_bodies_rest_on_the_floor(drawn, known):
     assert set(known.family) <= set(at_rest.FAMILIES)
 
 
+@pytest.mark.slow
 def test_controls_are_not_balanced():
     tipped = truth.Truth.of(at_rest.draw_people(4, 5, "tipped"))
     assert (tipped.margin_3 < 0).mean() >= 0.75

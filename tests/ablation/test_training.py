@@ -71,6 +71,7 @@ def test_sinking_does_not_pass_the_strict_figure(truth, posing):
     assert np.array_equal(usual.strict, sunk.strict)
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_mean_and_tell_a_difference():
     draw = np.random.default_rng(0)
     baseline = draw.normal(size=(3, 200))

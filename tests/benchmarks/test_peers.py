@@ -84,6 +84,7 @@ def test_metrics(template):
         assert relative_error(ours, theirs) < 1e-11
 
 
+@pytest.mark.slow
 def test_skinning():
     found = []
     for make in (skinning.Smplx, skinning.TorchSkinning, skinning.OurSkinning):

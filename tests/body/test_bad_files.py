@@ -153,6 +153,7 @@ def test_sparse_matrix_that_claims_too_much(tmp_path, arrays, write_upstream):
     refused(path, "J_regressor: expected shape")
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(st.data())
 def test_any_damage_gives_a_model_or_a_value_error(tmp_path_factory, data):

@@ -18,6 +18,7 @@ def smplx():
     return pytest.importorskip("smplx")  # brings torch
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("num_joints", [24, 52, 55])
 @pytest.mark.parametrize(("protocol", "python2"), [(0, False), (2, True), (2, False), (4, False), (5, False)])
 def test_upstream_pickle_equals_plain_npz(num_joints, protocol, python2, lifelike_arrays, write_upstream, tmp_path):
@@ -42,6 +43,7 @@ def test_written_pickle_is_a_real_one(lifelike_arrays, write_upstream):
     np.testing.assert_array_equal(content["J_regressor"].toarray(), arrays["J_regressor"])
 
 
+@pytest.mark.slow
 def test_smpl_against_smplx_package(smplx, random_arrays, tmp_path):
     import torch
 
@@ -77,6 +79,7 @@ def smplx_file(random_arrays, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flat", [False, True])
 @pytest.mark.parametrize("components", [None, 6])
 def test_smplx_against_smplx_package(smplx, smplx_file, flat, components):

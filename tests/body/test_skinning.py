@@ -165,6 +165,7 @@ def test_joints_alone(model):
         torch.testing.assert_close(a, b, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("op", ["skin", "skin_vjp", "skin_jvp", "skin_vjp_jvp"])
 def test_opcheck(op):
     body = ip.load_body("anny-lite")

@@ -106,6 +106,7 @@ def test_the_table_of_the_centre_of_mass(run, folder, own, tmp_path):
     assert re.search(r"\| CoM exact, mm \| – \| \d+\.\d \[", page)
 
 
+@pytest.mark.slow
 def test_the_bodies_of_the_data_set_itself(run, folder, own, tmp_path):
     """Their centre of mass is the one that was said to be measured; float32 figures, so 1e-6."""
     done = run("evaluate", "truth", "--table", "com", *own, "-o", tmp_path / "out")

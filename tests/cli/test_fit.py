@@ -109,6 +109,7 @@ def test_analyze_reads_the_parameters(fit, tmp_path, standing):
     assert again["frames"][0]["volume"] == pytest.approx(said.report["bodies"][0]["frames"][0]["volume"], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_bad_items_leave_the_others_as_they_are(fit, tmp_path, standing):
     alone = fit(files.write(tmp_path / "good.json", standing))
     expected = (alone.folder / "good" / "good.npz").read_bytes()
@@ -314,6 +315,7 @@ def test_points_of_another_image_size(fit, tmp_path, standing):
     assert any("lie outside the image of 480 × 640" in flag for flag in said.report["bodies"][0]["flags"])
 
 
+@pytest.mark.slow
 def test_a_photo_of_another_size(fit, tmp_path, standing):
     from PIL import Image
 
@@ -350,6 +352,7 @@ def test_a_video_of_mmpose(fit, tmp_path, standing):
     assert any("1 of 3 images left out" in note for note in body["notes"])
 
 
+@pytest.mark.slow
 def test_mirrored_points_and_a_camera_of_another_image_are_flagged(fit, tmp_path, standing):
     mirrored = standing * [-1, 1, 1, 1] + [1, 0, 0, 0]
     (tmp_path / "camera.json").write_text(json.dumps({"K": [[800, 0, 960], [0, 800, 540], [0, 0, 1]]}))
@@ -368,6 +371,7 @@ def test_without_torch(tmp_path, standing, monkeypatch):
     assert "pip install 'ipman_rs[fit]'" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_known_camera(fit, tmp_path, standing):
     """The same scene told as one camera in a turned and moved world: the body is the same, where the world says."""
     c, s = math.cos(0.4), math.sin(0.4)

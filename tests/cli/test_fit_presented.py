@@ -60,6 +60,7 @@ def test_a_pose_from_a_file(preset, tmp_path, lite):
     assert (tmp_path / "out" / "anna" / "anna.npz").read_bytes() == by_file
 
 
+@pytest.mark.slow
 def test_contact_of_a_file(tmp_path):
     (tmp_path / "touch.json").write_text("[3, 900]")
     record, _ = fit(tmp_path, "--preset", "ipman-o", "--pose", "t_pose", "--contact", tmp_path / "touch.json")
@@ -67,6 +68,7 @@ def test_contact_of_a_file(tmp_path):
     assert record["presented"]["contact_from"] == "given"
 
 
+@pytest.mark.slow
 def test_another_pose_file_is_fitted_anew(tmp_path, lite):
     """--resume looks at the content of the pose file, not at its name."""
     for name in ("squat", "chair"):

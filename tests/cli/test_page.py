@@ -39,6 +39,7 @@ def is_quiet(page):
     assert (outside, page.complaints) == ([], [])
 
 
+@pytest.mark.slow
 def test_the_guard_sees_what_it_guards_against(page, tmp_path):
     path = tmp_path / "loud.html"
     script = 'console.error("loud"); nothing.here()'

@@ -161,6 +161,7 @@ def predictions(path, poses, names, **more):
     np.savez(path, names=np.array(names), **values)
 
 
+@pytest.mark.slow
 def test_predictions_are_paired_by_name_on_their_own_ground(run, tmp_path):
     """The floor of the first is y = 0.2, of the second z = −1; the second's rows stand in another order."""
     squat, leaning = ip.body.poses.pose("squat"), ip.body.poses.pose("lean_past_toes")

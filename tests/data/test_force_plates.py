@@ -57,6 +57,7 @@ def test_walking_against_the_reference_of_opensim(shared):
     assert np.isfinite(center).sum() == loaded.any(axis=1).sum()
 
 
+@pytest.mark.slow
 def test_walking_against_ezc3d(shared):
     path = shared("c3d") / "walking2.c3d"
     found = force_plates.read(path)

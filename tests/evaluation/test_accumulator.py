@@ -74,6 +74,7 @@ def test_summary_by_statistics():
     assert found["bose"].missing == {}
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_any_shards_in_any_order_give_the_same_bits(drawn):
@@ -120,6 +121,7 @@ def test_pooled_clusters_are_those_of_the_hash():
     np.testing.assert_array_equal(found.counts, np.unique(which, return_counts=True)[1])
 
 
+@pytest.mark.slow
 def test_memory_is_flat():
     """A hundred thousand images, each a sequence of its own, in pieces: no more memory than ten thousand."""
     peaks = []

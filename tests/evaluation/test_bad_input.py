@@ -160,6 +160,7 @@ def test_a_name_twice(tmp_path, true, guessed):
         job.measure(0)
 
 
+@pytest.mark.slow
 def test_partial_leaves_out_what_is_not_predicted(tmp_path, true, guessed):
     some = np.flatnonzero(np.arange(300) % 7 > 0)[20:]  # none of the first frames of all
     arrays = {key: value if key == "body" else value[some] for key, value in guessed.items()}
@@ -171,6 +172,7 @@ def test_partial_leaves_out_what_is_not_predicted(tmp_path, true, guessed):
     assert found["methods"]["guess"]["figures"]["mpjpe"]["frames"] == len(some)
 
 
+@pytest.mark.slow
 def test_a_frame_of_nan_touches_no_other(evaluated, tmp_path, true, guessed):
     pose = guessed["pose"].copy()
     pose[[5, 123]] = np.nan

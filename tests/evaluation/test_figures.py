@@ -108,6 +108,7 @@ def test_duckdb_over_the_frames_gives_the_means(evaluated, record):
     assert written == pytest.approx(dict(by_sequence), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_two_methods_are_compared_frame_by_frame(evaluated, tmp_path, true):
     folder, _ = evaluated
     better = files.save(tmp_path / "better.npz", files.predictions(true, noise=0.05, seed=2))

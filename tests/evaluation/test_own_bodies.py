@@ -169,6 +169,7 @@ def test_measured_joints_take_the_regressor_of_the_protocol(bodies, regressors, 
     assert "truth by the joints that the data set gives, estimate by J_regressor_h36m × vertices; aligned at" in page
 
 
+@pytest.mark.slow
 def test_the_table_of_rich_by_plain_loops(bodies, regressors, tmp_path):
     """Both sides' joints and pelvis of their vertices; the file's own joints, 30 mm away, do not count."""
     folder = make("rich", tmp_path / "data", bodies, regressors[0])
@@ -194,6 +195,7 @@ def test_the_table_of_rich_by_plain_loops(bodies, regressors, tmp_path):
     assert 0.01 < figures["pve"]["mean"] < 0.5
 
 
+@pytest.mark.slow
 def test_poses_that_are_known_nowhere_are_no_bodies(bodies, regressors, tmp_path):
     """has_smpl_world is 0 in every row: Human3.6M's measured joints are all that there is."""
     file, _ = human36m.write(tmp_path)
@@ -248,6 +250,7 @@ def test_measured_joints_of_spin_s_definition_take_its_extra_regressor(bodies, r
     assert record(tmp_path / "both")["methods"]["own"]["figures"]["mpjpe"]["largest"] <= 1e-9
 
 
+@pytest.mark.slow
 def test_bodies_of_another_model_are_compared_by_name_and_it_is_said(bodies, tmp_path):
     pytest.importorskip("ezc3d", reason="ezc3d writes and judges C3D files")
     from tests.helpers.miniatures import moyo

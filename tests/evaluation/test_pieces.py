@@ -59,6 +59,7 @@ def test_shards_add_up_to_the_same_bits(count, evaluated, again):
     the_same(evaluated, job)
 
 
+@pytest.mark.slow
 def test_shards_of_other_machines_are_copied_together(evaluated, again):
     folder, job = again
     elsewhere = [replace(job, folder=str(folder / f"machine{index}")) for index in (1, 2, 3)]
@@ -93,6 +94,7 @@ def test_killed_twice_it_goes_on_and_ends_the_same(evaluated, again):
     the_same(evaluated, job)
 
 
+@pytest.mark.slow
 def test_a_half_written_piece_is_done_again(evaluated, again):
     _, job = again
     files.finish([job])
@@ -106,6 +108,7 @@ def test_a_half_written_piece_is_done_again(evaluated, again):
     the_same(evaluated, job)
 
 
+@pytest.mark.slow
 def test_a_piece_of_another_evaluation_is_not_taken(evaluated, again):
     folder, job = again
     files.finish([job])

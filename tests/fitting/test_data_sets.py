@@ -251,6 +251,7 @@ def test_what_is_missing_is_named(yoga, models, tmp_path, preset):
     assert "--models" in said
 
 
+@pytest.mark.slow
 def test_a_frame_without_keypoints_is_left_out(scans, models, tmp_path, preset, monkeypatch):
     """Without MediaPipe, too; keypoints of a file belong to the frame that it names, and to no other."""
     from ipman_rs.fitting import photo

@@ -158,6 +158,7 @@ RECORDINGS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("folder", "file"), RECORDINGS)
 def test_a_body_fits_the_markers(shared, folder, file):
     body = ipt.BodyModel("anny-lite", torch.float64)

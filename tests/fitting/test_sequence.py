@@ -63,6 +63,7 @@ def smooth(problem):
     return fitted(problem, smoothness=STRONG)
 
 
+@pytest.mark.slow
 def test_one_shape_for_all_frames(smooth):
     assert smooth.converged.all()
     for name in ("betas", "log_focal"):
@@ -92,6 +93,7 @@ def test_smoothness_takes_away_jitter(problem, smooth):
     assert away[1] < away[0] + 0.005  # the noise
 
 
+@pytest.mark.slow
 def test_frames_side_by_side_and_threads_change_no_bit(problem, smooth, monkeypatch):
     monkeypatch.setattr(sequence, "CHUNK", 4)
     threads = torch.get_num_threads()
@@ -121,6 +123,7 @@ def test_frames_of_an_earlier_result_are_not_searched_again(problem, smooth, mon
     assert moved.max() < 0.01
 
 
+@pytest.mark.slow
 def test_a_frame_that_is_no_number_follows_its_neighbours(problem, smooth):
     points = problem.points_3d.clone()
     points[2] = torch.nan
@@ -131,6 +134,7 @@ def test_a_frame_that_is_no_number_follows_its_neighbours(problem, smooth):
     assert away.max() < 0.1
 
 
+@pytest.mark.slow
 def test_a_frame_where_nothing_was_seen(problem, smooth):
     seen = torch.ones_like(problem.confidence_3d)
     seen[3] = 0

@@ -57,6 +57,7 @@ def test_the_named_pose_that_is_seen_is_found():
     assert (found["transl"] - double(0.1, 0.2, -4.0)).norm(dim=1).max() < 0.1
 
 
+@pytest.mark.slow
 def test_a_start_depends_on_its_own_row_alone():
     problem = seen_problem()
     found = start.before_camera(problem)
@@ -86,6 +87,7 @@ def lowest(problem: Problem, variables) -> np.ndarray:
     return np.asarray(vertices)[..., 1].min(axis=1)
 
 
+@pytest.mark.slow
 def test_a_floor_that_was_found_is_found_again():
     problem = seen_problem({"standing": 0, "sitting": 30})
     begun = start.before_camera(problem)

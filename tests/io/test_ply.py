@@ -97,6 +97,7 @@ def test_other_elements_are_named_and_clouds_are_clouds(read, order):
             read(content)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["ascii", "binary_little_endian", "binary_big_endian"])
 def test_every_cut_is_told(read, order):
     whole = ply(order, MIXED, extra=True)

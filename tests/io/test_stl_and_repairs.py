@@ -121,6 +121,7 @@ def test_no_stl(read, content):
         read(content)
 
 
+@pytest.mark.slow
 def test_every_cut_of_an_stl_is_told(read):
     box = trimesh.creation.box((1, 1, 1)).triangles
     for whole in (binary(box), words(box).encode().split(b"endsolid")[0]):

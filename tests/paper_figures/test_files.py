@@ -59,6 +59,7 @@ def test_the_layout_has_no_digits_of_the_solver(tmp_path):
     assert abs(place[0] - 0.125) > 0.005  # matplotlib's own, without a layout
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written(tmp_path, figure):
     (tmp_path / "file").write_text("a file is in the way")
     said = figure("com", "standing", "--body", "anny-lite", out="file/out")

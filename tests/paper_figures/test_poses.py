@@ -20,6 +20,7 @@ def own(path, middle, count=40, seed=0, joints=24):
     return pose
 
 
+@pytest.mark.slow
 def test_two_data_sets(figure, tmp_path, contents):
     own(tmp_path / "a.npz", 0.0)
     own(tmp_path / "b.npz", 2.0, seed=1)
@@ -37,6 +38,7 @@ def test_two_data_sets(figure, tmp_path, contents):
     assert contents(said.folder) == contents(again.folder)
 
 
+@pytest.mark.slow
 def test_mixed_data_sets_are_neighbours_by_chance(figure, tmp_path):
     own(tmp_path / "a.npz", 0.0, 60)
     own(tmp_path / "b.npz", 0.0, 60, seed=1)

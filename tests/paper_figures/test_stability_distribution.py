@@ -50,6 +50,7 @@ def own(tmp_path, lite):
     return tmp_path / "own.npz", vertices
 
 
+@pytest.mark.slow
 def test_own_bodies(figure, own, lite, contents):
     path, vertices = own
     said = figure("stability", "--data", "own", "--path", path)
@@ -76,6 +77,7 @@ def test_some_frames_of_several_data_sets(figure, own):
     assert [(each["name"], each["bodies"]) for each in said.numbers["data"]] == [("own", 2), ("own-2", 2)]
 
 
+@pytest.mark.slow
 def test_built_people(figure):
     said = figure("stability", "--people", 7)
     assert said.code == 0, said.err

@@ -47,6 +47,7 @@ def child(script, timeout=60, **environment):
     return done.stdout.split()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_fork_after_use():
@@ -106,6 +107,7 @@ def test_process_pools(method, tmp_path):
     assert done.stdout.split() == ["equal"], done.stderr
 
 
+@pytest.mark.slow
 def test_any_number_of_threads_gives_the_same_bits():
     digests = child(
         """
@@ -119,6 +121,7 @@ def test_any_number_of_threads_gives_the_same_bits():
     assert len(set(digests[1::2])) == 1
 
 
+@pytest.mark.slow
 def test_the_environment_sets_the_threads():
     results = [child("print(ip.get_num_threads(), digest())", RAYON_NUM_THREADS=str(n)) for n in (1, 3)]
     assert [result[0] for result in results] == ["1", "3"]
@@ -220,6 +223,7 @@ def test_ctrl_c_within_a_second(call, threads):
     assert took < 1.0
 
 
+@pytest.mark.slow
 def test_interrupted_once_and_usable_again():
     """An own handler that raises: its exception comes through, and the next call is right."""
     assert child(
@@ -257,6 +261,7 @@ def test_calls_from_many_threads(blob, bodies):
         assert all(pool.map(work, range(24)))
 
 
+@pytest.mark.slow
 def test_the_lock_is_released(lite):
     """Another Python thread counts on while a long call runs."""
     people = np.ascontiguousarray(np.broadcast_to(lite.v_template, (400, *lite.v_template.shape)))

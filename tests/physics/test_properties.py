@@ -115,6 +115,7 @@ def test_the_margin_is_qhull_s(vertices, threshold, method):
         assert ip.bose(vertices, BLOB, ip.Ground(), threshold, "lp", method) == (expected > 0)
 
 
+@pytest.mark.slow
 @settings(steady, max_examples=200)
 @given(st.lists(st.tuples(*[st.integers(-4, 4)] * 2), min_size=1, max_size=40), st.data())
 def test_hulls_of_grid_points(grid, data):
@@ -220,6 +221,7 @@ def test_no_arguments_break_the_core(data):
         getattr(handle, verb)(*(arguments[name] for name in names[3:]))
 
 
+@pytest.mark.slow
 @settings(steady, max_examples=200)
 @given(st.data())
 def test_no_arguments_break_support_and_status(data):

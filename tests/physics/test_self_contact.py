@@ -36,6 +36,7 @@ def test_winding_numbers_of_arms_in_a_trunk_are_libigls(lite, arms):
     np.testing.assert_allclose(tables.windings(arms.astype(np.float32)), expected, rtol=0, atol=2e-4)
 
 
+@pytest.mark.slow
 def test_large_and_open_meshes(anny):
     """The tree's short cuts over many levels, and over a boundary: the mesh without one of its legs."""
     vertices = overlapping.arms_in_trunk(anny, 1)[0]

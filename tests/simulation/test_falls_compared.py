@@ -58,6 +58,7 @@ def test_means_and_intervals():
     assert found.displacement[1].ratio.high < 1
 
 
+@pytest.mark.slow
 def test_order_of_the_methods_and_many_bodies():
     """Exchanged, differences change sign and ratios are turned over. More than 4,096 bodies are drawn in clusters."""
     first, second = two_methods(6000)

@@ -41,6 +41,7 @@ def projected(sample, point):
     return image[0] / image[2], image[1] / image[2]
 
 
+@pytest.mark.slow
 def test_keypoints_are_the_bodys_points_through_the_camera(samples):
     names, skin = keypoint_names("anny-lite"), skin_points(ip.load_body("anny-lite"))
     assert len(names) == len(set(names)) == 52
@@ -55,6 +56,7 @@ def test_keypoints_are_the_bodys_points_through_the_camera(samples):
             assert inside == (0 <= x <= 112 and 0 <= y <= 112)
 
 
+@pytest.mark.slow
 def test_silhouette_is_that_of_the_mesh(samples):
     """Against the union of the projected triangles, by shapely: its area, and its bounds, which are the box."""
     from shapely import polygons, union_all

@@ -39,6 +39,7 @@ def test_many_small_vectors_are_asked_for_too(case, spare):
     assert ending(case, spare, backtrace=True) in ("MemoryError", "answered")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [200_000, 260_000, 350_000])  # kB
 def test_a_command_with_too_little_to_load_scipy_says_so(tmp_path, limit):
     """SciPy then loaded for minutes, each small allocation a failing system call, or OpenBLAS ended the process."""

@@ -180,6 +180,7 @@ def test_a_gradient_is_clipped_and_one_that_is_infinite_dropped(settings, tmp_pa
     assert all(weights.grad is None for weights in module.parameters())
 
 
+@pytest.mark.slow
 def test_the_last_step_is_saved_and_gone_on_with(settings, tmp_path, whole):
     """Seven steps, saved every five, then on to twelve: nothing is lost or done twice."""
     for steps in (7, 12):
@@ -492,6 +493,7 @@ def test_box_of_predicting_is_told_once(tmp_path):
     assert "--box or --whole, not both" in done.output
 
 
+@pytest.mark.slow
 def test_predicting_needs_a_checkpoint_of_images(whole, tmp_path):
     (tmp_path / "wrong.ckpt").write_bytes(b"nothing")
     torch.save({"model": {}}, tmp_path / "spin.pt")

@@ -28,6 +28,7 @@ def plates(load):
     return ForcePlates(TIMES, forces, nothing + [0.0, 0.0, 0.02], nothing, np.array([0.0, 1.0, 0.0]), "made up")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("measured", ["all", "no load", "nothing", "unseen", "a reference without numbers"])
 def test_whatever_was_measured(lite, bodies, measured):
     of = {"all": plates(600.0), "no load": plates(0.0), "unseen": plates(600.0)}.get(measured)
