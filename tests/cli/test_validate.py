@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +15,7 @@ pytest.importorskip("torch", reason="torch is an extra")
 from click.testing import CliRunner
 
 from ipman_rs.cli import main
+from ipman_rs.fitting.jobs.recordings import FittedRecording
 from ipman_rs.validation import run as validation_run
 from tests.helpers import laboratory_files
 from tests.helpers.laboratory_files import FRAMES, MASS, OFF, G, mot, moved, trc
@@ -152,7 +154,7 @@ def test_a_recording_that_fails_for_no_known_reason_takes_no_other_with_it(folde
             raise AssertionError
         return {"name": one.trial.name}
 
-    monkeypatch.setattr(validation_run, "_fit", lambda *_: {"notes": []})
+    monkeypatch.setattr(validation_run, "_fit", lambda *_: FittedRecording(Path(), {}, {"notes": []}))
     monkeypatch.setattr(validation_run, "_compare", compared)
     monkeypatch.setattr(validation_run, "_gives_weight", lambda _: False)
     found, _, failures = validation_run.run(plan)
