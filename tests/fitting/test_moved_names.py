@@ -1,8 +1,7 @@
-"""Names that were changed or moved are still found, with a warning."""
+"""Modules that were moved are still found, with a warning."""
 
 from __future__ import annotations
 
-import importlib
 import subprocess
 import sys
 
@@ -26,21 +25,3 @@ def test_moved_modules(name, words):
     said = [line for line in done.stderr.splitlines() if "DeprecationWarning" in line]
     assert len(said) == 1
     assert f"ipman_rs.fitting.{name} is now {MOVED[name].__name__}" in said[0]
-
-
-@pytest.mark.parametrize(
-    ("module", "old", "now"),
-    [
-        ("ipman_rs.fitting.detection_problem", "problem", "problem_from_detections"),
-        ("ipman_rs.fitting.marker_fit", "Recorded", "MarkerFit"),
-        ("ipman_rs.fitting.result", "results", "fit_results"),
-        ("ipman_rs.fitting.start", "begin", "initial_state"),
-        ("ipman_rs.simulation", "Comparison", "MethodComparison"),
-        ("ipman_rs.study", "Camera", "ViewCamera"),
-        ("ipman_rs.training.losses", "Physics", "PhysicsLoss"),
-    ],
-)
-def test_changed_names(module, old, now):
-    package = importlib.import_module(module)
-    with pytest.warns(DeprecationWarning, match=f"{module}.{old} is now {module}.{now}"):
-        assert getattr(package, old) is getattr(package, now)
