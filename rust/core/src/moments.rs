@@ -66,35 +66,41 @@ impl<W: Real> Moments<W> {
     #[inline(always)]
     fn tetrahedron_backward(d_moments: &Self, corners: [Vec3<W>; 3]) -> [Vec3<W>; 3] {
         let [a, b, c] = corners;
-        let s: Vec3<W> = std::array::from_fn(|k| a[k] + b[k] + c[k]);
+        let s = add(add(a, b), c);
         let d = dot(a, cross(b, c));
         // The derivative by d …
         let mut quadratic = W::zero();
-        for (d_second, (i, j)) in d_moments.second.iter().zip(PAIRS) {
-            quadratic = quadratic + *d_second * (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + s[i] * s[j]);
+        for (k, &(i, j)) in PAIRS.iter().enumerate() {
+            let products = a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + s[i] * s[j];
+            quadratic = quadratic + d_moments.second[k] * products;
         }
         let d_d = d_moments.volume * W::of(1.0 / 6.0)
             + dot(d_moments.first, s) * W::of(1.0 / 24.0)
             + quadratic * W::of(1.0 / 120.0);
         // … and by the corners at fixed d: through s, and through each corner's own square.
-        let twice = |v: Vec3<W>| -> Vec3<W> {
-            let mut product = [W::zero(); 3];
-            for (&d_second, (i, j)) in d_moments.second.iter().zip(PAIRS) {
-                product[i] = product[i] + d_second * v[j];
-                product[j] = product[j] + d_second * v[i];
+        let through_s = second_backward(&d_moments.second, s);
+        let mut d_corners = [cross(b, c), cross(c, a), cross(a, b)];
+        for (d_corner, corner) in d_corners.iter_mut().zip(corners) {
+            let own = second_backward(&d_moments.second, corner);
+            for k in 0..3 {
+                let through_sums =
+                    d_moments.first[k] * W::of(1.0 / 24.0) + (own[k] + through_s[k]) * W::of(1.0 / 120.0);
+                d_corner[k] = d_d * d_corner[k] + d * through_sums;
             }
-            product
-        };
-        let through_s = twice(s);
-        let others = [cross(b, c), cross(c, a), cross(a, b)];
-        std::array::from_fn(|corner| {
-            let own = twice(corners[corner]);
-            std::array::from_fn(|k| {
-                d_d * others[corner][k]
-                    + d * (d_moments.first[k] * W::of(1.0 / 24.0) + (own[k] + through_s[k]) * W::of(1.0 / 120.0))
-            })
-        })
+        }
+        d_corners
     }
+}
+
+/// The derivative of Σ d_second · vvᵀ by v. No closure: those need not be inlined, and then lanes are lost.
+#[inline(always)]
+fn second_backward<W: Real>(d_second: &[W; 6], v: Vec3<W>) -> Vec3<W> {
+    let mut product = [W::zero(); 3];
+    for (k, &(i, j)) in PAIRS.iter().enumerate() {
+        product[i] = product[i] + d_second[k] * v[j];
+        product[j] = product[j] + d_second[k] * v[i];
+    }
+    product
 }
 
 /// The moments of each closed part, about the local origin.
