@@ -61,7 +61,9 @@ def test_a_standing_body(fit, tmp_path, standing):
     # The points are the body's own, but priors pull at them.
     assert body["fit"]["reprojection"]["median_percent"] < 1.0
     assert body["flags"] == body["fit"]["flags"] == []
-    assert [stage["name"] for stage in body["fit"]["stages"]] == ["pose", "physics", "settle"]
+    assert [stage["name"] for stage in body["fit"]["stages"]] == [
+        "coarse", "pose", "weigh", "physics", "settle",
+    ]  # fmt: skip
     frame = body["frames"][0]
     assert frame["inside"]
     assert abs(frame["lowest"]) < 0.02

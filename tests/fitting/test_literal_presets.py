@@ -144,7 +144,7 @@ def test_ours_keep_their_own():
     assert {name for stage in config.load("balanced").stages for name in stage.weights} == {
         "reprojection", "measured_shape", "presented_pose", "hand_prior", "balance", "ground"
     }  # fmt: skip
-    assert not any(stage.terms for name in ("fast", "balanced", "markers") for stage in config.load(name).stages)
+    assert not any(stage.terms for name in ("balanced", "markers") for stage in config.load(name).stages)
 
 
 def test_weights_of_points_by_stage():

@@ -76,8 +76,9 @@ def test_a_presented_pose_is_not_replaced():
 
 def stages(*found: bool) -> config.FitConfig:
     preset = config.load("fast")
-    stage = replace(preset.stages[1], options=replace(preset.stages[1].options, iterations=3))
-    return replace(preset, stages=tuple(replace(stage, find_ground=find) for find in found))
+    last = preset.stages[-1]
+    stage = replace(last, options=replace(last.options, iterations=3))
+    return replace(preset, stages=tuple(replace(stage, find_ground=find) for find in found), hypotheses=None)
 
 
 def lowest(problem: Problem, variables) -> np.ndarray:

@@ -165,8 +165,8 @@ def of_files(command):
 def of_unknown_camera(command):
     """The options of commands that assume a camera for an image."""
     pitch = click.option(
-        "--camera-pitch", "pitch", type=float, default=0.0, show_default=True, metavar="DEGREES",
-        help="How far the camera looks down; negative: up.",
+        "--camera-pitch", "pitch", type=float, metavar="DEGREES",
+        help="How far the camera looks down; negative: up. Default: found by `fit` where its preset does, else 0.",
     )  # fmt: skip
     diagonal = "Focal length in pixels. Default: the image's diagonal."
     return click.option("--focal", type=float, metavar="PX", help=diagonal)(pitch(command))

@@ -54,7 +54,7 @@ def predict(
     box: Box | None,
     whole: bool,
     focal: float | None,
-    pitch: float,
+    pitch: float | None,
 ) -> None:
     """A body for the person in each image, from a regressor that `ipman train` trained, in one look.
 
@@ -95,7 +95,7 @@ def predict(
                 box_of = detector.enter_context(_boxes(box, whole))
             except ImportError as error:
                 raise ImportError(f"{error}; or give --box or --whole") from error
-            camera = {"focal": focal, "pitch": pitch, "pictures": pictures, "progress": console.progress}
+            camera = {"focal": focal, "pitch": pitch or 0.0, "pictures": pictures, "progress": console.progress}
             studies, failures = library.predict_images(trained, paths, output, box_of, **camera)
     for failure in failures:
         console.error(str(failure))

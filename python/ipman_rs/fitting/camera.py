@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from .rotations import matrix
+
 NEAREST = 0.05  # m: points nearer, or behind the camera, are seen as if they were there
 
 
@@ -38,3 +40,12 @@ class Camera:
         """Points (B, N, 3) in the camera's frame -> pixels (B, N, 2)."""
         depth = seen[..., 2:].clamp(min=NEAREST)
         return self.focal[:, None] * seen[..., :2] / depth + self.center[:, None]
+
+
+def level_camera(pitch: float | Tensor = 0.0) -> Tensor:
+    """R (3, 3) or (..., 3, 3) of a camera that looks along the world's −z, its x axis level; pitch in radians, positive
+    looking down."""
+    pitch = torch.as_tensor(pitch, dtype=torch.float64)
+    facing = torch.diag(torch.tensor([1.0, -1.0, -1.0], dtype=torch.float64))
+    zero = torch.zeros_like(pitch)
+    return matrix(torch.stack([pitch, zero, zero], dim=-1)) @ facing

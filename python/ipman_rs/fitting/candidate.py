@@ -12,6 +12,7 @@ from torch import Tensor
 from ipman_rs.torch.body import BodyOutput
 
 from .camera import Camera
+from .landmarks import Landmarks
 from .problem import Problem
 from .rotations import matrix
 from .variables import Variables, full_pose, pose_blocks
@@ -51,21 +52,29 @@ class Candidate:
     @cached_property
     def landmarks(self) -> Tensor:
         """(B, K, 3) m, in the world."""
+        return self.points_of(self.problem.landmarks)
+
+    def points_of(self, landmarks: Landmarks) -> Tensor:
+        """Other named points (B, K, 3) m of the same body, in the world."""
         variables = self.variables
-        return self.problem.landmarks(self.full_pose, variables["betas"], variables["transl"], self.expression)
+        return landmarks(self.full_pose, variables["betas"], variables["transl"], self.expression)
 
     def landmark_slopes(self, free: Sequence[str]) -> Tensor:
-        """The landmarks' derivatives (B, P, K, 3) by the free blocks; 0 by those of the camera."""
-        variables, points, body = self.variables, self.landmarks, self.problem.body.body
-        zero = points.new_zeros(())
-        by_body = self.problem.landmarks.jacobian(self.full_pose, variables["betas"], self.expression)
+        """The landmarks' derivatives (B, P, K, 3) by the free blocks; 0 by those of the camera. Made once."""
+        return self.shared(("landmark_slopes", tuple(free)), lambda: self.slopes_of(self.problem.landmarks, free))
+
+    def slopes_of(self, landmarks: Landmarks, free: Sequence[str]) -> Tensor:
+        """The same of other named points of the body."""
+        variables, body = self.variables, self.problem.body.body
+        by_body = landmarks.jacobian(self.full_pose, variables["betas"], self.expression)
+        zero, shape = by_body.new_zeros(()), by_body.shape[2:]
         sizes = [self.full_pose[0].numel(), variables["betas"].shape[1]]
         by_pose, by_betas, by_expression = by_body.tensor_split([sizes[0], sum(sizes)], dim=1)
         by_joint = pose_blocks(by_pose.unflatten(1, (-1, 3)), body)  # (B, joints, 3, K, 3), the root's (B, 3, K, 3)
         known = {"orient": by_joint["orient"]} | {name: by_joint[name].flatten(1, 2) for name in ("pose", "face")}
-        by_transl = torch.eye(3, dtype=points.dtype)[:, None].expand(len(points), 3, points.shape[1], 3)
+        by_transl = torch.eye(3, dtype=by_body.dtype)[:, None].expand(len(by_body), 3, *shape)
         known |= {"betas": by_betas, "expression": by_expression, "transl": by_transl}
-        still = {name: zero.expand(len(points), variables[name][0].numel(), *points.shape[1:]) for name in free}
+        still = {name: zero.expand(len(by_body), variables[name][0].numel(), *shape) for name in free}
         return torch.cat([known.get(name, still[name]) for name in free], dim=1)
 
     @cached_property

@@ -12,6 +12,7 @@ from typing import Any
 
 from ipman_rs.files import read_yaml
 
+from .hypotheses import PITCH_PRIOR, SUPPORTS, Hypotheses
 from .solvers import SOLVERS, Options
 from .terms import TERMS
 from .variables import BLOCKS
@@ -34,6 +35,7 @@ class Stage:
     solver: str
     options: Options
     find_ground: bool = False  # lay the ground under the body before it, unless the ground is given
+    keep: int = 1  # hypotheses of each body that go on after it, the cheapest
     terms: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # options that differ from the file's
 
     def term_options(self, terms: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -43,12 +45,13 @@ class Stage:
 
 @dataclass(frozen=True)
 class FitConfig:
-    """A fit: its stages, and the options of its terms by their names."""
+    """A fit: its stages, the options of its terms by their names, and what it weighs, if anything."""
 
     name: str
     stages: tuple[Stage, ...]
     terms: Mapping[str, Mapping[str, Any]]
     start: Mapping[str, Any]
+    hypotheses: Hypotheses | None = None
 
     @property
     def moves_camera(self) -> bool:
@@ -104,7 +107,7 @@ def search_options(start: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _config(name: str, content: Any) -> FitConfig:
-    _known("the file", content, ("description", "solver", "start", "stages", "terms", "tolerance"))
+    _known("the file", content, ("description", "solver", "start", "stages", "terms", "tolerance", "hypotheses"))
     terms, start = _terms("terms", content.get("terms")), content.get("start") or {}
     _known("start", start, ("search", "yaws", "iterations"))
     _expect("start, search", start.get("search", ""), "str")
@@ -115,12 +118,42 @@ def _config(name: str, content: Any) -> FitConfig:
     if not listed or not isinstance(listed, (list, tuple)):
         raise ValueError(f"stages: expected a list of at least one, got {_short(listed)}")
     stages = tuple(_stage(number, stage, content) for number, stage in enumerate(listed))
-    return FitConfig(name, stages, terms, start)
+    return FitConfig(
+        name, stages, terms, start, _hypotheses(content.get("hypotheses"), [stage.name for stage in stages])
+    )
+
+
+def _hypotheses(content: Any, stages: list[str]) -> Hypotheses | None:
+    """What a preset weighs."""
+    if content is None:
+        return None
+    place = "hypotheses"
+    _known(place, content, ("before", "pitches", "pitch", "prices"))
+    before, pitches = content.get("before"), content.get("pitches")
+    if before not in stages:
+        raise ValueError(f"{place}, before: expected one of the stages {', '.join(stages)}, got {_short(before)}")
+    if (
+        not isinstance(pitches, list)
+        or not pitches
+        or not all(_is(each, "float") and abs(each) < 90 for each in pitches)
+    ):
+        raise ValueError(f"{place}, pitches: expected degrees between -90 and 90, got {_short(pitches)}")
+    numbers = {}
+    for name, given, known in (
+        ("pitch", content.get("pitch"), PITCH_PRIOR),
+        ("prices", content.get("prices"), SUPPORTS),
+    ):
+        _known(f"{place}, {name}", given, known)
+        numbers[name] = {key: float(value) for key, value in given.items()}
+        for key in known:
+            if not _is(given.get(key), "float") or (key != "mean" and not given[key] >= 0):
+                raise ValueError(f"{place}, {name}, {key}: expected a number ≥ 0, got {_short(given.get(key))}")
+    return Hypotheses(before, tuple(map(float, pitches)), prices=numbers["prices"], **numbers["pitch"])
 
 
 def _stage(number: int, stage: Any, content: Mapping[str, Any]) -> Stage:
     place = f"stage {number}"
-    _known(place, stage, ("name", "free", "weights", "solver", "iterations", "find_ground", "terms"))
+    _known(place, stage, ("name", "free", "weights", "solver", "iterations", "find_ground", "terms", "keep"))
     for needed in ("free", "weights"):
         if not stage.get(needed):
             raise ValueError(f"{place}, {needed}: expected at least one, got none")
@@ -138,7 +171,9 @@ def _stage(number: int, stage: Any, content: Mapping[str, Any]) -> Stage:
     find_ground = stage.get("find_ground", False)
     _expect(f"{place}, find_ground", find_ground, "bool")
     terms = _terms(f"{place}, terms", stage.get("terms"))
-    return Stage(str(stage.get("name", number)), tuple(stage["free"]), weights, solver, options, find_ground, terms)
+    keep = _whole(f"{place}, keep", stage.get("keep", 1), 1)
+    name = str(stage.get("name", number))
+    return Stage(name, tuple(stage["free"]), weights, solver, options, find_ground, keep, terms)
 
 
 def _terms(place: str, given: Any) -> dict[str, Mapping[str, Any]]:

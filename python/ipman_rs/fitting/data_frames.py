@@ -21,13 +21,12 @@ from ipman_rs.data.frames import Frames
 from ipman_rs.evaluation.tables.models import FrameBodies
 
 from ..data.keypoints.detections import Detections
-from .camera import Camera
+from .camera import Camera, level_camera
 from .detection_problem import shared_names
 from .landmarks import Landmarks
 from .presented import PresentedBody, presented_body, self_touching_vertices
 from .presented_files import y_up
 from .problem import Problem
-from .start import level_camera
 
 Array = NDArray[np.float64]
 

@@ -14,11 +14,11 @@ from ipman_rs.renamed import old_names
 
 from ..body.sites import FEWEST_POINTS
 from ..data.keypoints.detections import Detections
-from .camera import Camera
+from .camera import Camera, level_camera
 from .camera_file import KnownCamera
 from .landmarks import Landmarks, landmark_names
 from .problem import Problem
-from .start import SEEN, level_camera
+from .start import SEEN
 
 NOTHING_KNOWN = KnownCamera()
 FACE_SEEN = 0.8  # confidence of nose and eyes that the face of a person is turned to the camera
@@ -44,7 +44,7 @@ def problem_from_detections(
     detections: Detections,
     *,
     focal: float | None = None,
-    pitch: float = 0.0,
+    pitch: float | None = None,
     camera: KnownCamera = NOTHING_KNOWN,
     ground: float | None = None,
     height: float | None = None,
@@ -53,12 +53,13 @@ def problem_from_detections(
     """The fit of each person of `detections`, a row each. ValueError without image sizes, or for numbers out of range.
 
     `focal`: pixels, the image's diagonal if None. `pitch`: degrees by which the camera looks down, under 90 either way;
-    it stands at the world's origin. What `camera` knows goes before both. `ground`: height of the floor in the world
-    (below the camera: negative), found by the fit if None. `height` m and `mass` kg of the person.
+    None: unknown, and found by presets with `hypotheses`, while the others take the camera for level. It stands at the
+    world's origin. What `camera` knows goes before both. `ground`: height of the floor in the world (below the camera:
+    negative), found by the fit if None. `height` m and `mass` kg of the person.
     """
     if detections.image_size is None:
         raise ValueError("image_size: expected width and height of the images, got none")
-    if not abs(pitch) < 90:
+    if pitch is not None and not abs(pitch) < 90:
         raise ValueError(f"pitch: expected more than -90 and less than 90 degrees, got {pitch}")
     names = shared_names(body, detections)
     seen = detections.select(names)
@@ -80,7 +81,7 @@ def problem_from_detections(
     before = Camera(
         length[:, None].expand(people, 2).clone() if lengths is None else lengths,
         size / 2 if center is None else center,
-        level_camera(math.radians(pitch)).expand(people, 3, 3).clone() if rotation is None else rotation,
+        level_camera(math.radians(pitch or 0.0)).expand(people, 3, 3).clone() if rotation is None else rotation,
         torch.zeros(people, 3, dtype=torch.float64) if translation is None else translation,
     )
     return Problem(
@@ -93,6 +94,9 @@ def problem_from_detections(
         image_size=size,
         height=each("height", height),
         mass=each("mass", mass),
+        pitch_known=pitch is not None or rotation is not None,
+        relative_points=None if seen.points_3d is None else torch.from_numpy(seen.points_3d),
+        relative_confidence=None if seen.confidence_3d is None else torch.from_numpy(seen.confidence_3d),
     )
 
 

@@ -12,9 +12,10 @@ import torch
 import ipman_rs.torch as ipt
 from ipman_rs.torch.threads import one_thread
 
-from . import static_gate
+from . import hypotheses, static_gate
 from .candidate import Candidate
 from .config import FitConfig, Stage
+from .hypotheses import Hypotheses, Hypothesis
 from .objective import Objective
 from .problem import Problem
 from .solvers import SOLVERS, Outcome, ValueAndGradient, minimise
@@ -39,14 +40,30 @@ class StageReport:
     variables: Variables
     trace: list[dict[str, np.ndarray]] | None = None  # B times (n,) each
 
+    def take(self, rows: np.ndarray) -> StageReport:
+        """The report of some bodies; an index may come more than once."""
+        index = torch.from_numpy(rows)
+        return StageReport(
+            self.name,
+            [self.reasons[row] for row in rows],
+            [self.iterations[row] for row in rows],
+            {name: cost[rows] for name, cost in self.terms.items()},
+            {name: value[index] for name, value in self.variables.items()},
+            None if self.trace is None else [self.trace[row] for row in rows],
+        )
+
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted bodies: their variables (one row per body) and how each stage went."""
+    """Fitted bodies: their variables (one row per body) and how each stage went. `weighed`: where the preset weighs
+    hypotheses, those of each body, the cheapest first, which is this one; `runner_up`: the fit of the second ones.
+    """
 
     problem: Problem
     variables: Variables
     stages: list[StageReport] = field(default_factory=list)
+    weighed: list[list[Hypothesis]] | None = None
+    runner_up: Fit | None = None
 
     @property
     def converged(self) -> np.ndarray:
@@ -71,8 +88,11 @@ def fit(
 
     `trace`: report the terms by iteration, for one more evaluation each.
     """
-    reports = []
     known = problem.ground is not None
+    if config.hypotheses is not None:
+        with one_thread():
+            return _fit_hypotheses(problem, variables, config, config.hypotheses, known, progress, trace)
+    reports = []
     with one_thread():
         for stage in config.stages:
             if stage.find_ground and not known:
@@ -81,6 +101,63 @@ def fit(
             variables, report = run_stage(problem, variables, stage, config.terms, progress, trace)
             reports.append(report)
     return Fit(problem, variables, reports)
+
+
+def _fit_hypotheses(
+    problem: Problem,
+    variables: Variables,
+    config: FitConfig,
+    weighing: Hypotheses,
+    known_ground: bool,
+    progress: Callable[[str, int], None] | None,
+    trace: bool,
+) -> Fit:
+    """`fit` with several rows for each body from one stage on, of which the cheapest go on after each."""
+    names = [stage.name for stage in config.stages]
+    first, people = names.index(weighing.before), problem.num_bodies
+    single = fit(problem, variables, replace(config, stages=config.stages[:first], hypotheses=None), progress, trace)
+    problem, variables, rows = hypotheses.expand(single.problem, single.variables, weighing)
+    reports = [_turned(report.take(rows.person), single.problem, rows) for report in single.stages]
+    weighed: list[list[tuple[int, Hypothesis]]] = []
+    out: list[list[Hypothesis]] = [[] for _ in range(people)]
+    for stage in config.stages[first:]:
+        if stage.find_ground and not known_ground:
+            problem = with_ground_under_body(problem, variables)
+        problem = hypotheses.with_feet_down(problem, variables)
+        told = None if progress is None else _of_people(progress, len(rows.person) / people)
+        variables, report = run_stage(problem, variables, stage, config.terms, told, trace)
+        weighed = hypotheses.weigh(report.terms, rows, weighing)
+        keep = stage.keep if stage is not config.stages[-1] else max(map(len, weighed))
+        kept = hypotheses.best(weighed, keep)
+        for own, each in zip(out, weighed, strict=True):
+            own[:0] = [worse for _, worse in each[keep:]]
+        problem, variables, rows = problem.rows(torch.from_numpy(kept)), report.take(kept).variables, rows.take(kept)
+        reports = [one.take(kept) for one in (*reports, report)]
+    weighed = hypotheses.weigh(reports[-1].terms, rows, weighing)
+
+    def fit_of(place: int) -> Fit:
+        picked = np.array([own[min(place, len(own) - 1)][0] for own in weighed])
+        index = torch.from_numpy(picked)
+        return Fit(
+            problem.rows(index),
+            {name: value[index] for name, value in variables.items()},
+            [report.take(picked) for report in reports],
+            [[*(each for _, each in own), *worse] for own, worse in zip(weighed, out, strict=True)],
+        )
+
+    return replace(fit_of(0), runner_up=fit_of(1))
+
+
+def _turned(report: StageReport, problem: Problem, rows: hypotheses.Rows) -> StageReport:
+    """A report of the stages before the hypotheses, its bodies turned as the camera of each was."""
+    return replace(
+        report, variables=hypotheses.turn(problem.rows(torch.from_numpy(rows.person)), report.variables, rows)[1]
+    )
+
+
+def _of_people(progress: Callable[[str, int], None], rows: float) -> Callable[[str, int], None]:
+    """Progress in people, told that in rows, of which each person has some."""
+    return lambda stage, ended: progress(stage, int(ended / rows))
 
 
 def with_ground_under_body(problem: Problem, variables: Variables) -> Problem:

@@ -38,11 +38,16 @@ class Problem:
     confidence: Tensor | None = None  # (B, K), 0 to 1
     points_3d: Tensor | None = None  # (B, K, 3) m, in the world
     confidence_3d: Tensor | None = None  # (B, K)
+    relative_points: Tensor | None = None  # (B, K, 3) m in the camera's axes, from an origin of their own
+    relative_confidence: Tensor | None = None  # (B, K)
+    feet_down: Tensor | None = None  # (B, 2) bool, left and right: their soles are on the ground; None: not asked for
     image_size: Tensor | None = None  # (B, 2) width and height, pixels
     height: Tensor | None = None  # (B,) m, of the person
     mass: Tensor | None = None  # (B,) kg
     presented: Presented | None = None
-    static: Tensor | None = None  # (B,) bool, `switch.static` where the stage began; None: not asked for
+    static: Tensor | None = None  # (B,) bool: something holds it up, and it rests; None: not asked for
+    pitch_known: bool = True  # whether the camera's rotation tells where down is
+    seated: Tensor | None = None  # (B,) bool: a seat does, too; None: nobody sits
 
     @property
     def num_bodies(self) -> int:

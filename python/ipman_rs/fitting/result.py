@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,12 @@ from ipman_rs.body.model import BodyModel
 from ipman_rs.jsonable import jsonable
 from ipman_rs.renamed import old_names
 
+from . import confidence
 from .candidate import Candidate
+from .confidence import Confidence
 from .config import FitConfig
 from .fit import Fit, StageReport
+from .hypotheses import Hypothesis
 from .solvers.outcome import CONVERGED
 from .start import SEEN
 from .variables import BLOCKS, Variables, full_pose
@@ -25,7 +29,6 @@ from .variables import BLOCKS, Variables, full_pose
 Arrays = dict[str, NDArray[Any]]
 
 PHYSICS = ("stability", "balance", "ground")
-POOR = 5.0  # % of the person's height: a median error above it is flagged
 OFF = 0.05  # m: a body whose lowest point is further from the floor is flagged
 FAR = 99.0  # m from the camera: where the start gives up
 
@@ -33,13 +36,15 @@ FAR = 99.0  # m from the camera: where the start gives up
 @dataclass(frozen=True)
 class FitResult:
     """One fitted body, a candidate of one row; its variables before the physics terms (None: no stage has any); and how
-    each stage went, as plain values.
+    each stage went, as plain values. weighed: its hypotheses, the cheapest first; runner_up: the body of the second.
     """
 
     candidate: Candidate
     before: Variables | None
     stages: list[dict[str, Any]]
     converged: bool
+    weighed: list[Hypothesis] | None = None
+    runner_up: Candidate | None = None
 
     @property
     def finite(self) -> bool:
@@ -84,7 +89,16 @@ class FitResult:
             "iterations": sum(stage["iterations"] for stage in self.stages),
             "reprojection": jsonable(self.reprojection()),
             "stages": self.stages,
+            "confidence": jsonable(self.confidence.record()),
+            **({} if self.weighed is None else {"hypotheses": [jsonable(asdict(each)) for each in self.weighed]}),
         }
+
+    @cached_property
+    def confidence(self) -> Confidence:
+        """How sure this body is, and why not."""
+        return confidence.assess(
+            self.candidate, self.reprojection().get("median_percent", 0.0), self.weighed, self.runner_up
+        )
 
     def reprojection(self) -> dict[str, float]:
         """Errors of the points that were seen: their median in pixels, and in percent of the height of the whole fitted
@@ -101,10 +115,7 @@ class FitResult:
 
     def doubts(self) -> list[str]:
         """Why this body should be looked at before it is used."""
-        flags = []
-        errors = self.reprojection()
-        if errors and not errors["median_percent"] <= POOR:
-            flags.append(f"fits poorly: median error {errors['median_percent']:.1f} % of the person's height")
+        flags = list(self.confidence.reasons)
         with torch.no_grad():
             vertices = self.candidate.vertices.double()
             depth = float(self.candidate.camera.see(vertices)[..., 2].mean())
@@ -125,13 +136,19 @@ def fit_results(fit: Fit, config: FitConfig, start: Variables) -> list[FitResult
     converged = fit.converged
     return [
         FitResult(
-            Candidate(fit.problem.rows(torch.tensor([row])), _row(fit.variables, row)),
+            _candidate(fit, row),
             None if before is None else _row(before, row),
             [_stage(stage, row) for stage in fit.stages],
             bool(converged[row]),
+            None if fit.weighed is None else fit.weighed[row],
+            None if fit.runner_up is None else _candidate(fit.runner_up, row),
         )
         for row in range(fit.problem.num_bodies)
     ]
+
+
+def _candidate(fit: Fit, row: int) -> Candidate:
+    return Candidate(fit.problem.rows(torch.tensor([row])), _row(fit.variables, row))
 
 
 def parameters(body: BodyModel, variables: Variables) -> Arrays:

@@ -24,6 +24,7 @@ from ipman_rs.body.poses import NAMES, pose_of
 from ipman_rs.renamed import old_names
 
 from .camera import NEAREST
+from .camera import level_camera as level_camera
 from .config import Stage, search_of, search_options
 from .fit import run_stage, with_ground_under_body
 from .objective import Objective
@@ -60,15 +61,6 @@ def initial_state(problem: Problem, start: Mapping[str, Any]) -> tuple[Problem, 
             problem = with_ground_under_body(problem, neutral(problem))
         return problem, camera_around(problem, **given)
     return problem, (mean_before_camera if how == "mean" else before_camera)(problem, **given)
-
-
-def level_camera(pitch: float | Tensor = 0.0) -> Tensor:
-    """R (3, 3) or (..., 3, 3) of a camera that looks along the world's −z, its x axis level; pitch in radians, positive
-    looking down."""
-    pitch = torch.as_tensor(pitch, dtype=torch.float64)
-    facing = torch.diag(torch.tensor([1.0, -1.0, -1.0], dtype=torch.float64))
-    zero = torch.zeros_like(pitch)
-    return matrix(torch.stack([pitch, zero, zero], dim=-1)) @ facing
 
 
 def neutral(problem: Problem) -> dict[str, Tensor]:

@@ -34,7 +34,7 @@ class FitOptions:
     config: FitConfig
     model: str
     focal: float | None = None
-    pitch: float = 0.0
+    pitch: float | None = None
     camera: KnownCamera | None = None
     ground: float | None = None
     height: float | None = None

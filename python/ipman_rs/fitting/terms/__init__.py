@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from .bending import Bending
+from .bone_directions import BoneDirections
 from .contact_normals import ContactNormals
 from .expression_prior import ExpressionPrior
+from .flat_soles import FlatSoles
 from .gmm_prior import GaussianMixture
 from .hand_prior import HandPrior
 from .jaw_prior import JawPrior
@@ -17,6 +19,8 @@ from .presented_contact import PresentedContact
 from .presented_orient import PresentedOrient
 from .presented_pose import PresentedPose
 from .reprojection import Reprojection
+from .seat import Seat
+from .segment_balance import SegmentBalance
 from .self_contact import SelfContact, SelfPenetration
 from .shape_prior import ShapePrior
 from .term import LeastSquares, Term
@@ -25,6 +29,7 @@ from .vposer import VPoser
 TERMS: dict[str, type[Term]] = {
     "reprojection": Reprojection,
     "points_3d": Points3D,
+    "bone_directions": BoneDirections,
     "joint_limits": JointLimits,
     "pose_prior": PosePrior,
     "gmm_prior": GaussianMixture,
@@ -38,9 +43,12 @@ TERMS: dict[str, type[Term]] = {
     "hand_prior": HandPrior,
     "jaw_prior": JawPrior,
     "expression_prior": ExpressionPrior,
+    "flat_soles": FlatSoles,
     "stability": Stability,
     "ground": Ground,
     "balance": Balance,
+    "seat": Seat,
+    "segment_balance": SegmentBalance,
     "self_contact": SelfContact,
     "self_penetration": SelfPenetration,
     "contact_normals": ContactNormals,

@@ -23,7 +23,6 @@ from collections.abc import Sequence
 
 import torch
 from torch import Tensor
-from torch.autograd import forward_ad
 
 from ipman_rs.body import joints
 from ipman_rs.checks import not_negative
@@ -97,15 +96,14 @@ class JointLimits(LeastSquares):
         return excess.square() / (excess + SOFTNESS)
 
     def linearised(self, candidate: Candidate, free: Sequence[str]) -> tuple[Tensor, Tensor]:
-        """No joint knows of another: three directions, of all joints at once, find the whole Jacobian."""
-        pose = candidate.variables["pose"][:, self.joints]
-        bodies, count = pose.shape[:2]
-        directions = torch.eye(3, dtype=pose.dtype)[:, None, None].expand(3, bodies, count, 3).flatten(0, 1)
-        with forward_ad.dual_level():
-            dual = forward_ad.make_dual(pose.repeat(3, 1, 1), directions.contiguous())
-            values, slopes = forward_ad.unpack_dual(self._of(dual))
-        slopes = torch.zeros_like(values) if slopes is None else slopes
-        blocks = slopes.reshape(3, bodies, count, 3).permute(1, 2, 0, 3)  # body, joint, by which number, which residual
+        """No joint knows of another: three sums, over all joints at once, find the whole Jacobian backwards."""
+        bodies, count = len(candidate.variables["pose"]), len(self.joints)
+        with torch.enable_grad():
+            pose = candidate.variables["pose"][:, self.joints].detach().requires_grad_()
+            values = self._of(pose)
+            sums = values.sum(dim=(0, 1)).unbind()
+            slopes = [torch.autograd.grad(total, pose, retain_graph=True)[0] for total in sums]
+        blocks = torch.stack(slopes, dim=-1)  # body, joint, by which number, which residual
         jacobian = pose.new_zeros(bodies, candidate.variables["pose"].shape[1], 3, count, 3)
         for place, joint in enumerate(self.joints):
             jacobian[:, joint, :, place] = blocks[:, place]
@@ -115,7 +113,7 @@ class JointLimits(LeastSquares):
             else pose.new_zeros(bodies, candidate.variables[name][0].numel(), 3 * count)
             for name in free
         ]
-        return values[:bodies].flatten(1), torch.cat(whole, dim=1)
+        return values.detach().flatten(1), torch.cat(whole, dim=1)
 
 
 def swing_twist(pose: Tensor, bones: Tensor) -> Tensor:

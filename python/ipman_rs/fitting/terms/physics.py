@@ -30,7 +30,8 @@ from .term import Term
 class Physics(Term):
     """preset: a name of `ipman_rs.presets`, `usual` if None.
     samples: of the body's surface, those of its template if None; fewer are faster and coarser.
-    only_static: leave alone a body that was in the air or falling where the stage began (`problem.static`).
+    only_static: leave alone a body that was in the air or falling where the stage began (`problem.static`). Balance on
+    the floor is not asked of a body that sits (`problem.seated`).
     """
 
     needs_mesh = True
@@ -38,6 +39,7 @@ class Physics(Term):
     quantities: tuple[str, ...]  # of IntuitivePhysicsLoss, summed
     factors: Mapping[str, float] = {}  # of the quantities, 1 where nothing is said
     wrap: Wrap = "log"  # of the balance cost
+    needs_feet = True  # whether it asks the floor alone to hold the body up
 
     def __init__(
         self, problem: Problem, preset: str | None = None, samples: int | None = None, only_static: bool = False
@@ -50,6 +52,8 @@ class Physics(Term):
         if missing:
             raise ValueError(f"preset: {preset!r} has {', '.join(self.loss.terms)}, but no {', '.join(missing)}")
         self.gate = problem.static if only_static else None
+        if self.gate is not None and problem.seated is not None and self.needs_feet:
+            self.gate = self.gate & ~problem.seated
 
     def cost(self, candidate: Candidate) -> Tensor:
         values = candidate.shared(self.loss, lambda: self.loss(candidate.vertices, self.problem.ground))
@@ -67,6 +71,7 @@ class Ground(Physics):
     at 1 a body that is free to move comes to rest centimetres inside the floor."""
 
     quantities = ("pull", "push")
+    needs_feet = False
 
     def __init__(self, problem: Problem, pull: float = 1.0, **options: Any):
         super().__init__(problem, **options)

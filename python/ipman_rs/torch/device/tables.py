@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ..compiling import assume_constant_result
 from ..reference.topology import topology
 from .sparse import SparseRows, sparse_rows
 
@@ -142,7 +143,7 @@ def _build(template: BodyTemplate, device: torch.device, dtype: torch.dtype) -> 
 _tables = PerTemplate(_build)
 
 
-@torch.compiler.assume_constant_result
+@assume_constant_result
 def tables(template: BodyTemplate, device: torch.device, dtype: torch.dtype) -> Tables:
     """The gather tables of `template`, built at the first call."""
     return _tables(template, device, dtype)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-import roma
 import torch
 from torch import Tensor, nn
 
@@ -67,6 +66,8 @@ def posed(
 
 def _rotations(model: BodyModel, pose: Tensor) -> Tensor:
     """Local rotation matrices (..., J, 3, 3) of a pose in either form."""
+    import roma  # slow to load: it brings torch's compiler with it
+
     if pose.shape[-1] == 3:
         return roma.rotvec_to_rotmat(pose + model.pose_mean)
     return roma.special_gramschmidt(pose.unflatten(-1, (2, 3)).transpose(-1, -2))

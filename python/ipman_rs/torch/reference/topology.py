@@ -15,6 +15,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ..compiling import assume_constant_result
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -51,7 +53,7 @@ class Topology:
 _cache: WeakKeyDictionary[BodyTemplate, dict[torch.device, Topology]] = WeakKeyDictionary()
 
 
-@torch.compiler.assume_constant_result
+@assume_constant_result
 def topology(template: BodyTemplate, device: torch.device) -> Topology:
     """The index tensors of `template` on `device`, built at the first call."""
     on_devices = _cache.setdefault(template, {})

@@ -1,0 +1,146 @@
+"""What a photo leaves open, as hypotheses that are fitted side by side and weighed by one cost.
+
+One image does not say how far the camera looks down, nor what holds a person up. A hypothesis is a pitch of the camera
+and a support:
+
+feet     the feet that are down hold the person up, at rest
+seat     a seat does, too, at a height of its own
+nothing  the person moves: neither balance nor floor are asked for, and the pitch is the likeliest
+
+The body is fitted to the image first, which no pitch changes: a camera that looks down and a body that leans back look
+the same. Then every hypothesis starts from that body, turned as its pitch tells, and the stages that follow fit it with
+its support. What is compared is the cost of all terms, that of the pitch, and the price of the support: an odd pose
+must be bought by the image.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from .camera import Camera, level_camera
+from .candidate import Candidate
+from .landmarks import Landmarks
+from .problem import Problem
+from .rotations import matrix, vector
+from .variables import Variables
+
+PITCH_PRIOR = ("mean", "deviation", "weight")
+SUPPORTS = ("feet", "seat", "nothing")
+FEET = ("left_heel", "left_big_toe", "right_heel", "right_big_toe")
+NEAR = 0.12  # m above the lower foot: up to there the other one counts as down, and the terms may bring it to the floor
+
+
+@dataclass(frozen=True)
+class Hypotheses:
+    """What a preset weighs.
+
+    before: the stage from which on a person is several rows. pitches: degrees, looking down +. A pitch p costs
+    weight ((p − mean) / deviation)², and each support its price.
+    """
+
+    before: str
+    pitches: tuple[float, ...]
+    mean: float
+    deviation: float
+    weight: float
+    prices: Mapping[str, float]
+
+    def pitch_cost(self, pitch: np.ndarray) -> np.ndarray:
+        return self.weight * ((pitch - self.mean) / self.deviation) ** 2
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """pitch: degrees; nan where the camera is known. cost: of its terms, its pitch and its support."""
+
+    support: str
+    pitch: float
+    cost: float
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Several rows of a problem for each person. person, support: of each row; pitch: degrees."""
+
+    person: np.ndarray
+    support: np.ndarray
+    pitch: np.ndarray
+
+    def take(self, rows: np.ndarray) -> Rows:
+        return Rows(self.person[rows], self.support[rows], self.pitch[rows])
+
+
+def expand(problem: Problem, variables: Variables, hypotheses: Hypotheses) -> tuple[Problem, dict[str, Tensor], Rows]:
+    """Each person's rows: of all pitches with each support that rests, and of the likeliest with nothing."""
+    pitches = (math.nan,) if problem.pitch_known else hypotheses.pitches
+    likeliest = min(pitches, key=lambda pitch: abs(pitch - hypotheses.mean))
+    each = [*product(SUPPORTS[:2], pitches), (SUPPORTS[2], likeliest)]
+    people = problem.num_bodies
+    rows = Rows(
+        np.repeat(np.arange(people), len(each)),
+        np.array([support for support, _ in each] * people),
+        np.array([pitch for _, pitch in each] * people),
+    )
+    index = torch.from_numpy(rows.person)
+    problem, variables = problem.rows(index), {name: value[index] for name, value in variables.items()}
+    problem, variables = turn(problem, variables, rows)
+    static, seated = (torch.from_numpy(rows.support == name) for name in ("nothing", "seat"))
+    return replace(problem, static=~static, seated=seated), variables, rows
+
+
+def turn(problem: Problem, variables: Variables, rows: Rows) -> tuple[Problem, dict[str, Tensor]]:
+    """The cameras of the rows, and the bodies turned with them, so that in the image nothing moves."""
+    if problem.pitch_known:
+        return problem, dict(variables)
+    rotation = level_camera(torch.from_numpy(rows.pitch).deg2rad())
+    turn = rotation.transpose(1, 2) @ problem.camera.rotation
+    with torch.no_grad():
+        root = Candidate(problem, variables).posed.joints[:, 0].double()  # about which `orient` turns
+    moved = (turn @ root[:, :, None])[..., 0] - (root - variables["transl"])
+    variables = {
+        **variables,
+        "orient": vector(turn @ matrix(variables["orient"])),
+        "transl": moved,
+        "camera_orient": vector(rotation),
+    }
+    camera = problem.camera
+    return replace(problem, camera=Camera(camera.focal, camera.center, rotation, camera.translation)), variables
+
+
+def with_feet_down(problem: Problem, variables: Variables) -> Problem:
+    """The problem with the feet that are down: the lower one and, near its height, the other; none of a body that
+    moves. Unchanged if the ground is unknown."""
+    if problem.ground is None or problem.static is None:
+        return problem
+    with torch.no_grad():
+        points = Candidate(problem, variables).points_of(Landmarks(problem.body, FEET))
+        normal = problem.ground.normal.to(points).expand(len(points), 3)
+        heights = (points * normal[:, None]).sum(dim=-1).unflatten(1, (2, 2)).amin(dim=-1)
+    down = heights <= heights.amin(dim=1, keepdim=True) + NEAR
+    return replace(problem, feet_down=down & problem.static[:, None])
+
+
+def weigh(terms: Mapping[str, np.ndarray], rows: Rows, hypotheses: Hypotheses) -> list[list[tuple[int, Hypothesis]]]:
+    """Each person's rows and what they cost, the cheapest first; a cost that is not finite comes last."""
+    cost = sum(terms.values(), np.zeros(len(rows.person)))
+    cost = cost + np.nan_to_num(hypotheses.pitch_cost(rows.pitch), nan=0.0)
+    cost = cost + np.array([hypotheses.prices[support] for support in rows.support])
+    cost = np.where(np.isfinite(cost), cost, np.inf)
+    order = np.lexsort((np.arange(len(cost)), cost, rows.person))
+    weighed: list[list[tuple[int, Hypothesis]]] = [[] for _ in range(rows.person[-1] + 1)]
+    for row in order:
+        own = Hypothesis(str(rows.support[row]), float(rows.pitch[row]), float(cost[row]))
+        weighed[rows.person[row]].append((int(row), own))
+    return weighed
+
+
+def best(weighed: Sequence[Sequence[tuple[int, Hypothesis]]], keep: int) -> np.ndarray:
+    """The rows of the `keep` cheapest of each person, in their order."""
+    return np.array(sorted(row for own in weighed for row, _ in own[:keep]))

@@ -1,0 +1,71 @@
+"""Flat soles: heels and toes of the feet that are down are where they are when the body stands flat on its ground,
+
+    Σ_feet Σ_points ρ² d² / (d² + ρ²)     d = h − h₀, metres
+
+h is the height of heel, big toe and small toe above the ground, and h₀ that of the zero pose, in which soles are flat.
+So a sole is neither tilted nor above or below the floor; with ρ a foot that the image lifts or stands on its toes stops
+pulling. Only the feet that `Problem.feet_down` names take part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from ipman_rs.checks import positive
+
+from ...body.landmarks import SIDES, skin_points
+from ..candidate import Candidate
+from ..landmarks import Landmarks
+from ..problem import Problem
+from .term import LeastSquares
+
+POINTS = ("heel", "big_toe", "small_toe")
+
+
+class FlatSoles(LeastSquares):
+    """rho: metres."""
+
+    def __init__(self, problem: Problem, rho: float = 0.05):
+        super().__init__(problem)
+        if problem.ground is None:
+            raise ValueError("ground: expected one for flat soles; give it, or let a stage find it (find_ground)")
+        self.rho = positive("rho", rho)
+        body = problem.body.body
+        skin = skin_points(body)
+        names = [f"{side}_{point}" for side in SIDES for point in POINTS]
+        names = [name for name in names if name in skin]
+        self.landmarks = Landmarks(problem.body, names) if names else None
+        vertices = body.v_template
+        self.flat = torch.as_tensor(vertices[[skin[name] for name in names], 1] - vertices[:, 1].min()).double()
+        down = problem.feet_down
+        if down is None:
+            down = torch.ones(problem.num_bodies, 2, dtype=torch.bool)
+        side = [list(SIDES).index(name.partition("_")[0]) for name in names]
+        self.weight = down[:, side].double()
+
+    def residuals(self, candidate: Candidate) -> Tensor:
+        difference = self._heights(candidate) - self.flat
+        return self.weight * self.rho * difference * torch.rsqrt(difference.square() + self.rho**2)
+
+    def linearised(self, candidate: Candidate, free: Sequence[str]) -> tuple[Tensor, Tensor]:
+        """h's derivative is the normal's share of the points'; that of ρ d / √(d² + ρ²) is (ρ / √(d² + ρ²))³."""
+        difference = self._heights(candidate) - self.flat
+        soft = self.rho * torch.rsqrt(difference.square() + self.rho**2)
+        slopes = candidate.slopes_of(self.landmarks, free)
+        by_height = (slopes * self._normal(slopes)).sum(dim=-1)
+        return self.weight * difference * soft, (self.weight * soft**3)[:, None] * by_height
+
+    def _heights(self, candidate: Candidate) -> Tensor:
+        """(B, K) m."""
+        points = candidate.points_of(self.landmarks)
+        assert self.problem.ground is not None
+        return (points * self._normal(points)).sum(dim=-1) - self.problem.ground.height.to(points).reshape(-1, 1)
+
+    def _normal(self, like: Tensor) -> Tensor:
+        """The ground's, with one axis of length 1 for each of the vectors' but the batch and the last."""
+        assert self.problem.ground is not None
+        normal = self.problem.ground.normal.to(like).expand(len(like), 3)
+        return normal.reshape(len(like), *(1,) * (like.ndim - 2), 3)
