@@ -120,3 +120,34 @@ def train(
         )
         page = run(Benchmark(output, task, seeds, part, lean), tilts, workers, console.progress)
     click.echo(page.read_text())
+
+
+@benchmark.command()
+@click.argument("folder", type=click.Path(file_okay=False, exists=True, path_type=Path))
+@click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Folder.")
+@click.option(
+    "--preset", "presets", multiple=True, default=("fast",), show_default=True, metavar="NAME|FILE",
+    help="Of `ipman fit`; may be repeated.",
+)  # fmt: skip
+@click.option("--body", "model", default="anny-lite", show_default=True, metavar="NAME|PATH", help="Body model.")
+def photos(folder: Path, output: Path, presets: tuple[str, ...], model: str) -> None:
+    """Fits of real photos, judged by what a person sees in them.
+
+    FOLDER has photos and labels.csv, a line each: file, posture (stand, walk, lunge, squat, one-leg, sit-chair,
+    airborne …), trunk_lean_deg, lean_direction (forward, back, left, right, none), feet_on_floor (both, left, right,
+    none), camera_pitch_deg, balanced (yes, no). A keypoint file of the same name (.json) stands for its photo.
+
+    Writes photos_benchmark.md, .json and .csv: of the photos with such a label, how many bodies meet it; and a sheet
+    with all pictures for each preset, so that anyone can judge with their own eyes. Interrupted, the same command goes
+    on where it was.
+
+    \b
+    ipman benchmark photos photos/ -o out --preset fast --preset smplify-x
+    """
+    from . import console
+
+    with one_line_errors(output):
+        from ..ablation.photos.benchmark import benchmark as run
+
+        page = run(folder, output, presets, model, console.progress)
+    click.echo(page.read_text())

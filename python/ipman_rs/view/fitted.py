@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
@@ -45,7 +45,7 @@ def draw_fitted(study: Study, folder: Path) -> Iterator[str]:
         yield "before_after.png"
 
 
-def draw_overlay(study: Study, path: Path) -> None:
+def draw_overlay(study: Study, path: Path | IO[bytes]) -> None:
     """The body in the photo, or on white, with the points that were detected and those that were fitted."""
     fitted = study.fitted
     assert fitted is not None

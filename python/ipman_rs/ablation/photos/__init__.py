@@ -1,0 +1,1 @@
+"""Fits of real photos, judged by what a person sees in them."""
