@@ -43,7 +43,7 @@ def problem_from_detections(
     body: ipt.BodyModel,
     detections: Detections,
     *,
-    focal: float | None = None,
+    focal: float | Sequence[float | None] | None = None,
     pitch: float | None = None,
     camera: KnownCamera = NOTHING_KNOWN,
     ground: float | None = None,
@@ -52,10 +52,10 @@ def problem_from_detections(
 ) -> Problem:
     """The fit of each person of `detections`, a row each. ValueError without image sizes, or for numbers out of range.
 
-    `focal`: pixels, the image's diagonal if None. `pitch`: degrees by which the camera looks down, under 90 either way;
-    None: unknown, and found by presets with `hypotheses`, while the others take the camera for level. It stands at the
-    world's origin. What `camera` knows goes before both. `ground`: height of the floor in the world (below the camera:
-    negative), found by the fit if None. `height` m and `mass` kg of the person.
+    `focal`: pixels, one for all or one for each; the image's diagonal where None. `pitch`: degrees by which the camera
+    looks down, under 90 either way; None: unknown, and found by presets with `hypotheses`, while the others take the
+    camera for level. It stands at the world's origin. What `camera` knows goes before both. `ground`: height of the
+    floor in the world (below the camera: negative), found by the fit if None. `height` m and `mass` kg of the person.
     """
     if detections.image_size is None:
         raise ValueError("image_size: expected width and height of the images, got none")
@@ -74,8 +74,12 @@ def problem_from_detections(
             return None
         return torch.tensor(numbers, dtype=torch.float64).reshape(shape).repeat(people, *(1 for _ in shape))
 
-    length = size.norm(dim=1) if focal is None else each("focal", focal)
-    assert length is not None
+    several = [focal] * people if focal is None or isinstance(focal, (int, float)) else focal
+    known = [None if own is None else check_measurement("focal", own) for own in several]
+    length = torch.tensor(
+        [diagonal if own is None else own for own, diagonal in zip(known, size.norm(dim=1).tolist(), strict=True)],
+        dtype=torch.float64,
+    )
     rotation, translation = known_of(camera.rotation, 3, 3), known_of(camera.translation, 3)
     lengths, center = known_of(camera.focal, 2), known_of(camera.center, 2)
     before = Camera(

@@ -19,14 +19,17 @@ from ..data.keypoints.detections import Array, Detections, join
 
 Box = tuple[float, float, float, float]  # x, y, width, height in pixels
 
+PARTS = (0.6, 0.4, 0.27)  # of the image's sides, looked at where nobody is found in the whole of it
+SURE = 0.5  # median visibility from which a person in a part counts
 AROUND = 0.04  # of the longer side: how far a body reaches beyond its landmarks; the median of rendered people
 
 
 def detect(paths: Sequence[str | os.PathLike[str]]) -> Detections:
     """The person in each image, a row each: MediaPipe's landmarks in pixels, and its world landmarks.
 
-    MediaPipe finds one person an image. ImportError without the extra; ValueError, naming the file, for a missing or
-    unreadable image, one under 32 pixels, and one without a person.
+    MediaPipe finds one person an image, and nobody who is small in it: then it looks at parts of the image, and again
+    around the largest person that it found there. ImportError without the extra; ValueError, naming the file, for a
+    missing or unreadable image, one under 32 pixels, and one without a person.
     """
     with _model() as model:
         return join([_detections(path, *_landmarks(model, path, read(path))) for path in paths])
@@ -79,13 +82,59 @@ def _model() -> Any:
 def _landmarks(
     model: Any, path: str | os.PathLike[str], pixels: NDArray[np.uint8]
 ) -> tuple[Array, Array, tuple[int, int]]:
+    height, width = pixels.shape[:2]
+    found = _look(model, pixels, (0, 0, width, height)) or _look_at_parts(model, pixels)
+    if found is None:
+        raise ValueError(
+            f"{path}: expected a person, found none; crop the image around one person whose feet are in it, or give "
+            "keypoints of another detector (.json)"
+        )
+    return (*found, (width, height))
+
+
+def _look_at_parts(model: Any, pixels: NDArray[np.uint8]) -> tuple[Array, Array] | None:
+    """The largest person in overlapping parts of the image, of the largest parts that have one, looked at closely."""
+    height, width = pixels.shape[:2]
+    for share in PARTS:
+        sides = max(int(share * width), SMALLEST), max(int(share * height), SMALLEST)
+        boxes = [(x, y, *sides) for y in _steps(height, sides[1]) for x in _steps(width, sides[0])]
+        seen = [landmarks for box in boxes if (landmarks := _look(model, pixels, box)) is not None]
+        seen = [landmarks for landmarks in seen if np.median(landmarks[0][:, 3]) > SURE]
+        if seen:
+            largest = max(seen, key=lambda landmarks: float(np.ptp(landmarks[0][:, 1])))
+            return _look(model, pixels, _around(largest[0], width, height)) or largest
+    return None
+
+
+def _steps(length: int, part: int) -> list[int]:
+    """Where parts begin that overlap by half."""
+    count = max(1, round(2 * (length - part) / part) + 1)
+    return np.linspace(0, length - part, count).round().astype(int).tolist()
+
+
+def _around(landmarks: Array, width: int, height: int) -> tuple[int, int, int, int]:
+    """A box (x, y, width, height) in the image with room around a person."""
+    points = landmarks[:, :2] * (width, height)
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.3 * (high - low).max()
+    x, y = np.maximum(low - margin, 0).astype(int).tolist()
+    right, bottom = np.minimum(high + margin, (width, height)).astype(int).tolist()
+    return x, y, max(right - x, SMALLEST), max(bottom - y, SMALLEST)
+
+
+def _look(model: Any, pixels: NDArray[np.uint8], box: tuple[int, int, int, int]) -> tuple[Array, Array] | None:
+    """MediaPipe's landmarks (33, 4) relative to the whole image, and its world landmarks, of a box in it."""
+    x, y, width, height = box
+    part = np.ascontiguousarray(pixels[y : y + height, x : x + width])
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "SymbolDatabase.GetPrototype", UserWarning)  # between MediaPipe and protobuf
-        result = model.process(pixels)
+        result = model.process(part)
     if result.pose_landmarks is None:
-        raise ValueError(f"{path}: expected a person, found none")
-    height, width = pixels.shape[:2]
-    return _four(result.pose_landmarks), _four(result.pose_world_landmarks), (width, height)
+        return None
+    landmarks = _four(result.pose_landmarks)
+    size = np.array([part.shape[1], part.shape[0]])
+    landmarks[:, :2] = (landmarks[:, :2] * size + (x, y)) / (pixels.shape[1], pixels.shape[0])
+    return landmarks, _four(result.pose_world_landmarks)
 
 
 def _four(landmarks: Any) -> Array:

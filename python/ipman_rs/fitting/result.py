@@ -24,11 +24,11 @@ from .fit import Fit, StageReport
 from .hypotheses import Hypothesis
 from .solvers.outcome import CONVERGED
 from .start import SEEN
+from .terms import PHYSICS
 from .variables import BLOCKS, Variables, full_pose
 
 Arrays = dict[str, NDArray[Any]]
 
-PHYSICS = ("stability", "balance", "ground")
 OFF = 0.05  # m: a body whose lowest point is further from the floor is flagged
 FAR = 99.0  # m from the camera: where the start gives up
 

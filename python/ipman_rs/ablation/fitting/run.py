@@ -129,6 +129,7 @@ class Benchmark:
             block.told,
             preset.terms,
             [asdict(stage) for stage in preset.stages],
+            preset.hypotheses and asdict(preset.hypotheses),
         ]
         key = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:16]
         return self.folder / f"fit-{key}.npz"

@@ -6,8 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from ...fitting.config import FitConfig, limit_iterations, load
-
-PHYSICS = ("stability", "balance", "ground")
+from ...fitting.terms import PHYSICS
 
 
 @dataclass(frozen=True)

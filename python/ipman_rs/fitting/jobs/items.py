@@ -14,6 +14,7 @@ import numpy as np
 from ...data.keypoints import suffixes
 from ...files import regular_file
 from ...files.errors import FileError
+from ...files.image import focal_length
 
 if TYPE_CHECKING:
     from ...data.keypoints.detections import Detections
@@ -36,6 +37,7 @@ class Item:
     notes: list[str] = field(default_factory=list)
     flags: list[str] = field(default_factory=list)
     failure: str | None = None
+    focal: float | None = None  # pixels, where the photo's camera wrote it
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,9 @@ def detect(item: Item) -> None:
     except (ValueError, ImportError) as error:
         raise FileError(item.path, str(error)) from error
     item.notes += item.detections.notes
+    item.focal = focal_length(item.path)
+    if item.focal is not None:
+        item.notes.append(f"focal length: {item.focal:.0f} px, as the camera wrote it into the photo")
 
 
 def _size(options: InputOptions) -> tuple[tuple[float, float] | None, list[str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -73,10 +74,15 @@ class FitOptions:
             raise ValueError(f"preset {self.config.name} knows the person's size: give --height or --mass, or both")
 
     def problem(
-        self, model: ipt.BodyModel, detections: Detections, presented_body: PresentedBody | None = None
+        self,
+        model: ipt.BodyModel,
+        detections: Detections,
+        presented_body: PresentedBody | None = None,
+        focal: Sequence[float | None] | None = None,
     ) -> Problem:
-        """The fitting problem of detected people, who imitate a presented pose if there is one."""
-        known = {"focal": self.focal, "pitch": self.pitch, "ground": self.ground}
+        """The fitting problem of detected people, who imitate a presented pose if there is one. focal: pixels, of each
+        photo, where it is known and the options do not say another."""
+        known = {"focal": focal if self.focal is None else self.focal, "pitch": self.pitch, "ground": self.ground}
         known |= {} if self.camera is None else {"camera": self.camera}
         problem = detection_problem.problem_from_detections(
             model, detections, **known, height=self.height, mass=self.mass

@@ -193,7 +193,7 @@ def _fit_batch(
     if not usable:
         return
     detections = join([item.detections for item in usable if item.detections is not None])
-    problem = options.problem(model, detections, presented_body)
+    problem = options.problem(model, detections, presented_body, [item.focal for item in usable])
     config = options.config
     with progress(f"fitting {len(usable)}", len(usable) * len(config.stages)) as step:
         problem, variables = start.initial_state(problem, config.start)

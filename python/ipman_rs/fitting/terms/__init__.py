@@ -54,4 +54,7 @@ TERMS: dict[str, type[Term]] = {
     "contact_normals": ContactNormals,
 }
 
-__all__ = ["TERMS", "LeastSquares", "Term"]
+# What stands in a world with a floor: they need a ground, and hold a body up.
+PHYSICS = ("stability", "balance", "ground", "flat_soles", "segment_balance", "seat")
+
+__all__ = ["PHYSICS", "TERMS", "LeastSquares", "Term"]

@@ -36,8 +36,10 @@ class FlatSoles(LeastSquares):
         body = problem.body.body
         skin = skin_points(body)
         names = [f"{side}_{point}" for side in SIDES for point in POINTS]
-        names = [name for name in names if name in skin]
-        self.landmarks = Landmarks(problem.body, names) if names else None
+        missing = [name for name in names if name not in skin]
+        if missing:
+            raise ValueError(f"flat_soles: expected a body with feet, {body.name!r} has no {missing[0]}")
+        self.landmarks = Landmarks(problem.body, names)
         vertices = body.v_template
         self.flat = torch.as_tensor(vertices[[skin[name] for name in names], 1] - vertices[:, 1].min()).double()
         down = problem.feet_down
