@@ -14,7 +14,7 @@ import numpy as np
 
 import ipman_rs as ip
 from ipman_rs.body import BodyModel, pose_arrays
-from ipman_rs.files import read_json, safe_npz, write_whole
+from ipman_rs.files import read_json, safe_names, safe_npz, write_whole
 from ipman_rs.files.item_folder import RECORD
 from ipman_rs.fitting.jobs.options import fit_options
 from ipman_rs.fitting.jobs.run import fit_files
@@ -50,20 +50,20 @@ def benchmark(
     folder, output = Path(folder), Path(output)
     labels = read_labels(folder)
     results: dict[str, Verdicts] = {}
-    for preset in presets:
+    for preset, name in zip(presets, safe_names([Path(preset).stem for preset in presets]), strict=True):
         options = fit_options(preset, model)
         inputs = [_input(folder, label) for label in labels]
-        fits = fit_files(inputs, output / preset, options, resume=True, pictures=len(inputs), progress=progress)
+        fits = fit_files(inputs, output / name, options, resume=True, pictures=len(inputs), progress=progress)
         body = ip.load_body(model)
-        bodies = {study.source: (study, _measure(study, output / preset / study.name, body)) for study in fits.studies}
+        bodies = {study.source: (study, _measure(study, output / name / study.name, body)) for study in fits.studies}
         failures = dict(fits.failures)
-        results[preset] = [
+        results[name] = [
             (label, bodies[str(path)][1] if str(path) in bodies else None, failures.get(str(path), ""))
             for label, path in zip(labels, inputs, strict=True)
         ]
         studies = [bodies[str(path)][0] if str(path) in bodies else None for path in inputs]
-        with progress(f"drawing {preset}", len(labels)) as step:
-            draw_sheet(results[preset], studies, folder, output / f"photos_{preset}.png", step.one)
+        with progress(f"drawing {name}", len(labels)) as step:
+            draw_sheet(results[name], studies, folder, output / f"photos_{name}.png", step.one)
     return _write(results, output)
 
 
@@ -91,7 +91,7 @@ def _measure(study: Study, folder: Path, body: BodyModel) -> Measures:
         float(ip.support_margin(vertices, body.template, ground, threshold=CONTACT)),
         (soles[0], soles[1]),
         trunk_direction(dict(zip(body.joint_names, joints, strict=True)), up),
-        float(np.degrees(np.arcsin(np.clip(-forward @ up, -1, 1)))),
+        float(np.degrees(np.arcsin(np.clip(-forward @ up, -1, 1)))) + 0.0,
         float(record["reprojection"]["median_percent"]),
         confidence["level"],
         confidence.get("support", ""),
