@@ -55,16 +55,20 @@ class Candidate:
         return self.points_of(self.problem.landmarks)
 
     def points_of(self, landmarks: Landmarks) -> Tensor:
-        """Other named points (B, K, 3) m of the same body, in the world."""
+        """Other named points (B, K, 3) m of the same body, in the world. Posed once."""
         variables = self.variables
-        return landmarks(self.full_pose, variables["betas"], variables["transl"], self.expression)
+        given = (variables["betas"], variables["transl"], self.expression)
+        return self.shared(("points", landmarks), lambda: landmarks(self.full_pose, *given))
 
     def landmark_slopes(self, free: Sequence[str]) -> Tensor:
-        """The landmarks' derivatives (B, P, K, 3) by the free blocks; 0 by those of the camera. Made once."""
-        return self.shared(("landmark_slopes", tuple(free)), lambda: self.slopes_of(self.problem.landmarks, free))
+        """The landmarks' derivatives (B, P, K, 3) by the free blocks; 0 by those of the camera."""
+        return self.slopes_of(self.problem.landmarks, free)
 
     def slopes_of(self, landmarks: Landmarks, free: Sequence[str]) -> Tensor:
-        """The same of other named points of the body."""
+        """The same of other named points of the body. Made once."""
+        return self.shared(("slopes", landmarks, tuple(free)), lambda: self._slopes_of(landmarks, free))
+
+    def _slopes_of(self, landmarks: Landmarks, free: Sequence[str]) -> Tensor:
         variables, body = self.variables, self.problem.body.body
         by_body = landmarks.jacobian(self.full_pose, variables["betas"], self.expression)
         zero, shape = by_body.new_zeros(()), by_body.shape[2:]

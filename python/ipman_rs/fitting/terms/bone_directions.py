@@ -53,7 +53,7 @@ class BoneDirections(LeastSquares):
         self.directions = bone / length.clamp(min=SHORTEST)
 
     def residuals(self, candidate: Candidate) -> Tensor:
-        bone = self._bones(candidate.camera.turn(candidate.landmarks[:, None]))[:, 0]
+        bone = candidate.camera.turn(self._bones(candidate.landmarks)[:, None])[:, 0]
         difference = bone / _length(bone) - self.directions
         return (self.weight * self.rho * difference * self._soft(difference)).flatten(1)
 
@@ -61,10 +61,10 @@ class BoneDirections(LeastSquares):
         """d's derivative is (1 − b̂b̂ᵀ) / |b| times the bone's; that of ρ d / √(|d|² + ρ²) has another share along d."""
         if "camera_orient" in free:
             return None
-        bone = self._bones(candidate.camera.turn(candidate.landmarks[:, None]))[:, 0]
+        bone = candidate.camera.turn(self._bones(candidate.landmarks)[:, None])[:, 0]
         length = _length(bone)
         direction = bone / length
-        slopes = self._bones(candidate.camera.turn(candidate.landmark_slopes(free)))
+        slopes = candidate.camera.turn(self._bones(candidate.landmark_slopes(free)))
         along = (slopes * direction[:, None]).sum(dim=-1, keepdim=True)
         slopes = (slopes - along * direction[:, None]) / length[:, None]
         difference = direction - self.directions

@@ -18,11 +18,9 @@ from ipman_rs.checks import positive
 
 from ...body.landmarks import SIDES, skin_points
 from ..candidate import Candidate
-from ..landmarks import Landmarks
 from ..problem import Problem
+from ..support_points import NAMES, SOLE, support_points
 from .term import LeastSquares
-
-POINTS = ("heel", "big_toe", "small_toe")
 
 
 class FlatSoles(LeastSquares):
@@ -34,19 +32,16 @@ class FlatSoles(LeastSquares):
             raise ValueError("ground: expected one for flat soles; give it, or let a stage find it (find_ground)")
         self.rho = positive("rho", rho)
         body = problem.body.body
-        skin = skin_points(body)
-        names = [f"{side}_{point}" for side in SIDES for point in POINTS]
-        missing = [name for name in names if name not in skin]
-        if missing:
-            raise ValueError(f"flat_soles: expected a body with feet, {body.name!r} has no {missing[0]}")
-        self.landmarks = Landmarks(problem.body, names)
-        vertices = body.v_template
-        self.flat = torch.as_tensor(vertices[[skin[name] for name in names], 1] - vertices[:, 1].min()).double()
+        self.landmarks = support_points(problem.body)
+        soles = [f"{side}_{point}" for side in SIDES for point in SOLE]
+        self.places = [NAMES.index(name) for name in soles]
+        vertices, skin = body.v_template, skin_points(body)
+        rest = vertices[[skin[name] for name in soles], 1] - vertices[:, 1].min()
+        self.flat = torch.as_tensor(rest, dtype=torch.float64)
         down = problem.feet_down
         if down is None:
             down = torch.ones(problem.num_bodies, 2, dtype=torch.bool)
-        side = [list(SIDES).index(name.partition("_")[0]) for name in names]
-        self.weight = down[:, side].double()
+        self.weight = down.double().repeat_interleave(len(SOLE), dim=1)
 
     def residuals(self, candidate: Candidate) -> Tensor:
         difference = self._heights(candidate) - self.flat
@@ -56,13 +51,13 @@ class FlatSoles(LeastSquares):
         """h's derivative is the normal's share of the points'; that of ρ d / √(d² + ρ²) is (ρ / √(d² + ρ²))³."""
         difference = self._heights(candidate) - self.flat
         soft = self.rho * torch.rsqrt(difference.square() + self.rho**2)
-        slopes = candidate.slopes_of(self.landmarks, free)
+        slopes = candidate.slopes_of(self.landmarks, free)[:, :, self.places]
         by_height = (slopes * self._normal(slopes)).sum(dim=-1)
         return self.weight * difference * soft, (self.weight * soft**3)[:, None] * by_height
 
     def _heights(self, candidate: Candidate) -> Tensor:
         """(B, K) m."""
-        points = candidate.points_of(self.landmarks)
+        points = candidate.points_of(self.landmarks)[:, self.places]
         assert self.problem.ground is not None
         return (points * self._normal(points)).sum(dim=-1) - self.problem.ground.height.to(points).reshape(-1, 1)
 

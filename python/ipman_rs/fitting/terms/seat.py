@@ -15,8 +15,8 @@ from torch import Tensor
 from ipman_rs.checks import not_negative
 
 from ..candidate import Candidate
-from ..landmarks import Landmarks
 from ..problem import Problem
+from ..support_points import NAMES, support_points
 from .term import LeastSquares
 
 
@@ -28,17 +28,18 @@ class Seat(LeastSquares):
         if problem.ground is None:
             raise ValueError("ground: expected one for a seat; give it, or let a stage find it (find_ground)")
         self.slack = not_negative("slack", slack)
-        self.landmarks = Landmarks(problem.body, ("left_hip", "right_hip", "left_knee", "right_knee"))
+        self.landmarks = support_points(problem.body)
+        self.places = [NAMES.index(name) for name in ("left_hip", "right_hip", "left_knee", "right_knee")]
         seated = torch.zeros(problem.num_bodies, dtype=torch.bool) if problem.seated is None else problem.seated
         self.weight = seated.double()[:, None]
         self.up = problem.ground.normal.double().expand(problem.num_bodies, 3)
 
     def residuals(self, candidate: Candidate) -> Tensor:
-        return self._outside(candidate.points_of(self.landmarks))[0]
+        return self._outside(candidate.points_of(self.landmarks)[:, self.places])[0]
 
     def linearised(self, candidate: Candidate, free: Sequence[str]) -> tuple[Tensor, Tensor]:
-        residuals, side = self._outside(candidate.points_of(self.landmarks))
-        slopes = candidate.slopes_of(self.landmarks, free)
+        residuals, side = self._outside(candidate.points_of(self.landmarks)[:, self.places])
+        slopes = candidate.slopes_of(self.landmarks, free)[:, :, self.places]
         heights = (slopes * self.up[:, None, None]).sum(dim=-1)
         return residuals, side[:, None] * (heights[..., :2] - heights[..., 2:])
 

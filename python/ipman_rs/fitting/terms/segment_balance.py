@@ -18,8 +18,8 @@ from torch import Tensor
 from ipman_rs.checks import positive
 
 from ..candidate import Candidate
-from ..landmarks import Landmarks
 from ..problem import Problem
+from ..support_points import NAMES, support_points
 from .term import LeastSquares
 
 # Share of the whole mass, the segment's two ends, and where between them its centre of mass lies; limbs on either side.
@@ -44,9 +44,8 @@ class SegmentBalance(LeastSquares):
         segments += [
             (f"{side}_{a}", f"{side}_{b}", share, at) for side in ("left", "right") for a, b, share, at in LIMBS
         ]
-        ends = dict.fromkeys(name for a, b, _, _ in segments for name in (a, b))
-        names = list(dict.fromkeys([*ends, *SUPPORTS]))
-        self.landmarks = Landmarks(problem.body, names)
+        names = NAMES
+        self.landmarks = support_points(problem.body)
         mass = torch.zeros(len(names), dtype=torch.float64)
         for a, b, share, at in segments:
             mass[names.index(a)] += share * (1 - at)
