@@ -358,6 +358,7 @@ class DataFit(Resumable):
         columns = {name: arrays[name] for name in _COLUMNS if name in arrays}
         with atomic_write(self.folder / PREDICTIONS) as out:
             np.savez(out, allow_pickle=False, body=np.array(kind), **columns)
+        source = "the recorded pose of each frame" if self.pose is None else self.pose.name
         record = {
             "data": self.source.name,
             "split": self.source.split,
@@ -370,9 +371,7 @@ class DataFit(Resumable):
             "median_reprojection_px": float(np.median(arrays["median_px"])),
             "median_reprojection_percent": float(np.median(arrays["median_percent"])),
             "with_presented_contact": int((arrays["contact_vertices"] > 0).sum()) if self.imitates else None,
-            "presented": (self.pose.name if self.pose else "the recorded pose of each frame")
-            if self.imitates
-            else None,
+            "presented": source if self.imitates else None,
             "left_out": left_out,
         }
         write_whole(self.folder / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")

@@ -30,7 +30,7 @@ from .config import FitConfig, Stage
 from .fit import CHUNK, Fit, StageReport, run_stage, with_ground_under_body, with_static_mask
 from .objective import Objective
 from .problem import Problem
-from .solvers import Options, ValueAndGradient, minimise
+from .solvers import SolverOptions, ValueAndGradient, minimise
 from .solvers.arrow import Arrow, solve
 from .solvers.levenberg import levenberg
 from .terms.smoothness import Smoothness
@@ -173,7 +173,7 @@ class SequenceObjective:
     def solved(self, progress: Progress | None = None) -> tuple[dict[str, Tensor], StageReport]:
         """The variables of all frames, and how it went: the same for all but those that were left out."""
         options = self.stage.options
-        options = Options(options.iterations, options.gradient, options.decrease * self.frames)
+        options = SolverOptions(options.iterations, options.gradient, options.decrease * self.frames)
         told = None if progress is None else (lambda ended: progress(self.stage.name, ended * self.frames))
         solver = partial(levenberg, solve=solve)
         (outcome,) = minimise(solver, self.start[None], lambda _, points: [self.evaluation(points[0])], options, told)

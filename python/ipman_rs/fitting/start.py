@@ -29,7 +29,7 @@ from .fit import run_stage, with_ground_under_body
 from .objective import Objective
 from .problem import Problem
 from .rotations import matrix, nearest, vector
-from .solvers import Options
+from .solvers import SolverOptions
 from .variables import COMPONENTS, Variables, full_pose, pack, pose_blocks
 
 # Far joints of the trunk, whose lengths change least with the pose, and then those of the legs and arms.
@@ -194,7 +194,7 @@ def _best(
     tried = min(TRIED, count)
     order = costs.nan_to_num(nan=torch.inf).reshape(bodies, count).argsort(dim=1, stable=True)[:, :tried]
     rows = (order + count * torch.arange(bodies)[:, None]).flatten()
-    stage = Stage("start", free, WEIGHTS, "levenberg", Options(iterations=iterations, gradient=1.0, decrease=1.0))
+    stage = Stage("start", free, WEIGHTS, "levenberg", SolverOptions(iterations=iterations, gradient=1.0, decrease=1.0))
     found, report = run_stage(many.rows(rows), {name: value[rows] for name, value in starts.items()}, stage, {})
     ends = np.nan_to_num(sum(report.terms.values()), nan=np.inf).reshape(bodies, tried)
     winners = torch.from_numpy(ends.argmin(axis=1)) + tried * torch.arange(bodies)

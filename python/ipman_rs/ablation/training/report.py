@@ -19,11 +19,11 @@ from ipman_rs.files.page_templates import environment
 from ...training.metrics import COLUMNS, PoseMetrics, columns
 from .claims import UNITS, judge_claims
 from .intervals import paired_over_seeds
-from .run import TILTS, Benchmark, VariantResult
+from .run import TILTS, TrainingBenchmark, TrainingVariantResult
 from .variants import BASELINE, CONTROL, OURS
 
 Array = NDArray[np.floating]
-Found = Mapping[float, Sequence[VariantResult]]
+ResultsByTilt = Mapping[float, Sequence[TrainingVariantResult]]
 
 PAGES = {"keypoints": "training_benchmark", "images": "training_benchmark_images"}
 TEMPLATE = "training_benchmark.md.j2"
@@ -32,7 +32,7 @@ DIFFERENCES = {"PVE": 1, "BoSE": 1, "strict BoSE (exact CoM)": 1, "tilt": 2, "pe
 ASKED = 8.0  # degrees: the tilt at which something was to be shown
 
 
-def write(found: Found, run: Benchmark) -> Path:
+def write(found: ResultsByTilt, run: TrainingBenchmark) -> Path:
     """The files into the folder of the run; the page's path."""
     name = PAGES[run.task.name]
     record = {
@@ -67,7 +67,7 @@ def page(record: dict[str, Any]) -> str:
     )  # fmt: skip
 
 
-def _record(tilt: float, results: Sequence[VariantResult]) -> dict[str, Any]:
+def _record(tilt: float, results: Sequence[TrainingVariantResult]) -> dict[str, Any]:
     """Means and intervals of the labels of one tilt."""
     tables = {result.row.name: _stacked(result.figures) for result in results}
     baseline = tables[BASELINE]
@@ -128,7 +128,7 @@ def _signed(value: float, digits: int = 1) -> str:
     return f"{value:+.{digits}f}".replace("-", "−")
 
 
-def _write_csv(found: Found, path: Path) -> None:
+def _write_csv(found: ResultsByTilt, path: Path) -> None:
     """One line per body, row and seed."""
     file = io.StringIO(newline="")
     lines = csv.writer(file)

@@ -10,14 +10,14 @@ from .hand_prior import HandPrior
 from .jaw_prior import JawPrior
 from .joint_limits import JointLimits
 from .measured_shape import MeasuredShape
-from .physics import Balance, Ground, Stability
+from .physics import BalanceTerm, GroundTerm, StabilityTerm
 from .points_3d import Points3D
 from .pose_prior import PosePrior
 from .presented_contact import PresentedContact
 from .presented_orient import PresentedOrient
 from .presented_pose import PresentedPose
 from .reprojection import Reprojection
-from .self_contact import SelfContact, SelfPenetration
+from .self_contact import SelfContactTerm, SelfPenetrationTerm
 from .shape_prior import ShapePrior
 from .term import LeastSquares, Term
 from .vposer import VPoser
@@ -38,11 +38,11 @@ TERMS: dict[str, type[Term]] = {
     "hand_prior": HandPrior,
     "jaw_prior": JawPrior,
     "expression_prior": ExpressionPrior,
-    "stability": Stability,
-    "ground": Ground,
-    "balance": Balance,
-    "self_contact": SelfContact,
-    "self_penetration": SelfPenetration,
+    "stability": StabilityTerm,
+    "ground": GroundTerm,
+    "balance": BalanceTerm,
+    "self_contact": SelfContactTerm,
+    "self_penetration": SelfPenetrationTerm,
     "contact_normals": ContactNormals,
 }
 
