@@ -295,8 +295,8 @@ def test_only_static_holds_from_the_start_of_a_stage():
     on_floor, in_air = standing(("standing",)), standing(("standing",), lift=0.5)
     start = cases.candidate(problem, **{name: torch.cat([on_floor[name], in_air[name]]) for name in on_floor})
     landed = cases.candidate(problem, **{name: torch.cat([on_floor[name]] * 2) for name in on_floor})
-    judged = replace(problem, static=static_gate.static_mask(start.vertices, problem.body.template, problem.ground))
-    always, static = GroundTerm(problem), GroundTerm(judged, only_static=True)
+    gated = replace(problem, static=static_gate.static_mask(start.vertices, problem.body.template, problem.ground))
+    always, static = GroundTerm(problem), GroundTerm(gated, only_static=True)
     for body in (start, landed):
         assert torch.equal(static.cost(body)[0], always.cost(body)[0])
         assert static.cost(body)[1] == 0

@@ -12,7 +12,7 @@ import numpy as np
 from ..body import pose_arrays, rotations
 from ..body.joints import LEFT_HAND, RIGHT_HAND
 from ..body.sequence import Index, PosedSequence, rows_of
-from ..data import check, judge
+from ..data import check, plausibility
 from ..data.check import Finding
 from ..files import safe_npz
 from ..files.errors import FileError
@@ -278,7 +278,7 @@ def _seconds(stored: StoredArrays, frames: int, rate: float | None) -> tuple[np.
             return None, [Finding("wrong", said, option="--rate HZ")]
         hertz = float(same[0])
     assert hertz is not None
-    findings = judge.rate(hertz)
+    findings = plausibility.rate(hertz)
     usable = np.isfinite(hertz) and hertz > 0
     return np.arange(frames) / hertz if usable else None, findings
 
@@ -290,7 +290,11 @@ def _angles(pieces: Sequence[pose_arrays.Piece], degrees: bool) -> list[Finding]
         found = check.radians(piece.name, piece.rotations[check.evenly(len(piece.rotations))])
         if found:
             return found
-    return judge.degrees([piece.rotations[check.evenly(len(piece.rotations))] for piece in vectors]) if degrees else []
+    return (
+        plausibility.degrees([piece.rotations[check.evenly(len(piece.rotations))] for piece in vectors])
+        if degrees
+        else []
+    )
 
 
 def _columns(pieces: Sequence[pose_arrays.Piece]) -> list[Finding]:
@@ -306,7 +310,7 @@ def _places(stored: StoredArrays, trans: np.ndarray | None, seconds: np.ndarray 
     if trans is None:
         return []
     name = str(stored.name(*_TRANSLATIONS))
-    return check.near_origin(name, trans[check.evenly(len(trans))]) or judge.speed(name, trans, seconds)
+    return check.near_origin(name, trans[check.evenly(len(trans))]) or plausibility.speed(name, trans, seconds)
 
 
 def _gender(stored: StoredArrays, body: Any, model: str) -> list[Finding]:
