@@ -258,7 +258,7 @@ class DataFit(Resumable):
         if self.keypoints is None:
             return data_frames.detections_of(frame)
         name = str(frame.names[0])
-        endings = [f"{said}{suffix}" for suffix in keypoints.suffixes() for said in ("", "_keypoints")]
+        endings = [f"{mark}{suffix}" for suffix in keypoints.suffixes() for mark in ("", "_keypoints")]
         places = [self.keypoints / f"{name}{ending}" for ending in endings]
         place = next((place for place in places if place.is_file()), None)
         if place is None:

@@ -188,8 +188,8 @@ def camera_flags(camera: KnownCamera, size: np.ndarray) -> list[str]:
     center = np.array(camera.center)
     if (abs(center - size / 2) < CENTER * size).all():
         return []
-    said = f"the camera's center ({center[0]:g}, {center[1]:g}) is far from the middle of the {size[0]:g} × {size[1]:g}"
-    return [f"{said} image: is the camera of another image size?"]
+    flag = f"the camera's center ({center[0]:g}, {center[1]:g}) is far from the middle of the {size[0]:g} × {size[1]:g}"
+    return [f"{flag} image: is the camera of another image size?"]
 
 
 def _pair(where: dict[str, np.ndarray], joint: str) -> list[np.ndarray]:

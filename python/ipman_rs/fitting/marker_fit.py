@@ -132,8 +132,8 @@ def fit_tracks(
     if betas is not None:
         start["betas"] = betas.expand(len(tracks), -1).clone()
     rate = tracks.rate or 1.0
-    found = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
-    return MarkerFit(found, tracks, sites, unknown, unseen, markers.meanings(tracks.names, own))
+    fitted = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
+    return MarkerFit(fitted, tracks, sites, unknown, unseen, markers.meanings(tracks.names, own))
 
 
 def check_fit(recorded: MarkerFit) -> list[Finding]:
@@ -143,8 +143,8 @@ def check_fit(recorded: MarkerFit) -> list[Finding]:
         mass = np.asarray(ipt.mass_properties(vertices, recorded.fit.problem.body.template).mass)
     errors = recorded.errors
     known = errors[np.isfinite(errors)]
-    found = plausibility.marker_error(float(known.mean())) if len(known) else []
-    return found + plausibility.masses(np.atleast_1d(mass), vertices.numpy())
+    findings = plausibility.marker_error(float(known.mean())) if len(known) else []
+    return findings + plausibility.masses(np.atleast_1d(mass), vertices.numpy())
 
 
 def _shape_kept(config: FitConfig) -> FitConfig:
@@ -166,9 +166,9 @@ def _calibrated(
     for _ in range(times):
         problem = problem_of(body, tracks, sites, ground)
         start = start_at_points(problem) if variables is None else variables
-        found = fit_sequence(problem, start, config, smoothness=0, progress=progress)
-        variables = dict(found.variables)
-        bodies = found.candidate.full_pose, variables["betas"], variables["transl"]
+        fitted = fit_sequence(problem, start, config, smoothness=0, progress=progress)
+        variables = dict(fitted.variables)
+        bodies = fitted.candidate.full_pose, variables["betas"], variables["transl"]
         points, confidence = torch.from_numpy(tracks.points), torch.from_numpy(tracks.confidence)
         sites = calibrate_sites(body, sites, bodies, points, confidence)
     return None if variables is None else variables["betas"][:1], sites

@@ -125,10 +125,10 @@ def load(
             raise ValueError(f"{path}: {what}")
         listed = ", ".join(poses.NAMES)
         raise ValueError(f"no pose {str(name)!r}; there are {listed}, or a file ending in {' '.join(ENDINGS)}")
-    found = presented_files.read(path, body, frame, up)
+    stored = presented_files.read(path, body, frame, up)
     contact_from = "file" if given is None else "given"
-    known = found.contact if given is None else given
-    return presented_body(str(path), found.pose, body, known, contact_from, found.height, found.notes)
+    known = stored.contact if given is None else given
+    return presented_body(str(path), stored.pose, body, known, contact_from, stored.height, stored.notes)
 
 
 def presented_body(

@@ -13,9 +13,9 @@ __all__ = ["left_jacobian", "matrix", "nearest", "quaternion", "vector"]
 
 def nearest(matrices: torch.Tensor) -> torch.Tensor:
     """The rotations nearest to matrices (..., 3, 3)."""
-    found = procrustes(matrices, force_rotation=True, method="svd")
-    assert isinstance(found, torch.Tensor)
-    return found
+    rotations = procrustes(matrices, force_rotation=True, method="svd")
+    assert isinstance(rotations, torch.Tensor)
+    return rotations
 
 
 def left_jacobian(rotations: torch.Tensor) -> torch.Tensor:

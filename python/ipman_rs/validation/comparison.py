@@ -31,7 +31,7 @@ class MeasuredComparison:
     """T frames at `times`; `plates`, y up, and `reference`, a centre of mass (T, 3) m, at these times.
 
     NaN where nothing was measured. `seen` (T,): frames with enough visible markers to locate the body.
-    `reference_name`: of its source. `standing`: the person's mass, kg, by plates on which they stood still; NaN if unknown.
+    `reference_name`: of its source. `standing`: mass, kg, of the person by plates on which they stood still, or NaN.
 
     Raises:
         ValueError: the measurements are far from the body, as in other units or axes.

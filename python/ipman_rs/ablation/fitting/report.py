@@ -166,13 +166,13 @@ def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
             continue
         row = "both" if not isinstance(block["told"], float) else "ours"
         pve, bose = (rows[row]["against baseline"][key] for key in ("PVE", "BoSE 3 cm"))
-        said = f"PVE {_interval(pve)} mm, BoSE 3 cm {_interval(bose, 0)} points"
+        numbers = f"PVE {_interval(pve)} mm, BoSE 3 cm {_interval(bose, 0)} points"
         balanced = _direction(bose) == 1
         if not isinstance(block["told"], float):
-            lines.append((f"{block['name']}: both terms better", _direction(pve) == -1 and balanced, said))
+            lines.append((f"{block['name']}: both terms better", _direction(pve) == -1 and balanced, numbers))
         else:
             lines.append(
-                (f"{block['name']}: ours more balanced, PVE no worse", _direction(pve) in (-1, 0) and balanced, said)
+                (f"{block['name']}: ours more balanced, PVE no worse", _direction(pve) in (-1, 0) and balanced, numbers)
             )
     return lines
 

@@ -35,13 +35,13 @@ def lbfgs(start: Vector, options: SolverOptions) -> Generator[Vector, ValueAndGr
             memory.clear()
             direction = -evaluation.gradient
         first = 1.0 if memory else min(1.0, 1.0 / np.abs(evaluation.gradient).sum())
-        found = yield from _search(point, evaluation, direction, first)
-        if found is None:
+        searched = yield from _search(point, evaluation, direction, first)
+        if searched is None:
             if not memory:
                 return Outcome(point, evaluation.value, iteration, "no descent")
             memory.clear()
             continue
-        step, new = found
+        step, new = searched
         change, turn = step * direction, new.gradient - evaluation.gradient
         if change @ turn > 1e-10 * (turn @ turn):
             memory.append((change, turn))

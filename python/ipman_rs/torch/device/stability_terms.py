@@ -60,8 +60,8 @@ def values_and_gradient(
     tables: Tables, o: StabilityOptions, curve: str, vertices: Tensor, normal: Tensor, height: Tensor, weights: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Values (B, 3), and the gradient (B, V, 3) of Σ weights (B, 3) · values; 0 for a body that is not finite."""
-    found, stage = _values(tables, o, curve, vertices, normal, height)
-    return found, _gradient(tables, o, curve, stage, weights)
+    terms, stage = _values(tables, o, curve, vertices, normal, height)
+    return terms, _gradient(tables, o, curve, stage, weights)
 
 
 def _values(
@@ -101,9 +101,9 @@ def _values(
     # (Eq. 6) and (Eq. 7)
     pull = o.alpha1 * _wave(curve, at_samples.clamp(min=0) / o.alpha2)[0].mean(dim=-1, dtype=wide)
     push = o.beta1 * _wave(curve, at_samples.clamp(max=0) / o.beta2)[0].mean(dim=-1, dtype=wide)
-    found = torch.stack([length, pull, push], dim=-1).to(points.dtype)
-    found = torch.where(finite[:, None], found, torch.nan)
-    return found, Stage(
+    terms = torch.stack([length, pull, push], dim=-1).to(points.dtype)
+    terms = torch.where(finite[:, None], terms, torch.nan)
+    return terms, Stage(
         finite, points, narrow, at_samples, density, load, total, cop, area, volume, sums, com, offset, length
     )
 
