@@ -7,6 +7,8 @@ from importlib import import_module
 import pytest
 
 RENAMED = {
+    "ipman_rs.ablation.fitting.run": {"Benchmark": "FittingBenchmark"},
+    "ipman_rs.ablation.training.run": {"Benchmark": "TrainingBenchmark"},
     "ipman_rs.evaluation": {"Comparison": "PairedComparison"},
     "ipman_rs.evaluation.tables": {"Measured": "MethodSummary", "measured": "summarise"},
     "ipman_rs.validation": {"Comparison": "MeasuredComparison"},
@@ -18,10 +20,11 @@ RENAMED = {
     "ipman_rs.fitting.detection_problem": {"problem": "problem_from_detections"},
     "ipman_rs.fitting.marker_fit": {"Recorded": "MarkerFit"},
     "ipman_rs.fitting.result": {"results": "fit_results"},
+    "ipman_rs.fitting.solvers": {"Options": "SolverOptions"},
     "ipman_rs.fitting.start": {"begin": "initial_state"},
     "ipman_rs.training.losses": {"Physics": "PhysicsLoss"},
 }
-NEED_TORCH = ("ipman_rs.fitting.", "ipman_rs.training.")
+NEED_TORCH = ("ipman_rs.ablation.", "ipman_rs.fitting.", "ipman_rs.training.")
 
 
 @pytest.mark.parametrize(

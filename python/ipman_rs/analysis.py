@@ -114,9 +114,9 @@ def analyze(
         UnitsWarning: a body is too large or too small for metres.
     """
     bodies = Bodies(vertices, template)
-    found = _analyze(bodies, ground, presets.get(preset), density, with_pressure)
-    _warn_units(bodies.vertices, np.ravel(found.status))
-    return found
+    analysis = _analyze(bodies, ground, presets.get(preset), density, with_pressure)
+    _warn_units(bodies.vertices, np.ravel(analysis.status))
+    return analysis
 
 
 def analyze_poses(
@@ -172,10 +172,10 @@ def analyze_sequence(
     warned, start = False, 0
     for vertices in pieces(bodies, piece):
         checked = Bodies(vertices, template)
-        found = _analyze(checked, ground, constants, density, with_pressure)
-        warned = warned or _warn_units(checked.vertices, found.status, start)
+        analysis = _analyze(checked, ground, constants, density, with_pressure)
+        warned = warned or _warn_units(checked.vertices, analysis.status, start)
         start += len(vertices)
-        yield found
+        yield analysis
 
 
 def _analyze(

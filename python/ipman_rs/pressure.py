@@ -65,9 +65,9 @@ def binary_center_of_pressure(
     Bodies(vertices, template).over(ground)  # that they fit together
     samples = np.asarray(sample_surface(vertices, template))
     contact = np.abs(ground.signed_height(samples)) < metres
-    found = np.full((*samples.shape[:-2], 3), np.nan, samples.dtype)
-    for body in np.ndindex(found.shape[:-1]):
+    centers = np.full((*samples.shape[:-2], 3), np.nan, samples.dtype)
+    for body in np.ndindex(centers.shape[:-1]):
         if contact[body].any():
             with np.errstate(over="ignore"):  # a sum that double precision cannot hold becomes infinite
-                found[body] = samples[body][contact[body]].mean(axis=0, dtype=np.float64)
-    return found
+                centers[body] = samples[body][contact[body]].mean(axis=0, dtype=np.float64)
+    return centers

@@ -88,12 +88,12 @@ def test_the_camera_sees_the_person(known):
     np.testing.assert_allclose(turns @ turns.transpose(1, 2), np.eye(3)[None].repeat(4, 0), atol=1e-12)
     assert (torch.linalg.det(turns) > 0.999).all()
     assert (turns[:, 1, 1] < -0.5).all()
-    task = observations.calibrated_task(known, 0)
+    observed = observations.calibrated_observations(known, 0)
     landmarks = torch.from_numpy(known.landmarks)
     there = truth.landmark_names(load_body(truth.FITTED))
-    points = task.camera.project(landmarks[:, [there.index(name) for name in task.problem.landmarks.names]])
-    assert (points - task.problem.points).norm(dim=-1).median() < 25
-    assert task.problem.confidence.unique().tolist() == [0.0, 1.0]
+    points = observed.camera.project(landmarks[:, [there.index(name) for name in observed.problem.landmarks.names]])
+    assert (points - observed.problem.points).norm(dim=-1).median() < 25
+    assert observed.problem.confidence.unique().tolist() == [0.0, 1.0]
 
 
 def test_along_floor_finds_a_turn_and_a_shift(known):
@@ -104,8 +104,8 @@ def test_along_floor_finds_a_turn_and_a_shift(known):
 
 
 def test_snapped_bodies_lie_on_the_floor(known):
-    task = observations.calibrated_task(known, 0)
-    found = metrics.fit_metrics(metrics.snap_to_floor(Fit(task.problem, task.starts)), task, known)
+    observed = observations.calibrated_observations(known, 0)
+    found = metrics.fit_metrics(metrics.snap_to_floor(Fit(observed.problem, observed.starts)), observed, known)
     assert abs(found.lowest).max() < 1e-6
 
 

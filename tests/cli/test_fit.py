@@ -177,7 +177,7 @@ def test_x_and_y_swapped(standing):
     points, size = standing[known, :2] * [1920, 1080], np.array([1920, 1080])
     seen = [str(names[column]) for column in known], standing[known, 3]
     right, swapped = (
-        detection_problem.suspicious_keypoints(seen[0], each, seen[1], size[::way])
+        detection_problem.keypoint_flags(seen[0], each, seen[1], size[::way])
         for each, way in ((points, 1), (points[:, ::-1], -1))
     )
     said = "lies across the image, head beside feet: are x and y of the keypoints swapped?"

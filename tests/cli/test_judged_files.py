@@ -372,11 +372,11 @@ def test_other_files_go_on(run, mesh, tmp_path):
 
 def test_what_is_odd_about_a_predicted_body(lite_body, standing):
     pytest.importorskip("timm", reason="needs the extra train")
-    from ipman_rs.training.predicted_images import odd_about
+    from ipman_rs.training.predicted_images import body_flags
 
-    assert odd_about("a.jpg", standing, lite_body.template, np.array([0.0, 1.0, 0.0])) == ()
-    large = odd_about("a.jpg", 1.7 * standing, lite_body.template, np.array([0.0, 1.0, 0.0]))
+    assert body_flags("a.jpg", standing, lite_body.template, np.array([0.0, 1.0, 0.0])) == ()
+    large = body_flags("a.jpg", 1.7 * standing, lite_body.template, np.array([0.0, 1.0, 0.0]))
     assert large == ("a person of 301.4 kg",)
-    assert odd_about("a.jpg", standing, lite_body.template, np.array([0.0, -1.0, 0.0])) == (
+    assert body_flags("a.jpg", standing, lite_body.template, np.array([0.0, -1.0, 0.0])) == (
         "stands on its head, with its feet in the air",
     )

@@ -26,7 +26,7 @@ def beside(mesh, other, place):
     return trimesh.util.concatenate([mesh, other.copy().apply_translation(place)])
 
 
-def judged(mesh):
+def findings(mesh):
     return [each.what for each in separate_pieces.check_pieces(mesh.vertices, mesh.faces, np.array([0.0, 1.0, 0.0]))]
 
 
@@ -56,12 +56,12 @@ def test_two_bodies_in_one_file_are_marked_everywhere(tmp_path, person, name, fr
     "thing", [trimesh.creation.box((0.45, 0.9, 0.45)), trimesh.creation.box((1.0, 0.001, 1.0))], ids=["chair", "floor"]
 )
 def test_a_thing_beside_a_body_is_a_piece(person, thing):
-    assert judged(beside(person, thing, [0, 0.45, 0.8])) == [SEVERAL.partition(";")[0]]
+    assert findings(beside(person, thing, [0, 0.45, 0.8])) == [SEVERAL.partition(";")[0]]
 
 
 def test_eyes_and_shoes_are_no_bodies(person):
     eye, shoe = trimesh.creation.icosphere(1, 0.012), trimesh.creation.box((0.1, 0.05, 0.3))
-    assert judged(beside(beside(person, eye, [0, 1.6, 0.1]), shoe, [0.1, 0.0, 0.0])) == []
+    assert findings(beside(beside(person, eye, [0, 1.6, 0.1]), shoe, [0.1, 0.0, 0.0])) == []
 
 
 @pytest.mark.parametrize(
@@ -74,4 +74,4 @@ def test_a_speck_below_the_soles_is_marked(tmp_path, person, speck):
     done = CliRunner().invoke(main, ["analyze", str(path), "--json"])
     (flag,) = json.loads(done.stdout)["bodies"][0]["flags"]
     assert flag == f"{said} the body; the ground and the contact are theirs: take them out of the file"
-    assert judged(beside(person, speck, [0, 2.0, 0])) == []
+    assert findings(beside(person, speck, [0, 2.0, 0])) == []

@@ -1,4 +1,4 @@
-"""What markers of other laboratories' sets mean, by their names; users' own names; what the judge says of them."""
+"""What markers of other laboratories' sets mean, by their names; users' own names; findings about them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("torch", reason="torch is an extra")
 
 import ipman_rs as ip
-from ipman_rs.data.markers import judged, meanings, own
+from ipman_rs.data.markers import meanings, own, plausibility
 from ipman_rs.data.markers.anatomy import Anatomy, harrington
 from ipman_rs.data.markers.names import comparable, unmatched
 from ipman_rs.data.markers.skin_distance import mean_distances, signed_distance
@@ -228,7 +228,7 @@ def tracks(points=STANDING, names=NAMES, up="y", unit=1.0):
 
 
 def wrong(one, up_is_said=False):
-    found = judged.check_points(one, meanings(one.names), up_is_said)
+    found = plausibility.check_points(one, meanings(one.names), up_is_said)
     return [finding for finding in found if finding.level == "wrong"]
 
 
@@ -263,11 +263,11 @@ def test_units_are_refused_and_mended():
 
 
 def test_markers_below_the_floor():
-    (finding,) = judged.check_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES))
+    (finding,) = plausibility.check_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES))
     assert finding.what == "the lowest markers are 0.95 m below the floor in the median"
     assert finding.option == "--ground HEIGHT"
-    assert judged.check_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES), ground=-1.0) == []
-    assert judged.check_floor(tracks(), meanings(NAMES)) == []
+    assert plausibility.check_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES), ground=-1.0) == []
+    assert plausibility.check_floor(tracks(), meanings(NAMES)) == []
 
 
 SWAP = {"L": "R", "R": "L"}
@@ -291,30 +291,30 @@ def test_left_and_right_exchanged_in_a_part():
     """Of the feet alone: names, or crossed legs."""
     swapped = [SWAP[name[0]] + name[1:] if name[1:] in ("HEE", "TOE") else name for name in WITH_FEET]
     one = tracks(STANDING_FEET, swapped)
-    (finding,) = (each for each in judged.check_points(one, meanings(one.names)) if each.level != "ok")
+    (finding,) = (each for each in plausibility.check_points(one, meanings(one.names)) if each.level != "ok")
     assert (finding.level, finding.what) == ("odd", "left and right look swapped of feet")
 
 
 def test_what_the_markers_do_not_say():
     legs = [name for name in NAMES if name not in ("C7", "CLAV")]
-    (finding,) = judged.check_coverage(legs, meanings(legs))
+    (finding,) = plausibility.check_coverage(legs, meanings(legs))
     assert finding.what.startswith("no marker above the pelvis was ever seen: trunk, arms, mass and centre of mass")
-    (finding,) = judged.check_coverage(NAMES, meanings(NAMES))
+    (finding,) = plausibility.check_coverage(NAMES, meanings(NAMES))
     assert finding.what == "no marker on head and arms was ever seen: there the body's mean is shown"
     whole = [*NAMES, "LFHD", "LELB"]
-    assert judged.check_coverage(whole, meanings(whole)) == []
+    assert plausibility.check_coverage(whole, meanings(whole)) == []
 
 
 def test_markers_off_the_skin_are_flagged():
-    assert judged.check_skin({"C7": 0.01, "LASI": 0.03}) == []
-    (finding,) = judged.check_skin({"C7": 0.01, "LKNE": -0.038, "RKNE": 0.06})
+    assert plausibility.check_skin({"C7": 0.01, "LASI": 0.03}) == []
+    (finding,) = plausibility.check_skin({"C7": 0.01, "LKNE": -0.038, "RKNE": 0.06})
     assert finding.level == "odd"
     assert "2 of 3 markers are not on the skin of the fitted body (RKNE +60 mm, LKNE -38 mm;" in finding.what
 
 
 def test_wands_are_no_markers_on_the_skin():
     found = meanings(["LTHI", "RTIB", "LTH1", "LHJC", "LKJC", "LKNE", "C7", "L_thigh1"])
-    assert [name for name, place in found.items() if judged.on_skin(place)] == ["LKNE", "C7", "L_thigh1"]
+    assert [name for name, place in found.items() if plausibility.on_skin(place)] == ["LKNE", "C7", "L_thigh1"]
     body = ip.load_body("anny-lite")
     anatomy = Anatomy(body)
     from ipman_rs.data.markers import sites

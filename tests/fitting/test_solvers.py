@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from ipman_rs.fitting.solvers import SOLVERS, Options, ValueAndGradient, minimise
+from ipman_rs.fitting.solvers import SOLVERS, SolverOptions, ValueAndGradient, minimise
 
 TIMES = np.linspace(0, 3, 20)
 VALUES = 2 * np.exp(-1.3 * TIMES) + 0.1 * np.cos(9 * TIMES)
-STRICT = Options(iterations=400, gradient=1e-8, decrease=0.0)
+STRICT = SolverOptions(iterations=400, gradient=1e-8, decrease=0.0)
 
 
 def rosenbrock(x):
@@ -80,7 +80,7 @@ def test_a_constant_does_not_fool_the_end(name):
         minimise(
             SOLVERS[name], np.array([[-1.2, 1.0]]),
             everywhere(lambda x, c=constant: replace(rosenbrock(x), value=rosenbrock(x).value + c)),
-            Options(iterations=400, gradient=1e-5, decrease=1e-9),
+            SolverOptions(iterations=400, gradient=1e-5, decrease=1e-9),
         )[0]
         for constant in (0.0, 8192.0)
     ]  # fmt: skip
@@ -103,5 +103,5 @@ def test_company_changes_nothing(name):
 
 @pytest.mark.parametrize("name", SOLVERS)
 def test_the_end_of_iterations_is_said(name):
-    (outcome,) = minimise(SOLVERS[name], np.array([[-1.2, 1.0]]), everywhere(rosenbrock), Options(iterations=3))
+    (outcome,) = minimise(SOLVERS[name], np.array([[-1.2, 1.0]]), everywhere(rosenbrock), SolverOptions(iterations=3))
     assert (outcome.reason, outcome.iterations, outcome.converged) == ("iterations", 3, False)

@@ -18,7 +18,7 @@ from ipman_rs.fitting import static_gate
 from ipman_rs.fitting.geodesics import Geodesics, geodesics
 from ipman_rs.fitting.terms import physics
 from ipman_rs.fitting.terms.measured_shape import CAP, MeasuredShape, exponential
-from ipman_rs.fitting.terms.physics import Balance, Ground, Stability
+from ipman_rs.fitting.terms.physics import BalanceTerm, GroundTerm, StabilityTerm
 from ipman_rs.fitting.terms.presented_contact import PresentedContact
 from tests.helpers import fit_terms_cases as cases
 
@@ -193,8 +193,8 @@ def standing(names: tuple[str, ...], dtype: torch.dtype = torch.float64, lift: f
     return values
 
 
-SATURATED = functools.partial(Balance, wrap="saturate")
-PHYSICS = {"stability": Stability, "ground": Ground, "balance": Balance, "saturated": SATURATED}
+SATURATED = functools.partial(BalanceTerm, wrap="saturate")
+PHYSICS = {"stability": StabilityTerm, "ground": GroundTerm, "balance": BalanceTerm, "saturated": SATURATED}
 
 
 def test_physics_is_the_cores():
@@ -204,11 +204,11 @@ def test_physics_is_the_cores():
     template, floor = problem.body.template, problem.ground
     stability = ipt.stability_loss(body.vertices, template, floor, alpha=70.0)
     pull, push = ipt.ground_loss(body.vertices, template, floor)
-    torch.testing.assert_close(Stability(problem).cost(body), stability, rtol=1e-12, atol=0)
-    torch.testing.assert_close(Ground(problem).cost(body), pull + push, rtol=1e-12, atol=0)
-    torch.testing.assert_close(Ground(problem, pull=0.3).cost(body), 0.3 * pull + push, rtol=1e-12, atol=0)
+    torch.testing.assert_close(StabilityTerm(problem).cost(body), stability, rtol=1e-12, atol=0)
+    torch.testing.assert_close(GroundTerm(problem).cost(body), pull + push, rtol=1e-12, atol=0)
+    torch.testing.assert_close(GroundTerm(problem, pull=0.3).cost(body), 0.3 * pull + push, rtol=1e-12, atol=0)
     balance = ipt.balance_cost(body.vertices, template, floor)
-    torch.testing.assert_close(Balance(problem).cost(body), balance, rtol=1e-9, atol=1e-12)
+    torch.testing.assert_close(BalanceTerm(problem).cost(body), balance, rtol=1e-9, atol=1e-12)
     saturated = -torch.expm1(-balance)  # J / (1 + J) of log(1 + J)
     torch.testing.assert_close(SATURATED(problem).cost(body), saturated, rtol=1e-9, atol=1e-12)
 
@@ -220,12 +220,12 @@ def test_terms_of_one_preset_share_an_evaluation(monkeypatch):
         ipt.IntuitivePhysicsLoss, "forward", lambda self, *given: calls.append(self) or forward(self, *given)
     )
     problem = cases.problem(1)
-    stability, ground = Stability(problem), Ground(problem)
+    stability, ground = StabilityTerm(problem), GroundTerm(problem)
     for count in (1, 2):
         body = cases.candidate(problem, **standing(("tree",)))
         stability.cost(body), ground.cost(body)
         assert len(calls) == count
-    Ground(problem, samples=2000).cost(body)
+    GroundTerm(problem, samples=2000).cost(body)
     assert len(calls) == 3
     assert calls[-1].template.num_samples == 2000
 
@@ -258,9 +258,9 @@ def test_physics_rows_are_alone(name, dtype):
 
 def test_wrong_presets_are_refused():
     with pytest.raises(ValueError, match="preset: 'balanced' has balance, pull, push, but no stability"):
-        Stability(cases.problem(), preset="balanced")
+        StabilityTerm(cases.problem(), preset="balanced")
     with pytest.raises(ValueError, match="preset: 'paper-r' has .* but no balance"):
-        Balance(cases.problem(), preset="paper-r")
+        BalanceTerm(cases.problem(), preset="paper-r")
 
 
 def test_switch_leaves_jumping_and_tipping_bodies_alone():
@@ -295,8 +295,8 @@ def test_only_static_holds_from_the_start_of_a_stage():
     on_floor, in_air = standing(("standing",)), standing(("standing",), lift=0.5)
     start = cases.candidate(problem, **{name: torch.cat([on_floor[name], in_air[name]]) for name in on_floor})
     landed = cases.candidate(problem, **{name: torch.cat([on_floor[name]] * 2) for name in on_floor})
-    judged = replace(problem, static=static_gate.static_mask(start.vertices, problem.body.template, problem.ground))
-    always, static = Ground(problem), Ground(judged, only_static=True)
+    gated = replace(problem, static=static_gate.static_mask(start.vertices, problem.body.template, problem.ground))
+    always, static = GroundTerm(problem), GroundTerm(gated, only_static=True)
     for body in (start, landed):
         assert torch.equal(static.cost(body)[0], always.cost(body)[0])
         assert static.cost(body)[1] == 0

@@ -232,7 +232,7 @@ def test_tables_are_in_the_persons_own_axes(lite, standing):
     bodies = swaying(standing) @ turn.T
     com = ip.mass_properties(bodies[0], lite.template).center
     reference = np.tile(com + [-0.03, -0.01, -0.02], (FRAMES, 1))
-    one = compared(lite, bodies, None, reference, judge="Plug-in Gait")
+    one = compared(lite, bodies, None, reference, reference_name="Plug-in Gait")
     np.testing.assert_allclose(one.forward, np.tile([1.0, 0, 0], (FRAMES, 1)), atol=1e-6)
     found = figures(one)["com"]
     assert (found["judge"], found["axes"]) == ("Plug-in Gait", ["forward", "left", "up"])

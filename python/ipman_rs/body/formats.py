@@ -23,8 +23,8 @@ FORMATS: dict[str, BodyFormat] = {
 
 def titles() -> str:
     """The kinds of models, for readers: "SMPL, SMPL+H or SMPL-X"."""
-    said = [format.title for format in FORMATS.values()]
-    return f"{', '.join(said[:-1])} or {said[-1]}"
+    titles = [format.title for format in FORMATS.values()]
+    return f"{', '.join(titles[:-1])} or {titles[-1]}"
 
 
 def load(
@@ -43,8 +43,8 @@ def load(
     if not fitting:
         smpl_files.refuse(file)
     if len(fitting) > 1:
-        said = " or of ".join(format.title for format in fitting)
-        raise ValueError(f"{path}: may be a model of {said}; nothing in it tells which")
+        candidates = " or of ".join(format.title for format in fitting)
+        raise ValueError(f"{path}: may be a model of {candidates}; nothing in it tells which")
     return fitting[0].load(file, num_betas=num_betas, flat_hand_mean=flat_hand_mean, v_template=v_template)
 
 

@@ -35,11 +35,11 @@ Array = NDArray[Any]
 
 def pieces_of() -> dict[str, list[Joints]]:
     """The arrays that hold a piece of the pose, in files of all kinds of models, and the joints that each may have."""
-    found: dict[str, list[Joints]] = {}
+    pieces: dict[str, list[Joints]] = {}
     for format in FORMATS.values():
         for name, sets in format.pieces.items():
-            found[name] = list(dict.fromkeys((*found.get(name, ()), *sets)))
-    return found
+            pieces[name] = list(dict.fromkeys((*pieces.get(name, ()), *sets)))
+    return pieces
 
 
 def names() -> set[str]:
@@ -183,8 +183,8 @@ def _stored(first: Callable[..., Array | None], base: str) -> tuple[str, Array] 
     return None
 
 
-def _listed(found: tuple[str, Array] | None) -> list[tuple[str, Array]]:
-    return [] if found is None else [found]
+def _listed(named: tuple[str, Array] | None) -> list[tuple[str, Array]]:
+    return [] if named is None else [named]
 
 
 def _piece(name: str, array: Array, choices: Sequence[Joints]) -> Piece:

@@ -72,8 +72,8 @@ def refuse(file: ModelFile) -> NoReturn:
     """Raise the ValueError of a file that is none of the three."""
     file.read("v_template", (-1, 3))
     parents = _parents(file)
-    said = [f"{len(each.joints)} ({each.title})" for each in (SMPL, SMPLH, SMPLX)]
-    raise ValueError(f"{file.path}: expected {', '.join(said[:-1])} or {said[-1]} joints, found {len(parents)}")
+    counts = [f"{len(each.joints)} ({each.title})" for each in (SMPL, SMPLH, SMPLX)]
+    raise ValueError(f"{file.path}: expected {', '.join(counts[:-1])} or {counts[-1]} joints, found {len(parents)}")
 
 
 _GENDERS = {"female": "female", "f": "female", "male": "male", "m": "male", "neutral": "neutral", "n": "neutral"}
@@ -88,9 +88,9 @@ def gender_of(path: Path) -> str:
     """Of a model file: what an array of it says, or its name, or that of its folder, as AMASS's SMPL+H has it; empty
     where nothing does."""
     if path.suffix == ".npz" and "gender" in safe_npz.names(path):
-        said = safe_npz.read(path, "gender").reshape(-1)
-        if said.dtype.kind in "US" and len(said) == 1:
-            return gender(said[0].decode("latin1") if said.dtype.kind == "S" else str(said[0]))
+        stored = safe_npz.read(path, "gender").reshape(-1)
+        if stored.dtype.kind in "US" and len(stored) == 1:
+            return gender(stored[0].decode("latin1") if stored.dtype.kind == "S" else str(stored[0]))
     stem, folder = path.stem.lower(), path.parent.name.lower()
     words = [word for name in (stem, folder) for word in ("female", "male", "neutral") if word in name]
     return next((_GENDERS[word] for word in (*words, *re.split(r"[^a-z]+", stem)) if word in _GENDERS), "")

@@ -39,11 +39,11 @@ def fit(output: Path, bodies: int, controls: int, iterations: int, split: str, o
     command goes on where it was.
     """
     from ..ablation.fitting.benchmark import benchmark as run
-    from ..ablation.fitting.run import Benchmark
+    from ..ablation.fitting.run import FittingBenchmark
     from . import console
 
     try:
-        page = run(Benchmark(output, bodies, controls, iterations, split), only, console.progress)
+        page = run(FittingBenchmark(output, bodies, controls, iterations, split), only, console.progress)
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="'--only'") from error
     click.echo(page.read_text())
@@ -113,12 +113,12 @@ def train(
         from ..ablation.training.benchmark import benchmark as run
         from ..ablation.training.from_images import ImageTask
         from ..ablation.training.from_keypoints import KeypointTask
-        from ..ablation.training.run import Benchmark
+        from ..ablation.training.run import TrainingBenchmark
 
         task = (
             KeypointTask(output, people, bodies, split) if images is None else ImageTask(output, images, split, others)
         )
-        page = run(Benchmark(output, task, seeds, part, lean), tilts, workers, console.progress)
+        page = run(TrainingBenchmark(output, task, seeds, part, lean), tilts, workers, console.progress)
     click.echo(page.read_text())
 
 

@@ -28,6 +28,7 @@ def fit_data(
     """Fits a data set and says what became of it; the exit code."""
     from ..fitting import config
     from ..fitting.data_fits import PAPER, PREDICTIONS, DataFit, source_of
+    from ..fitting.presented import PoseSource
 
     said = click.get_current_context().get_parameter_source
     given = [name for name in NOT_OF_DATA if said(name) is ParameterSource.COMMANDLINE]
@@ -40,13 +41,14 @@ def fit_data(
     preset = options["preset"] or ("fast" if paper is None else paper.preset)
     try:
         chosen = config.load(preset)
+        pose = PoseSource.of(*(options[name] for name in ("pose", "pose_frame", "pose_up", "contact")))
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     if options["iterations"] is not None:
         chosen = config.limit_iterations(chosen, options["iterations"])
-    of_person = {name: options[name] for name in ("height", "mass", "pose", "pose_frame", "pose_up", "contact")}
+    size = {name: options[name] for name in ("height", "mass")}
     data = source_of(source["name"], source["path"], source["split"], dict(source["options"]))
-    job = DataFit(data, chosen, output, models, options["model"], keypoints, images, every, **of_person)
+    job = DataFit(data, chosen, output, models, options["model"], keypoints, images, every, pose, **size)
     try:
         job.begin()
         with console.progress(f"fitting {source['name']}", len(job.rows)) as step:

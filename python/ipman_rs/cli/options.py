@@ -140,7 +140,7 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-# What mends a file that the judge of all doors (`ipman_rs.data.judge`) refuses, beside --up.
+# What mends a file that `ipman_rs.data.plausibility` refuses, beside --up.
 units = click.option(
     "--units", type=UNIT, default="m", show_default=True, metavar="UNIT",
     help=f"Unit of the lengths in the files: {', '.join(METRES)}, or a number of metres.",

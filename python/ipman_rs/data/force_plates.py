@@ -276,13 +276,16 @@ def check_longest_axis(what: str, markers: Array, visible: NDArray[np.bool_], up
     return [Finding("wrong", message, "or does this person lie?", f"--up {axis}")]
 
 
-def _loads(file: Path, said: Sequence[str]) -> list[Finding]:
-    """What the plates measured; of the notes those that were not `said` of the points."""
+def _loads(file: Path, of_points: Sequence[str]) -> list[Finding]:
+    """What the plates measured; of the notes those that are not notes `of_points`."""
     try:
         plates = read(file)
     except ValueError as error:
         return [Finding("missing", str(error))]
-    findings = [Finding("odd", f"{file.name}: {note}") for note in plates.notes if note not in said]
+    findings = [Finding("odd", f"{file.name}: {note}") for note in plates.notes if note not in of_points]
     heaviest = float(np.nan_to_num(plates.loads).sum(axis=1).max())
-    said = f"{file.name}: {plates.forces.shape[1]} force plates, together up to {heaviest:.0f} N"
-    return [*findings, Finding("ok", said) if heaviest > 200 else Finding("missing", said, "nobody stands on them")]
+    message = f"{file.name}: {plates.forces.shape[1]} force plates, together up to {heaviest:.0f} N"
+    return [
+        *findings,
+        Finding("ok", message) if heaviest > 200 else Finding("missing", message, "nobody stands on them"),
+    ]

@@ -333,9 +333,9 @@ def check(path: str | os.PathLike[str]) -> list[Finding]:
 
 def _check_markers(tracks: Tracks, name: str) -> list[Finding]:
     """What `ipman fit` says of them, and how they stand where nobody knows the places of their names."""
-    from ipman_rs.data.markers import judged
+    from ipman_rs.data.markers import plausibility
 
-    findings = [Finding("odd", note) for note in tracks.notes] + judged.check_tracks(tracks)
+    findings = [Finding("odd", note) for note in tracks.notes] + plausibility.check_tracks(tracks)
     findings = [replace(each, what=f"{name}: {each.what}") for each in findings if each.level != "ok"]
     if any(each.level == "wrong" for each in findings):
         return findings

@@ -13,7 +13,7 @@ from typing import Any
 from ipman_rs.files import read_yaml
 
 from .hypotheses import PITCH_PRIOR, SUPPORTS, Hypotheses
-from .solvers import SOLVERS, Options
+from .solvers import SOLVERS, SolverOptions
 from .terms import TERMS
 from .variables import BLOCKS
 
@@ -33,7 +33,7 @@ class Stage:
     free: tuple[str, ...]
     weights: Mapping[str, float]
     solver: str
-    options: Options
+    options: SolverOptions
     find_ground: bool = False  # lay the ground under the body before it, unless the ground is given
     keep: int = 1  # hypotheses of each body that go on after it, the cheapest
     terms: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # options that differ from the file's
@@ -167,7 +167,7 @@ def _stage(number: int, stage: Any, content: Mapping[str, Any]) -> Stage:
     tolerance = content.get("tolerance") or {}
     _known("tolerance", tolerance, ("gradient", "decrease"))
     ends = {name: _not_negative(f"tolerance, {name}", value) for name, value in tolerance.items()}
-    options = Options(_whole(f"{place}, iterations", stage.get("iterations", 100), 0), **ends)
+    options = SolverOptions(_whole(f"{place}, iterations", stage.get("iterations", 100), 0), **ends)
     find_ground = stage.get("find_ground", False)
     _expect(f"{place}, find_ground", find_ground, "bool")
     terms = _terms(f"{place}, terms", stage.get("terms"))

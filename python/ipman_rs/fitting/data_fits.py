@@ -39,6 +39,7 @@ from .data_frames import FitToWorld
 from .detection_problem import missing_keypoints
 from .fit import fit
 from .landmarks import landmark_names
+from .presented import PoseSource
 from .problem import Problem
 from .result import FitResult, fit_results, parameters
 from .terms.measured_shape import DENSITY
@@ -90,8 +91,8 @@ class DataFit(Resumable):
 
     folder: of the results. models: folder of model files. body: an embedded body or a model file; None: the data set's
     own. keypoints: folder of keypoint files, named as the frames. images: where the paths of images begin. every: fit
-    each n-th frame. pose: a presented pose for all, by name or file, with its frame, up and contact as in
-    `presented.load`; None: the recorded ones. height, mass: of the person; None: of the data set's body.
+    each n-th frame. pose: what all are presented; None: the recorded poses. height, mass: of the person; None: of the
+    data set's body.
     """
 
     source: Source
@@ -102,10 +103,7 @@ class DataFit(Resumable):
     keypoints: Path | None = None
     images: Path = Path()
     every: int = 1
-    pose: str | None = None
-    pose_frame: int | None = None
-    pose_up: tuple[float, float, float] | None = None
-    contact: Path | None = None
+    pose: PoseSource | None = None
     height: float | None = None
     mass: float | None = None
     piece: int = PIECE
@@ -141,7 +139,8 @@ class DataFit(Resumable):
             raise ValueError(f"{self.source.name}: has no poses to present; give one with --pose")
         if first.cameras is None and not self.config.moves_camera:
             raise ValueError(f"{self.source.name}: has no cameras here, and the preset needs them")
-        self._presented_to_all(body)
+        if self.pose is not None:
+            self.pose.load(body)
         if uses_terms(self.config, "measured_shape") and self.height is None and self.mass is None:
             self.size(first)
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -152,8 +151,9 @@ class DataFit(Resumable):
     def manifest(self) -> dict[str, Any]:
         """All that decides the fits, as plain values; no paths, for a folder may be moved."""
         files = [] if self.models is None else self.bodies.files(str(self.data[slice(0, 1)].body))
-        given = (self.body, self.pose, self.contact)
-        files += [Path(path) for path in given if path is not None and Path(path).is_file()]
+        files += [] if self.body is None or not Path(self.body).is_file() else [Path(self.body)]
+        files += [] if self.pose is None else self.pose.files
+        contact = None if self.pose is None else self.pose.contact
         listed = [] if self.keypoints is None else sorted(self.keypoints.rglob("*.json"))
         content = hashlib.sha256()
         for path in listed:
@@ -167,8 +167,8 @@ class DataFit(Resumable):
             "every": self.every,
             "preset": json.loads(json.dumps(asdict(self.config), default=str)),
             "body": None if self.body is None else Path(self.body).name,
-            "pose": None if self.pose is None else [Path(self.pose).name, self.pose_frame, str(self.pose_up)],
-            "contact": None if self.contact is None else self.contact.name,
+            "pose": None if self.pose is None else [Path(self.pose.name).name, self.pose.frame, str(self.pose.up)],
+            "contact": None if contact is None else contact.name,
             "files": {path.name: fingerprint(path) for path in sorted(files)},
             "keypoints": None if self.keypoints is None else content.hexdigest(),
             "height": self.height,
@@ -258,7 +258,7 @@ class DataFit(Resumable):
         if self.keypoints is None:
             return data_frames.detections_of(frame)
         name = str(frame.names[0])
-        endings = [f"{said}{suffix}" for suffix in keypoints.suffixes() for said in ("", "_keypoints")]
+        endings = [f"{mark}{suffix}" for suffix in keypoints.suffixes() for mark in ("", "_keypoints")]
         places = [self.keypoints / f"{name}{ending}" for ending in endings]
         place = next((place for place in places if place.is_file()), None)
         if place is None:
@@ -290,8 +290,8 @@ class DataFit(Resumable):
     ) -> tuple[list[presented.PresentedBody] | None, list[FitToWorld]]:
         """The presented pose of each frame, if the preset imitates one, and the worlds of the fits."""
         whole = [FitToWorld.of(frame) for frame in frames]
-        shown = self._presented_to_all(body)
-        if shown is not None:
+        if self.pose is not None:
+            shown = self.pose.load(body)
             return [shown] * len(frames), [_on_floor(world, frame, shown.floor(body), self.config.moves_camera)
                                            for world, frame in zip(whole, frames, strict=True)]  # fmt: skip
         if not self.imitates:
@@ -299,12 +299,6 @@ class DataFit(Resumable):
         presented_frames = [data_frames.presented_of(frame, self.bodies.posed(frame), body) for frame in frames]
         worlds = [world for _, world in presented_frames]
         return [each for each, _ in presented_frames], worlds if self.config.moves_camera else whole
-
-    def _presented_to_all(self, body: BodyModel) -> presented.PresentedBody | None:
-        """The pose that all are presented, if there is one. Raises ValueError."""
-        if self.pose is None:
-            return None
-        return presented.load(self.pose, body, contact=self.contact, frame=self.pose_frame, up=self.pose_up)
 
     def size(self, frame: Frames) -> tuple[float, float]:
         """Height, m, and mass, kg, of a person: as given, or of the data set's own body in its zero pose."""
@@ -364,6 +358,7 @@ class DataFit(Resumable):
         columns = {name: arrays[name] for name in _COLUMNS if name in arrays}
         with atomic_write(self.folder / PREDICTIONS) as out:
             np.savez(out, allow_pickle=False, body=np.array(kind), **columns)
+        source = "the recorded pose of each frame" if self.pose is None else self.pose.name
         record = {
             "data": self.source.name,
             "split": self.source.split,
@@ -376,7 +371,7 @@ class DataFit(Resumable):
             "median_reprojection_px": float(np.median(arrays["median_px"])),
             "median_reprojection_percent": float(np.median(arrays["median_percent"])),
             "with_presented_contact": int((arrays["contact_vertices"] > 0).sum()) if self.imitates else None,
-            "presented": None if not self.imitates else self.pose or "the recorded pose of each frame",
+            "presented": source if self.imitates else None,
             "left_out": left_out,
         }
         write_whole(self.folder / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")

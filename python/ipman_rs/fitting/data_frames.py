@@ -123,8 +123,8 @@ def presented_of(frame: Frames, own: FrameBodies, body: BodyModel) -> tuple[Pres
     if floor is not None and not same:
         lowest = float(np.asarray(body(pose).vertices)[:, 1].min())
         shift[1] = floor - lowest
-    found = presented_body(name, pose, body, contact, "mesh", None if floor is None else floor - float(shift[1]))
-    return found, FitToWorld(whole.turn, shift)
+    presented = presented_body(name, pose, body, contact, "mesh", None if floor is None else floor - float(shift[1]))
+    return presented, FitToWorld(whole.turn, shift)
 
 
 def _on_joints(pose: Array, body: BodyModel, kind: str | None) -> Array:

@@ -141,9 +141,7 @@ def missing_keypoints(names: Sequence[str], confidence: np.ndarray) -> str | Non
     )
 
 
-def suspicious_keypoints(
-    names: Sequence[str], points: np.ndarray, confidence: np.ndarray, size: np.ndarray
-) -> list[str]:
+def keypoint_flags(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, size: np.ndarray) -> list[str]:
     """Warnings about one person's points (K, 2) that may be wrong, or that constrain the body poorly."""
     where = {name: points[k] for k, name in enumerate(names) if confidence[k] > SEEN}
     flags = []
@@ -191,15 +189,15 @@ def _mirrored(names: Sequence[str], points: np.ndarray, confidence: np.ndarray, 
     return bool(turn < 0 and left[0] < nose[0] < right[0])
 
 
-def camera_mismatch(camera: KnownCamera, size: np.ndarray) -> list[str]:
+def camera_flags(camera: KnownCamera, size: np.ndarray) -> list[str]:
     """Warnings if a known camera seems to belong to images of another size than `size` (2,), width and height."""
     if camera.center is None:
         return []
     center = np.array(camera.center)
     if (abs(center - size / 2) < CENTER * size).all():
         return []
-    said = f"the camera's center ({center[0]:g}, {center[1]:g}) is far from the middle of the {size[0]:g} × {size[1]:g}"
-    return [f"{said} image: is the camera of another image size?"]
+    flag = f"the camera's center ({center[0]:g}, {center[1]:g}) is far from the middle of the {size[0]:g} × {size[1]:g}"
+    return [f"{flag} image: is the camera of another image size?"]
 
 
 def _pair(where: dict[str, np.ndarray], joint: str) -> list[np.ndarray]:

@@ -189,8 +189,8 @@ def run_stage(
     traces: list[dict[str, np.ndarray]] = []
     for first in range(0, len(starts), CHUNK):
         part = _Shrinking(objective.rows(range(first, min(first + CHUNK, len(starts)))), stage.solver == "levenberg")
-        told = None if progress is None else (lambda ended, first=first: progress(stage.name, first + ended))
-        outcomes += minimise(SOLVERS[stage.solver], starts[first : first + CHUNK], part, stage.options, told)
+        on_ended = None if progress is None else (lambda ended, first=first: progress(stage.name, first + ended))
+        outcomes += minimise(SOLVERS[stage.solver], starts[first : first + CHUNK], part, stage.options, on_ended)
         traces += part.trace() if trace else []
     rows = torch.from_numpy(np.stack([outcome.point for outcome in outcomes]))
     variables = unpack(rows, stage.free, variables)

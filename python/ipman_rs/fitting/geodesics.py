@@ -30,9 +30,9 @@ class Geodesics:
         """(n, V) which vertices are far from these (n,)."""
         new = np.unique(vertices[self._rows[vertices] < 0])
         if len(new):
-            found = np.isinf(dijkstra(self.graph, directed=False, indices=new, limit=self.limit))
+            far = np.isinf(dijkstra(self.graph, directed=False, indices=new, limit=self.limit))
             self._rows[new] = len(self._far) + np.arange(len(new))
-            self._far = np.concatenate([self._far, found])
+            self._far = np.concatenate([self._far, far])
         return self._far[self._rows[vertices]]
 
     def far(self, first: Indices, second: Indices) -> NDArray[np.bool_]:

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 import ipman_rs.torch as ipt
-from ipman_rs.data import judge
+from ipman_rs.data import plausibility
 from ipman_rs.data.check import Finding
 from ipman_rs.renamed import old_names
 
 from ..body.sites import FEWEST_POINTS
 from ..data import markers
-from ..data.markers import judged
+from ..data.markers.plausibility import on_skin, seen_names
 from ..data.markers.sets import Meaning
 from ..data.markers.skin_distance import mean_distances
 from .camera import Camera
@@ -75,7 +75,7 @@ class MarkerFit:
     def skin_distances(self) -> dict[str, float]:
         """The mean distance of each marker from the skin of the fitted bodies, m, outwards; without those whose places
         are inside the body, and without plates and wands, which stand off it."""
-        names = [name for name in self.tracks.names if judged.on_skin(self.meanings[name])]
+        names = [name for name in self.tracks.names if on_skin(self.meanings[name])]
         some = self.tracks.select(names)
         with torch.no_grad():
             vertices = self.fit.candidate.vertices.numpy()
@@ -108,7 +108,7 @@ def fit_tracks(
     if every < 1:
         raise ValueError(f"every: expected 1 or more, got {every}")
     config = load("markers") if config is None else config
-    seen, unseen = judged.seen_names(tracks)
+    seen, unseen = seen_names(tracks)
     sites = markers.sites(body.body, seen, own=own)
     if len(sites) < FEWEST_POINTS:
         raise ValueError(
@@ -132,8 +132,8 @@ def fit_tracks(
     if betas is not None:
         start["betas"] = betas.expand(len(tracks), -1).clone()
     rate = tracks.rate or 1.0
-    found = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
-    return MarkerFit(found, tracks, sites, unknown, unseen, markers.meanings(tracks.names, own))
+    fitted = fit_sequence(problem, start, config, smoothness=smoothness, rate=rate, progress=progress)
+    return MarkerFit(fitted, tracks, sites, unknown, unseen, markers.meanings(tracks.names, own))
 
 
 def check_fit(recorded: MarkerFit) -> list[Finding]:
@@ -143,8 +143,8 @@ def check_fit(recorded: MarkerFit) -> list[Finding]:
         mass = np.asarray(ipt.mass_properties(vertices, recorded.fit.problem.body.template).mass)
     errors = recorded.errors
     known = errors[np.isfinite(errors)]
-    found = judge.marker_error(float(known.mean())) if len(known) else []
-    return found + judge.masses(np.atleast_1d(mass), vertices.numpy())
+    findings = plausibility.marker_error(float(known.mean())) if len(known) else []
+    return findings + plausibility.masses(np.atleast_1d(mass), vertices.numpy())
 
 
 def _shape_kept(config: FitConfig) -> FitConfig:
@@ -166,9 +166,9 @@ def _calibrated(
     for _ in range(times):
         problem = problem_of(body, tracks, sites, ground)
         start = start_at_points(problem) if variables is None else variables
-        found = fit_sequence(problem, start, config, smoothness=0, progress=progress)
-        variables = dict(found.variables)
-        bodies = found.candidate.full_pose, variables["betas"], variables["transl"]
+        fitted = fit_sequence(problem, start, config, smoothness=0, progress=progress)
+        variables = dict(fitted.variables)
+        bodies = fitted.candidate.full_pose, variables["betas"], variables["transl"]
         points, confidence = torch.from_numpy(tracks.points), torch.from_numpy(tracks.confidence)
         sites = calibrate_sites(body, sites, bodies, points, confidence)
     return None if variables is None else variables["betas"][:1], sites

@@ -65,6 +65,36 @@ class PresentedBody:
         }
 
 
+@dataclass(frozen=True)
+class PoseSource:
+    """What names a presented pose; fields as in `load`."""
+
+    name: str
+    frame: int | None = None
+    up: Axis | None = None
+    contact: Path | None = None
+
+    @classmethod
+    def of(
+        cls, pose: str | None, pose_frame: int | None = None, pose_up: Axis | None = None, contact: Path | None = None
+    ) -> PoseSource | None:
+        """Of options as `ipman fit` has them; None where no pose is named. ValueError for the others without it."""
+        if pose is not None:
+            return cls(pose, pose_frame, pose_up, contact)
+        if pose_frame is not None or pose_up is not None or contact is not None:
+            raise ValueError("--contact, --pose-frame and --pose-up say more of a --pose: give that, too")
+        return None
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that are read."""
+        return [Path(path) for path in (self.name, self.contact) if path is not None and Path(path).is_file()]
+
+    def load(self, body: BodyModel) -> PresentedBody:
+        """The presented pose for a body model. Raises ValueError."""
+        return load(self.name, body, contact=self.contact, frame=self.frame, up=self.up)
+
+
 def load(
     name: str | Path,
     body: BodyModel,
@@ -95,10 +125,10 @@ def load(
             raise ValueError(f"{path}: {what}")
         listed = ", ".join(poses.NAMES)
         raise ValueError(f"no pose {str(name)!r}; there are {listed}, or a file ending in {' '.join(ENDINGS)}")
-    found = presented_files.read(path, body, frame, up)
+    stored = presented_files.read(path, body, frame, up)
     contact_from = "file" if given is None else "given"
-    known = found.contact if given is None else given
-    return presented_body(str(path), found.pose, body, known, contact_from, found.height, found.notes)
+    known = stored.contact if given is None else given
+    return presented_body(str(path), stored.pose, body, known, contact_from, stored.height, stored.notes)
 
 
 def presented_body(

@@ -232,9 +232,9 @@ def _row(stored: _Stored, length: int, frame: int | None) -> int:
 
 def _kind(stored: _Stored, pieces: Sequence[pose_arrays.Piece]) -> str:
     """What the parameters are of: what the file says, or what its joints tell."""
-    said = stored.word(*_KINDS)
-    if said is not None and said.lower() in (*embedded.NAMES, *formats.FORMATS):
-        return said.lower()
+    named = stored.word(*_KINDS)
+    if named is not None and named.lower() in (*embedded.NAMES, *formats.FORMATS):
+        return named.lower()
     own = next((name for name, each in formats.FORMATS.items() if pieces[0].joints == each.joints), None)
     if own is not None:
         return own

@@ -113,7 +113,7 @@ class FitResult:
         median = float(errors.median()) if len(errors) else float("nan")
         return {"median_px": median, "median_percent": 100 * median / tall, "height_px": tall}
 
-    def doubts(self) -> list[str]:
+    def flags(self) -> list[str]:
         """Why this body should be looked at before it is used."""
         flags = list(self.confidence.reasons)
         with torch.no_grad():

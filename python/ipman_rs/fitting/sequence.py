@@ -31,7 +31,7 @@ from .fit import CHUNK, Fit, StageReport, run_stage, with_ground_under_body, wit
 from .hypotheses import with_feet_down
 from .objective import Objective
 from .problem import Problem
-from .solvers import Options, ValueAndGradient, minimise
+from .solvers import SolverOptions, ValueAndGradient, minimise
 from .solvers.arrow import Arrow, solve
 from .solvers.levenberg import levenberg
 from .terms.smoothness import Smoothness
@@ -103,11 +103,11 @@ def warm_start(
     def fit_frames(index: Tensor, starts: Variables, free: tuple[str, ...]) -> None:
         """From one start per frame; or from two, the second ones in the second half of the rows."""
         both = index.repeat(len(starts["pose"]) // len(index))
-        found, report = run_stage(problem.rows(both), starts, replace(stage, free=free), config.terms)
+        fitted, report = run_stage(problem.rows(both), starts, replace(stage, free=free), config.terms)
         costs = np.nan_to_num(sum(report.terms.values()), nan=np.inf).reshape(-1, len(index))
         costs[0, (observed_weight(problem)[index] == 0).numpy()] = np.inf  # nothing speaks for the frame's own start
         winners = torch.from_numpy((len(costs) - 1 - costs[::-1].argmin(axis=0)) * len(index) + np.arange(len(index)))
-        for name, value in found.items():
+        for name, value in fitted.items():
             results[name][index] = value[winners]
 
     if not done[seed]:
@@ -174,10 +174,12 @@ class SequenceObjective:
     def solved(self, progress: Progress | None = None) -> tuple[dict[str, Tensor], StageReport]:
         """The variables of all frames, and how it went: the same for all but those that were left out."""
         options = self.stage.options
-        options = Options(options.iterations, options.gradient, options.decrease * self.frames)
-        told = None if progress is None else (lambda ended: progress(self.stage.name, ended * self.frames))
+        options = SolverOptions(options.iterations, options.gradient, options.decrease * self.frames)
+        on_ended = None if progress is None else (lambda ended: progress(self.stage.name, ended * self.frames))
         solver = partial(levenberg, solve=solve)
-        (outcome,) = minimise(solver, self.start[None], lambda _, points: [self.evaluation(points[0])], options, told)
+        (outcome,) = minimise(
+            solver, self.start[None], lambda _, points: [self.evaluation(points[0])], options, on_ended
+        )
         rows = torch.from_numpy(self.rows(outcome.point))
         with torch.no_grad():
             costs = self.objective.costs(self.objective.candidate(rows))

@@ -30,7 +30,7 @@ from .fit import run_stage, with_ground_under_body
 from .objective import Objective
 from .problem import Problem
 from .rotations import matrix, nearest, vector
-from .solvers import Options
+from .solvers import SolverOptions
 from .variables import COMPONENTS, Variables, full_pose, pack, pose_blocks
 
 # Far joints of the trunk, whose lengths change least with the pose, and then those of the legs and arms.
@@ -133,9 +133,9 @@ def start_at_points(problem: Problem) -> dict[str, Tensor]:
     best, nearest_yet = _onto_points(problem, variables)
     for name in NAMES if problem.presented is None else ():
         posed = _posed(variables, problem, _named(problem, name))
-        found, away = _onto_points(problem, {**posed, "orient": variables["orient"]})
+        placed, away = _onto_points(problem, {**posed, "orient": variables["orient"]})
         nearer = away < nearest_yet
-        best = {key: torch.where(nearer.reshape(-1, *[1] * (a.ndim - 1)), found[key], a) for key, a in best.items()}
+        best = {key: torch.where(nearer.reshape(-1, *[1] * (a.ndim - 1)), placed[key], a) for key, a in best.items()}
         nearest_yet = torch.where(nearer, away, nearest_yet)
     return best
 
@@ -157,8 +157,8 @@ def _onto_points(problem: Problem, variables: Variables) -> tuple[dict[str, Tens
     # The root joint stays where it is when the body turns.
     root = problem.body(pose[:1].to(problem.body.dtype)).joints[:, 0].to(middle)
     turned = (turn * (middle - root)[:, None]).sum(dim=2)
-    found = {**variables, "orient": vector(turn @ matrix(variables["orient"])), "transl": target - root - turned}
-    return found, (weight * away.square()).sum(dim=(1, 2))
+    placed = {**variables, "orient": vector(turn @ matrix(variables["orient"])), "transl": target - root - turned}
+    return placed, (weight * away.square()).sum(dim=(1, 2))
 
 
 def _best(
@@ -186,11 +186,11 @@ def _best(
     tried = min(TRIED, count)
     order = costs.nan_to_num(nan=torch.inf).reshape(bodies, count).argsort(dim=1, stable=True)[:, :tried]
     rows = (order + count * torch.arange(bodies)[:, None]).flatten()
-    stage = Stage("start", free, WEIGHTS, "levenberg", Options(iterations=iterations, gradient=1.0, decrease=1.0))
-    found, report = run_stage(many.rows(rows), {name: value[rows] for name, value in starts.items()}, stage, {})
+    stage = Stage("start", free, WEIGHTS, "levenberg", SolverOptions(iterations=iterations, gradient=1.0, decrease=1.0))
+    fitted, report = run_stage(many.rows(rows), {name: value[rows] for name, value in starts.items()}, stage, {})
     ends = np.nan_to_num(sum(report.terms.values()), nan=np.inf).reshape(bodies, tried)
     winners = torch.from_numpy(ends.argmin(axis=1)) + tried * torch.arange(bodies)
-    return {name: value[winners] for name, value in found.items()}
+    return {name: value[winners] for name, value in fitted.items()}
 
 
 def _placed(
@@ -239,8 +239,8 @@ def _depth(problem: Problem, points: Tensor) -> Tensor:
     assert problem.points is not None
     seen, depth = _seen(problem), torch.full((len(points),), torch.nan, dtype=torch.float64)
     for spans in SPANS:
-        found = [(_ends(problem, a), _ends(problem, b)) for a, b in spans]
-        pairs = [(a, b) for a, b in found if a is not None and b is not None]
+        ends = [(_ends(problem, a), _ends(problem, b)) for a, b in spans]
+        pairs = [(a, b) for a, b in ends if a is not None and b is not None]
         if not pairs:
             continue
         first, second = map(list, zip(*pairs, strict=True))

@@ -12,7 +12,7 @@ import numpy as np
 from ..body import pose_arrays, rotations
 from ..body.joints import LEFT_HAND, RIGHT_HAND
 from ..body.sequence import Index, PosedSequence, rows_of
-from ..data import check, judge
+from ..data import check, plausibility
 from ..data.check import Finding
 from ..files import safe_npz
 from ..files.errors import FileError
@@ -51,14 +51,14 @@ def read_npz(
         model = model or stored.model()
         has_pose = bool(stored.names & pose_arrays.names())
         if stored.names & {*_VERTICES} and not (has_pose and _are_of_another_body(stored, model)):
-            found = _read_vertices(stored, model, unit, rate)
+            sequence = _read_vertices(stored, model, unit, rate)
         elif has_pose:
-            found = _read_parameters(stored, model, unit, degrees, rate)
+            sequence = _read_parameters(stored, model, unit, degrees, rate)
         else:
             raise FileError(path, _no_bodies(stored))
     except ValueError as error:
         raise FileError(path, str(error)) from error
-    return replace(found, unused=stored.unused())
+    return replace(sequence, unused=stored.unused())
 
 
 def _no_bodies(stored: StoredArrays) -> str:
@@ -145,11 +145,11 @@ def _read_parameters(stored: StoredArrays, model: str, unit: float, degrees: boo
         return pose.of(index), *(_singles(rows, index) for rows in (betas, trans, expression))
 
     vertices = PosedSequence(body, len(pose), parameters)
-    said = f"body: {body.name}, posed by {len(pose.names)} joints of the file"
+    note = f"body: {body.name}, posed by {len(pose.names)} joints of the file"
     return BodySequence(
         stored.path, vertices[:].astype(np.float64) if len(pose) == 1 else vertices, body.faces, body.template,
         seconds=seconds, up=Z_UP if amass else Y_UP, up_why=", as AMASS has it" if amass else "",
-        notes=(said, *pose.notes(), *shape, *face), findings=tuple(findings),
+        notes=(note, *pose.notes(), *shape, *face), findings=tuple(findings),
     )  # fmt: skip
 
 
@@ -240,10 +240,10 @@ def _betas(stored: StoredArrays, body: Any, frames: int, of_smpl: bool) -> tuple
     rows = _rows(stored, name, betas, frames)
     used = min(rows.shape[1], body.num_betas)
     if used < rows.shape[1]:
-        said = f"shape: the first {used} of {rows.shape[1]} betas, as many as {body.name} has"
+        note = f"shape: the first {used} of {rows.shape[1]} betas, as many as {body.name} has"
     else:
-        said = f"shape: the file's {used} betas"
-    return rows[:, :used], [f"{said}, taken as those of {body.name}" if embedded else said]
+        note = f"shape: the file's {used} betas"
+    return rows[:, :used], [f"{note}, taken as those of {body.name}" if embedded else note]
 
 
 def _expression(stored: StoredArrays, body: Any, frames: int) -> tuple[np.ndarray | None, list[str]]:
@@ -274,11 +274,11 @@ def _seconds(stored: StoredArrays, frames: int, rate: float | None) -> tuple[np.
     if hertz is None and given is not None:
         same = np.unique(given)  # some files have it for each frame
         if len(same) != 1:
-            said = f"{stored.name(*_FRAME_RATES)} holds {len(same)} different numbers, expected one"
-            return None, [Finding("wrong", said, option="--rate HZ")]
+            message = f"{stored.name(*_FRAME_RATES)} holds {len(same)} different numbers, expected one"
+            return None, [Finding("wrong", message, option="--rate HZ")]
         hertz = float(same[0])
     assert hertz is not None
-    findings = judge.rate(hertz)
+    findings = plausibility.rate(hertz)
     usable = np.isfinite(hertz) and hertz > 0
     return np.arange(frames) / hertz if usable else None, findings
 
@@ -287,10 +287,14 @@ def _angles(pieces: Sequence[pose_arrays.Piece], degrees: bool) -> list[Finding]
     """Whether rotation vectors, which are radians here, can be right."""
     vectors = [piece for piece in pieces if not piece.is_absolute]
     for piece in vectors:
-        found = check.radians(piece.name, piece.rotations[check.evenly(len(piece.rotations))])
-        if found:
-            return found
-    return judge.degrees([piece.rotations[check.evenly(len(piece.rotations))] for piece in vectors]) if degrees else []
+        findings = check.radians(piece.name, piece.rotations[check.evenly(len(piece.rotations))])
+        if findings:
+            return findings
+    return (
+        plausibility.degrees([piece.rotations[check.evenly(len(piece.rotations))] for piece in vectors])
+        if degrees
+        else []
+    )
 
 
 def _columns(pieces: Sequence[pose_arrays.Piece]) -> list[Finding]:
@@ -298,29 +302,29 @@ def _columns(pieces: Sequence[pose_arrays.Piece]) -> list[Finding]:
     names = [piece.name for piece in pieces if piece.form == pose_arrays.COLUMNS]
     if not names:
         return []
-    said = f"{', '.join(names)}: taken as the first two columns of matrices; PyTorch3D writes their first two rows"
-    return [Finding("odd", said, "save rotation vectors or matrices if these are rows")]
+    note = f"{', '.join(names)}: taken as the first two columns of matrices; PyTorch3D writes their first two rows"
+    return [Finding("odd", note, "save rotation vectors or matrices if these are rows")]
 
 
 def _places(stored: StoredArrays, trans: np.ndarray | None, seconds: np.ndarray | None) -> list[Finding]:
     if trans is None:
         return []
     name = str(stored.name(*_TRANSLATIONS))
-    return check.near_origin(name, trans[check.evenly(len(trans))]) or judge.speed(name, trans, seconds)
+    return check.near_origin(name, trans[check.evenly(len(trans))]) or plausibility.speed(name, trans, seconds)
 
 
 def _gender(stored: StoredArrays, body: Any, model: str) -> list[Finding]:
     """Whether the betas are of the model's gender."""
     from ..body import embedded, smpl_files
 
-    said = smpl_files.gender(stored.word("gender"))
-    if body.name in embedded.NAMES or not said:
+    gender = smpl_files.gender(stored.word("gender"))
+    if body.name in embedded.NAMES or not gender:
         return []
     own = smpl_files.gender_of(Path(model))
-    if not own or own == said:
+    if not own or own == gender:
         return []
-    what = f"the file's gender is {said}, and the body model {body.name} is {own}"
-    return [Finding("odd", what, f"--body with the {said} model")]
+    what = f"the file's gender is {gender}, and the body model {body.name} is {own}"
+    return [Finding("odd", what, f"--body with the {gender} model")]
 
 
 def _pass_over_repeated(stored: StoredArrays, pieces: Sequence[pose_arrays.Piece]) -> None:

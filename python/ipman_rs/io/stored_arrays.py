@@ -68,12 +68,12 @@ class StoredArrays:
         """What kind of model the parameters are of, where the file says."""
         for name in (name for name in _KINDS if name in self.names):
             try:
-                found = formats.kind_named(self._word(name))
+                kind = formats.kind_named(self._word(name))
             except ValueError:  # Python objects
                 continue
-            if found is not None:
+            if kind is not None:
                 self.used.add(name)
-                return found
+                return kind
         return None
 
     def unused(self) -> tuple[str, ...]:

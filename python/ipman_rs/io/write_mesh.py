@@ -15,7 +15,7 @@ _JSON, _BIN = 0x4E4F534A, 0x004E4942
 def glb(vertices: np.ndarray, faces: np.ndarray) -> bytes:
     points, corners = vertices.astype("<f4"), faces.astype("<u4")
     body = points.tobytes() + corners.tobytes()
-    told = {
+    document = {
         "asset": {"version": "2.0", "generator": "ipman_rs"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -34,7 +34,7 @@ def glb(vertices: np.ndarray, faces: np.ndarray) -> bytes:
             {"bufferView": 1, "componentType": _UINT, "count": corners.size, "type": "SCALAR"},
         ],
     }  # fmt: skip
-    text = json.dumps(told, separators=(",", ":")).encode()
+    text = json.dumps(document, separators=(",", ":")).encode()
     chunks = _chunk(_JSON, text, b" ") + _chunk(_BIN, body, b"\0")
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 

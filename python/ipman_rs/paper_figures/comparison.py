@@ -146,8 +146,8 @@ def _around(bodies: Sequence[Study]) -> Box:
         assert study.fitted is not None
         points.append(study.fitted.camera.pixels(np.asarray(study.vertices[0], np.float64))[0])
         points.append(study.fitted.seen[study.fitted.seen[:, 2] > 0, :2])
-    found = np.concatenate(points)
-    low, high = found.min(axis=0), found.max(axis=0)
+    corners = np.concatenate(points)
+    low, high = corners.min(axis=0), corners.max(axis=0)
     middle, half = (low + high) / 2, (high - low) * (0.5 + AROUND)
     half = np.maximum(half, half[::-1] * np.array([CELL[0] / CELL[1], CELL[1] / CELL[0]]))
     return (

@@ -42,12 +42,12 @@ def posed_bodies(
         bodies = models.posed(frames)
         if bodies.vertices is None or bodies.model is None:
             raise ValueError(f"{name}: {_lacking(frames)}")
-        kept = np.flatnonzero(np.isfinite(bodies.vertices).all(axis=(1, 2)))
+        finite = np.flatnonzero(np.isfinite(bodies.vertices).all(axis=(1, 2)))
         done = start + len(frames)
-        if len(kept):
-            frames = frames[kept]
+        if len(finite):
+            frames = frames[finite]
             assert frames.ground is not None
-            yield PosedFrames(frames, bodies.vertices[kept], bodies.model, frames.ground)
+            yield PosedFrames(frames, bodies.vertices[finite], bodies.model, frames.ground)
         progress(done)
 
 

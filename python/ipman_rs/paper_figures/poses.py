@@ -54,14 +54,14 @@ def of_data_set(name: str, data: DataSet, most: int = MOST, progress: Progress =
         if frames.pose is None or frames.pose.shape[1] < JOINTS.stop:
             raise ValueError(f"{name}: has no poses of a body model; expected rotations of at least 22 joints")
         pose = np.asarray(frames.pose, np.float64)[:, JOINTS]
-        kept = np.flatnonzero(np.isfinite(pose).all(axis=(1, 2)))
-        values.append(_as_matrices(pose[kept]))
-        names.append(frames.names[kept])
+        finite = np.flatnonzero(np.isfinite(pose).all(axis=(1, 2)))
+        values.append(_as_matrices(pose[finite]))
+        names.append(frames.names[finite])
         progress(start + len(pose))
-    found = Poses(name, np.concatenate(values), np.concatenate(names))
-    if not len(found.values):
+    poses = Poses(name, np.concatenate(values), np.concatenate(names))
+    if not len(poses.values):
         raise ValueError(f"{name}: none of its {len(rows)} poses is finite")
-    return found
+    return poses
 
 
 def of_built_people(people: int, progress: Progress = lambda done: None) -> list[Poses]:

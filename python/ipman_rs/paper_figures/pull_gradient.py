@@ -106,13 +106,13 @@ def engine_curve(
     sheets = np.repeat(corners[None], len(heights), axis=0)
     sheets[..., 1] = np.asarray(heights, float)[:, None]
     quantity = quantities.ground_loss(alpha1, alpha2, beta1, beta2, "samples", "tanh_squared").of(sheet)
-    found = []
+    curves = []
     for term in np.eye(2):
         arguments = Bodies(sheets, sheet).over(ip.Ground.y_up())
         asked = np.tile(term, (len(heights), 1))
         values, gradients = quantity.value_and_vjp(*arguments, asked)
-        found.append((values @ term, gradients[..., 1].sum(axis=1)))
-    return found[0], found[1]
+        curves.append((values @ term, gradients[..., 1].sum(axis=1)))
+    return curves[0], curves[1]
 
 
 def _draw_curve(axes: Axes, heights: Array, pull: Array, slope: Array, numbers: dict[str, Any]) -> None:

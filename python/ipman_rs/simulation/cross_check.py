@@ -18,11 +18,11 @@ def each_drop(
     """
     run = _engine(engine)
     for body, drop in drops.items():
-        found = run(UprightDrop.of(drop), looks, step, friction)
+        placements = run(UprightDrop.of(drop), looks, step, friction)
         axes = drop.axes()
         foot = drop.center - (drop.center @ drop.normal - drop.height) * drop.normal
         places = np.empty((1 + len(looks), 12))
-        for row, (center, rotation) in zip(places, found, strict=True):
+        for row, (center, rotation) in zip(places, placements, strict=True):
             row[:3] = foot + center @ axes
             row[3:] = (axes.T @ rotation @ axes).ravel()
         yield body, places

@@ -201,9 +201,9 @@ def _cross_check(
         )
         for body in np.flatnonzero(starts & (status & Status.NOT_SIMULATED == 0)).tolist()
     }
-    for body, found in each_drop(engine, drops, options.looks, options.step, options.friction):
-        if np.isfinite(found).all():
-            places[body] = found
+    for body, placements in each_drop(engine, drops, options.looks, options.step, options.friction):
+        if np.isfinite(placements).all():
+            places[body] = placements
         else:
             status[body] |= Status.NOT_SIMULATED
     return status, places

@@ -49,14 +49,14 @@ def read_bodies(path: Path, request: Request, progress: Progress = silent) -> Gr
     try:
         with collect_unit_warnings() as sizes:
             if path.is_dir() and not (path / PREDICTIONS).is_file():
-                found = _fits(path, request, progress)
+                bodies = _fits(path, request, progress)
             else:
-                found = replace(_file(path / PREDICTIONS if path.is_dir() else path, request, progress), path=path)
+                bodies = replace(_file(path / PREDICTIONS if path.is_dir() else path, request, progress), path=path)
     except (ValueError, TypeError) as error:
         raise FileError(path, str(error)) from error
     except MemoryError as error:
         raise FileError(path, "needs more memory than there is; simulate fewer frames at once") from error
-    return replace(found, flags=add_unit_warning(found.flags, sizes))
+    return replace(bodies, flags=add_unit_warning(bodies.flags, sizes))
 
 
 def _file(path: Path, request: Request, progress: Progress) -> GroundedBodies:

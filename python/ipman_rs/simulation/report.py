@@ -136,14 +136,14 @@ class Fall:
                     jsonable(run.tilt[frame]),
                 )
             listed.append(row)
-        told = {} if self.run is None else {"engine": self.run.engine, "times": jsonable(self.run.times)}
+        engine = {} if self.run is None else {"engine": self.run.engine, "times": jsonable(self.run.times)}
         notes = [*self.notes, *([self.without_verdict] if self.without_verdict else [])]
         return {
             "file": str(self.path),
             "notes": notes,
             "flags": [*self.flags],
             "fallen_tilt": FALLEN,
-            **told,
+            **engine,
             "frames": listed,
         }
 
@@ -185,8 +185,8 @@ def run_falls(
                 ground = _grounds(bodies.ground, slice(done, done + len(vertices)))
                 tips.append(tip_test(vertices, template, ground))
                 if not tip_only:
-                    told: dict[str, Any] = {**options, "progress": lambda here, done=done: bar.to(done + here)}
-                    runs.append(simulate(vertices, template, ground, times, **told))
+                    arguments: dict[str, Any] = {**options, "progress": lambda here, done=done: bar.to(done + here)}
+                    runs.append(simulate(vertices, template, ground, times, **arguments))
                 done += len(vertices)
                 bar.to(done)
         result = Fall(

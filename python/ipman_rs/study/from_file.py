@@ -15,7 +15,7 @@ import ipman_rs as ip
 
 from ..analysis import PIECE
 from ..body.sequence import pieces
-from ..data import check, judge, separate_pieces
+from ..data import check, plausibility, separate_pieces
 from ..data.check import Finding
 from ..files import regular_file, safe_npz
 from ..files.errors import FileError
@@ -116,11 +116,11 @@ def on_ground(
     `analyze_file`.
     """
     recording = read(path, request) if arrays is None else _parameters(path, request, arrays)
-    admitted = judge.admit(path, recording.findings, request.force)
+    admitted = plausibility.admit(path, recording.findings, request.force)
     template, notes = _template(recording, request)
     normal = request.up or recording.up if own is None else np.atleast_2d(own.normal)[0]
-    findings = _judged(recording, template, np.asarray(normal), request.up is not None or own is not None)
-    recording = replace(recording, flags=(*admitted, *judge.admit(path, findings, request.force)))
+    findings = _findings(recording, template, np.asarray(normal), request.up is not None or own is not None)
+    recording = replace(recording, flags=(*admitted, *plausibility.admit(path, findings, request.force)))
     notes = [*recording.notes, *notes, *_not_used(recording, read_elsewhere)]
     if own is not None:
         return recording, template, own, [*notes, "ground: the file's own (--up and --ground say otherwise)"]
@@ -137,17 +137,17 @@ def on_ground(
     return recording, template, ip.Ground(normal, height), notes
 
 
-def _judged(recording: BodySequence, template: Any, normal: np.ndarray, up_is_said: bool) -> list[Finding]:
+def _findings(recording: BodySequence, template: Any, normal: np.ndarray, up_is_said: bool) -> list[Finding]:
     """Of some bodies of a file, evenly spaced."""
     count, size = recording.vertices.shape[:2]
     few = np.asarray(recording.vertices[check.evenly(count, max(1, min(check.SAMPLE, SAMPLED_VERTICES // size)))])
-    findings = judge.bodies(few, template, normal, up_is_said=up_is_said)
+    findings = plausibility.bodies(few, template, normal, up_is_said=up_is_said)
     whole = few[np.isfinite(few).all(axis=(1, 2))]
     if recording.template is None and len(whole):  # a body model's own pieces are known
         findings += separate_pieces.check_pieces(whole[0], recording.faces, normal)
     if not any(each.level == "wrong" for each in findings):
         weighed = few[check.evenly(len(few), WEIGHED)]
-        findings += judge.masses(ip.mass_properties(weighed, template).mass, weighed)
+        findings += plausibility.masses(ip.mass_properties(weighed, template).mass, weighed)
     return findings
 
 

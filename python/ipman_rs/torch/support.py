@@ -53,7 +53,7 @@ def base_of_support(
     Raises:
         As `support_margin`.
     """
-    found = ip.base_of_support(as_array(vertices), template, as_numpy_ground(ground), threshold, method, contact)
+    base = ip.base_of_support(as_array(vertices), template, as_numpy_ground(ground), threshold, method, contact)
 
     def tensors(value: Any) -> Any:
         if isinstance(value, list):
@@ -61,7 +61,7 @@ def base_of_support(
         tensor = torch.as_tensor(value, device=vertices.device)
         return tensor.to(vertices.dtype) if tensor.is_floating_point() else tensor
 
-    on_device = replace(found, **{name: tensors(value) for name, value in vars(found).items()})
+    on_device = replace(base, **{name: tensors(value) for name, value in vars(base).items()})
     return replace(on_device, margin=support_margin(vertices, template, ground, threshold, method, contact))
 
 

@@ -59,8 +59,8 @@ class TrainedModel:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> TrainedModel:
         """A checkpoint of `ipman train`. ValueError, naming the file, for another file or a regressor of keypoints."""
-        told, weights = read_trained(path)
-        settings = config_of(told)
+        config, weights = read_trained(path)
+        settings = config_of(config)
         if settings.model.backbone == "keypoints":
             raise ValueError(f"{path}: this regressor sees keypoints, not images")
         posing = Posing(ipt.BodyModel(settings.body), KEYPOINTS)
@@ -107,8 +107,8 @@ class TrainedModel:
             progress(row + 1)
         if not rows:
             raise ValueError("data: none of its images can be read")
-        found = {key: np.array(column) for key, column in zip(PREDICTED, zip(*rows, strict=True), strict=True)}
-        return {**found, "body": np.array(body.kind)}
+        predictions = {key: np.array(column) for key, column in zip(PREDICTED, zip(*rows, strict=True), strict=True)}
+        return {**predictions, "body": np.array(body.kind)}
 
     @torch.no_grad()
     def predict(self, image: Any, box: Sequence[float], focal: float | None = None, pitch: float = 0.0) -> Prediction:

@@ -13,8 +13,8 @@ from PIL import Image
 
 import ipman_rs as ip
 from ipman_rs.body import joint_regressors, pose_arrays
-from ipman_rs.data import judge
 from ipman_rs.data import open as open_data_set
+from ipman_rs.data import plausibility
 from ipman_rs.files import image, path_list, write_whole
 from ipman_rs.files.errors import FileError
 from ipman_rs.files.item_folder import npz, write_files
@@ -133,7 +133,7 @@ def _predict_image(
     write_files(output / path.stem, files, {"name": path.stem, "source": str(path)})
     ground = ip.Ground.under(vertices)
     note = "predicted in one look; the floor lies under the lowest vertex"
-    flags = odd_about(path, vertices, body.template, ground.normal)
+    flags = body_flags(path, vertices, body.template, ground.normal)
     analyzed = study(path.stem, vertices, body.template, ground, source=str(path), notes=[note], flags=flags)
     shown = Fitted(
         camera=camera_of(*camera.values()), size=(width, height), seen=np.zeros((0, 3)), projected=np.zeros((0, 2)),
@@ -142,9 +142,12 @@ def _predict_image(
     return replace(analyzed, fitted=shown)
 
 
-def odd_about(path: Path, vertices: Any, template: ip.BodyTemplate, normal: Any) -> tuple[str, ...]:
+def body_flags(path: Path, vertices: Any, template: ip.BodyTemplate, normal: Any) -> tuple[str, ...]:
     """What is odd about a predicted body (V, 3) m, in words; normal (3,): what points up. Options of the command line
     mend files, not predictions, so none is named."""
     one = np.asarray(vertices)[None]
-    findings = [*judge.bodies(one, template, normal), *judge.masses(ip.mass_properties(one, template).mass, one)]
-    return judge.admit(path, [replace(each, option="", advice="") for each in findings], force=True)
+    findings = [
+        *plausibility.bodies(one, template, normal),
+        *plausibility.masses(ip.mass_properties(one, template).mass, one),
+    ]
+    return plausibility.admit(path, [replace(each, option="", advice="") for each in findings], force=True)

@@ -30,8 +30,8 @@ ANYWHERE = 0.5  # m: a reference farther from the body is in other units or axes
 class MeasuredComparison:
     """T frames at `times`; `plates`, y up, and `reference`, a centre of mass (T, 3) m, at these times.
 
-    NaN where nothing was measured. `seen` (T,): frames with enough visible markers to locate the body. `judge`: the
-    source of the reference. `standing`: the person's mass, kg, by plates on which they stood still; NaN if unknown.
+    NaN where nothing was measured. `seen` (T,): frames with enough visible markers to locate the body.
+    `reference_name`: of its source. `standing`: mass, kg, of the person by plates on which they stood still, or NaN.
 
     Raises:
         ValueError: the measurements are far from the body, as in other units or axes.
@@ -43,7 +43,7 @@ class MeasuredComparison:
     plates: ForcePlates | None = None
     reference: Array | None = None
     seen: Mask | None = None
-    judge: str = "reference"
+    reference_name: str = "reference"
     standing: float = np.nan
 
     def __post_init__(self) -> None:

@@ -147,7 +147,13 @@ def _against_reference(comparison: MeasuredComparison) -> dict[str, Any] | None:
             "distance": np.linalg.norm(off, axis=1).mean(),
         }
     seconds = [comparison.times[used][0], comparison.times[used][-1]]
-    return {"judge": comparison.judge, "frames": int(used.sum()), "seconds": seconds, "axes": AXES, "methods": errors}
+    return {
+        "judge": comparison.reference_name,
+        "frames": int(used.sum()),
+        "seconds": seconds,
+        "axes": AXES,
+        "methods": errors,
+    }
 
 
 def _standing(comparison: MeasuredComparison) -> dict[str, Any] | None:

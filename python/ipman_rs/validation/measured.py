@@ -105,7 +105,7 @@ def _axis(up: Up, usual: str, path: Path) -> str:
     return named[0]
 
 
-def judge(path: Path) -> str:
+def reference_name(path: Path) -> str:
     """Whose a centre of mass is."""
     if path.suffix.lower() == ".c3d":
         return "Plug-in Gait"

@@ -129,7 +129,7 @@ def _places(comparison: MeasuredComparison) -> list[tuple[str, Array, tuple[str,
         places.append(("measured CoP", comparison.measured, ("^", "black", 10)))
         places.append(("ZMP of the parts", comparison.zmp, ("D", OURS, 6)))
     if comparison.reference is not None:
-        places.append((f"CoM by {comparison.judge}", comparison.reference, ("s", REFERENCE, 6)))
+        places.append((f"CoM by {comparison.reference_name}", comparison.reference, ("s", REFERENCE, 6)))
     return places  # type: ignore[return-value]
 
 
@@ -164,7 +164,7 @@ def over_time(comparison: MeasuredComparison) -> bytes:
             color=REFERENCE,
             lw=2.5,
             zorder=1,
-            label=f"by {comparison.judge}",
+            label=f"by {comparison.reference_name}",
         )
     axes[0].set_ylabel("CoM height, m")
     axes[0].legend(frameon=False, fontsize=7, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1))
@@ -202,7 +202,9 @@ def _draw_centers(axis: Axes, comparison: MeasuredComparison, way: Array) -> Non
         shown.insert(0, ("measured CoP", measured, {"color": "black", "lw": 2}))
         shown.append(("ZMP of the parts", comparison.zmp, {"color": OURS, "lw": 1.2}))
     if comparison.reference is not None:
-        shown.append((f"CoM by {comparison.judge}", comparison.reference, {"color": REFERENCE, "lw": 2, "zorder": 1}))
+        shown.append(
+            (f"CoM by {comparison.reference_name}", comparison.reference, {"color": REFERENCE, "lw": 2, "zorder": 1})
+        )
     middle = comparison.com.mean(axis=0)
     along = {name: 1e3 * (places - middle) @ way for name, places, _ in shown}
     shown = [each for each in shown if np.isfinite(along[each[0]]).any()]

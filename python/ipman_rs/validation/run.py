@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..body.sites import FEWEST_POINTS
-from ..data import check, judge, markers, opensim
+from ..data import check, markers, opensim, plausibility
 from ..data.force_plates import ForcePlates
 from ..data.markers import own
-from ..data.markers.judged import check_tracks
+from ..data.markers.plausibility import check_tracks
 from ..data.tracks import Tracks
 from ..files import write_whole
 from ..files.errors import FileError
@@ -226,7 +226,7 @@ def _tracks(plan: Plan, trial: Trial) -> Tracks:
 
 
 def _marker_findings(plan: Plan, tracks: Tracks) -> list[check.Finding]:
-    """What the judge says of the markers before they are fitted; here --rate is another one."""
+    """Findings about the markers before they are fitted; here --rate is another one."""
     import ipman_rs as ip
 
     settings = plan.settings
@@ -238,8 +238,8 @@ def _marker_findings(plan: Plan, tracks: Tracks) -> list[check.Finding]:
 def _flags(path: Path, findings: Iterable[check.Finding], force: bool) -> tuple[str, ...]:
     """What is odd. Raises FileError for what cannot be."""
     try:
-        return judge.admit(path, findings, force)
-    except judge.NoPerson as error:
+        return plausibility.admit(path, findings, force)
+    except plausibility.NoPerson as error:
         raise FileError(path, str(error)) from error
 
 
@@ -305,7 +305,7 @@ def _compare(
             plates,
             None if measurement.reference is None else measurement.reference[rows],
             confidence.sum(axis=1) >= FEWEST_POINTS,
-            "reference" if trial.com is None else measured.judge(trial.com),
+            "reference" if trial.com is None else measured.reference_name(trial.com),
             weight,
         )
     except ValueError as error:

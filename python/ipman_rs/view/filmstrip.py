@@ -42,8 +42,8 @@ def draw_filmstrip(study: Study, path: Path | IO[bytes]) -> None:
     page.patch.set_alpha(0.0)
     page.text(40, 60, study.name, size=24, color=colors.INK, va="center", weight="bold", parse_math=False)
     moved = np.linalg.norm(study.numbers["center_of_mass_exact"] - study.numbers["center_of_mass_exact"][0], axis=-1)
-    said = f"centre of mass moved {1e3 * moved[-1]:.0f} mm in {study.label(count - 1)}"
-    page.text(40, 104, said, size=15, color=colors.MUTED, va="center", parse_math=False)
+    label = f"centre of mass moved {1e3 * moved[-1]:.0f} mm in {study.label(count - 1)}"
+    page.text(40, 104, label, size=15, color=colors.MUTED, va="center", parse_math=False)
     save(figure, path)
 
 

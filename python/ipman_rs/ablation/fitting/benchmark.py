@@ -8,10 +8,10 @@ from pathlib import Path
 from ipman_rs.progress import Progress, silent
 
 from . import report
-from .run import Benchmark, blocks
+from .run import FittingBenchmark, blocks
 
 
-def benchmark(run: Benchmark, only: Sequence[str] = (), progress: Progress = silent) -> Path:
+def benchmark(run: FittingBenchmark, only: Sequence[str] = (), progress: Progress = silent) -> Path:
     """Fit the people of a benchmark with and without physics; the page of its folder. Interrupted, it continues.
 
     only: the starts of names of blocks; all blocks where there is none.

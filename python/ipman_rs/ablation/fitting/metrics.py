@@ -13,7 +13,7 @@ from ipman_rs.evaluation import body_errors, lowest, pve
 
 from ...fitting.candidate import Candidate
 from ...fitting.fit import Fit
-from .observations import Task
+from .observations import Observations
 from .truth import Truth
 
 Array = NDArray[np.floating]
@@ -36,7 +36,7 @@ class FitMetrics:
     converged: Array
 
 
-def fit_metrics(fit: Fit, task: Task, truth: Truth) -> FitMetrics:
+def fit_metrics(fit: Fit, observed: Observations, truth: Truth) -> FitMetrics:
     """Where the camera is known, errors are those in the world. Where it is not, aligned errors are in the axes of the
     cameras, and those in the world are after the turn about the vertical and the shift along the floor that fit best,
     heights being those above the floor."""
@@ -53,7 +53,7 @@ def fit_metrics(fit: Fit, task: Task, truth: Truth) -> FitMetrics:
         resting = body(betas=fit.variables["betas"].to(body.dtype)).vertices[..., 1]
     seen = surface.numpy(), joints.numpy(), truth.surface, truth.joints
     if fit.problem.presented is not None:
-        turns = camera.rotation.numpy(), task.camera.rotation.numpy()
+        turns = camera.rotation.numpy(), observed.camera.rotation.numpy()
         seen = tuple(_turned(points, turns[i // 2]) for i, points in enumerate(seen))
         on_floor = surface.numpy() * [1.0, 0.0, 1.0] + heights.numpy()[..., None] * [0.0, 1.0, 0.0]
         world = along_floor(on_floor, truth.surface)

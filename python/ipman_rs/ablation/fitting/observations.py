@@ -40,7 +40,7 @@ DISTANCE, CAMERA_HEIGHT, ROLL = (3.0, 5.0), (0.6, 1.8), 2.0  # m, m, degrees
 
 
 @dataclass(frozen=True)
-class Task:
+class Observations:
     """A problem, where its fits start, and the true camera, in which errors of the presented setting are measured."""
 
     problem: Problem
@@ -48,28 +48,28 @@ class Task:
     camera: Camera
 
 
-def calibrated_task(truth: Truth, seed: int) -> Task:
+def calibrated_observations(truth: Truth, seed: int) -> Observations:
     draw = np.random.default_rng([seed, 1])
     camera = cameras(truth, draw)
     problem = _seen(truth, camera, draw)
-    return Task(problem, start.before_camera(problem), camera)
+    return Observations(problem, start.before_camera(problem), camera)
 
 
-def regressed_task(truth: Truth, seed: int) -> Task:
+def regressed_observations(truth: Truth, seed: int) -> Observations:
     """Starts: the true pose but for a noise, the mean shape, the pelvis seen where it is but at a wrong distance."""
     draw = np.random.default_rng([seed, 3])
-    task = calibrated_task(truth, seed)
+    observed = calibrated_observations(truth, seed)
     pose = torch.from_numpy(truth.pose + math.radians(REGRESSED) * draw.standard_normal(truth.pose.shape))
     away = torch.from_numpy(np.exp(DEPTH * draw.standard_normal(len(truth))))
-    camera = task.camera
+    camera = observed.camera
     place = -(camera.rotation * camera.translation[:, :, None]).sum(dim=1)
     pelvis = place + away[:, None] * (torch.from_numpy(truth.joints[:, 0]) - place)
     resting = torch.from_numpy(np.asarray(load_body(FITTED)().joints)[0])
-    starts = {**start.neutral(task.problem), "orient": pose[:, 0], "pose": pose[:, 1:], "transl": pelvis - resting}
-    return Task(task.problem, starts, camera)
+    starts = {**start.neutral(observed.problem), "orient": pose[:, 0], "pose": pose[:, 1:], "transl": pelvis - resting}
+    return Observations(observed.problem, starts, camera)
 
 
-def presented_task(truth: Truth, seed: int, noise: float) -> Task:
+def presented_observations(truth: Truth, seed: int, noise: float) -> Observations:
     """noise: degrees."""
     draw = np.random.default_rng([seed, 2])
     camera = cameras(truth, draw)
@@ -91,7 +91,7 @@ def presented_task(truth: Truth, seed: int, noise: float) -> Task:
         mass=torch.from_numpy(truth.mass),
         presented=Presented(torch.from_numpy(pose[:, 1:]), _touching(pose), torch.from_numpy(pose[:, 0])),
     )
-    return Task(problem, start.camera_around(problem), camera)
+    return Observations(problem, start.camera_around(problem), camera)
 
 
 def _touching(pose: Array) -> Tensor:
@@ -156,4 +156,4 @@ def _under(pose: Array, above: Array) -> ipt.Ground:
     return ipt.Ground(torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64).expand(len(pose), 3), torch.from_numpy(level))
 
 
-__all__ = ["Task", "calibrated_task", "presented_task", "regressed_task"]
+__all__ = ["Observations", "calibrated_observations", "presented_observations", "regressed_observations"]

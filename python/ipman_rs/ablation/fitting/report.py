@@ -20,11 +20,11 @@ from ipman_rs.jsonable import jsonable
 
 from ...synthetic import at_rest
 from .metrics import FitMetrics
-from .run import Benchmark, Block, VariantResult
+from .run import Block, FittingBenchmark, FittingVariantResult
 from .truth import Truth, error_floors
 
 Array = NDArray[np.floating]
-Found = Sequence[tuple[Block, Truth, Sequence[VariantResult]]]
+BlockResults = Sequence[tuple[Block, Truth, Sequence[FittingVariantResult]]]
 
 NAME = "fitting_benchmark"
 # Differences of these have intervals, with so many digits; the tables and the plot show the second line's.
@@ -52,7 +52,7 @@ CLAIMED = ("MPJPE", "PA-MPJPE", "PVE", "BoSE 10 cm", "BoSE 3 cm")  # columns of 
 PAPERS_FOUR = ("baseline", "+ ground", "+ stability", "both")
 
 
-def write(blocks: Found, run: Benchmark) -> Path:
+def write(blocks: BlockResults, run: FittingBenchmark) -> Path:
     """The files into the folder of the run; the page's path."""
     record = jsonable(
         {
@@ -101,7 +101,7 @@ def columns(figures: FitMetrics, baseline: FitMetrics) -> dict[str, Array]:
     }
 
 
-def _record(block: Block, truth: Truth, results: Sequence[VariantResult]) -> dict[str, Any]:
+def _record(block: Block, truth: Truth, results: Sequence[FittingVariantResult]) -> dict[str, Any]:
     """Means and intervals, whole and by family."""
     families = list(dict.fromkeys(truth.family.tolist()))
     by_name = {result.row.name: columns(result.figures, results[0].figures) for result in results}
@@ -166,13 +166,13 @@ def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
             continue
         row = "both" if not isinstance(block["told"], float) else "ours"
         pve, bose = (rows[row]["against baseline"][key] for key in ("PVE", "BoSE 3 cm"))
-        said = f"PVE {_interval(pve)} mm, BoSE 3 cm {_interval(bose, 0)} points"
+        numbers = f"PVE {_interval(pve)} mm, BoSE 3 cm {_interval(bose, 0)} points"
         balanced = _direction(bose) == 1
         if not isinstance(block["told"], float):
-            lines.append((f"{block['name']}: both terms better", _direction(pve) == -1 and balanced, said))
+            lines.append((f"{block['name']}: both terms better", _direction(pve) == -1 and balanced, numbers))
         else:
             lines.append(
-                (f"{block['name']}: ours more balanced, PVE no worse", _direction(pve) in (-1, 0) and balanced, said)
+                (f"{block['name']}: ours more balanced, PVE no worse", _direction(pve) in (-1, 0) and balanced, numbers)
             )
     return lines
 
@@ -250,7 +250,7 @@ def _number(value: float, digits: int) -> str:
     return f"{value:+.{digits}f}".replace("-", "−")
 
 
-def _write_csv(blocks: Found, path: Path) -> None:
+def _write_csv(blocks: BlockResults, path: Path) -> None:
     """A line a body and row."""
     file = io.StringIO(newline="")
     lines = csv.writer(file)

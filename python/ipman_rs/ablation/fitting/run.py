@@ -14,15 +14,18 @@ import numpy as np
 import torch
 
 from ipman_rs.files import atomic_write
+from ipman_rs.renamed import old_names
 
 from ...fitting.config import FitConfig
 from ...fitting.fit import Fit, StageReport, fit
 from ...synthetic.at_rest import draw_people
 from ...torch.threads import one_thread
 from .metrics import FitMetrics, fit_metrics, snap_to_floor
-from .observations import Task, calibrated_task, presented_task, regressed_task
+from .observations import Observations, calibrated_observations, presented_observations, regressed_observations
 from .truth import Truth
-from .variants import CALIBRATED, PRESENTED, Variant, config
+from .variants import CALIBRATED, PRESENTED, FittingVariant, config
+
+__getattr__ = old_names(__name__, {"Benchmark": "FittingBenchmark"})
 
 SPLITS = {"test": 40_000, "tune": 10_000}  # seeds of the people; those of 20_000 and 30_000 were looked at
 CONTROLS = ("baseline", "both", "ours", "ours without physics")
@@ -36,7 +39,7 @@ class Block:
     name: str
     kind: str
     told: float | str | None
-    rows: tuple[Variant, ...]
+    rows: tuple[FittingVariant, ...]
 
 
 def blocks() -> list[Block]:
@@ -55,16 +58,16 @@ def blocks() -> list[Block]:
 
 
 @dataclass(frozen=True)
-class VariantResult:
+class FittingVariantResult:
     """One row of a block. seconds: on one processor core, per body."""
 
-    row: Variant
+    row: FittingVariant
     figures: FitMetrics
     seconds: float
 
 
 @dataclass(frozen=True)
-class Benchmark:
+class FittingBenchmark:
     """bodies: of the balanced blocks; the controls have `controls`. iterations: of the longest stage."""
 
     folder: Path
@@ -73,20 +76,24 @@ class Benchmark:
     iterations: int = 100
     split: str = "test"
 
-    def run(self, block: Block, progress: Callable[[], None] = lambda: None) -> tuple[Truth, list[VariantResult]]:
+    def run(
+        self, block: Block, progress: Callable[[], None] = lambda: None
+    ) -> tuple[Truth, list[FittingVariantResult]]:
         """`progress` is called after each row."""
         truth = self.truth(block.kind)
-        task: Task | None = None
+        observed: Observations | None = None
         results = []
         for row in block.rows:
             preset = config(row, self.iterations)
             place = self.place(block, preset)
-            task = task or self.task(block, truth)
+            observed = observed or self.observations(block, truth)
             if not place.exists():
-                self.fit(task, preset, place)
-            bodies, seconds = load_fit(task, place)
+                self.fit(observed, preset, place)
+            bodies, seconds = load_fit(observed, place)
             results.append(
-                VariantResult(row, fit_metrics(snap_to_floor(bodies) if row.snap else bodies, task, truth), seconds)
+                FittingVariantResult(
+                    row, fit_metrics(snap_to_floor(bodies) if row.snap else bodies, observed, truth), seconds
+                )
             )
             progress()
         return truth, results
@@ -103,18 +110,18 @@ class Benchmark:
             Truth.of(draw_people(count, SPLITS[self.split], kind, progress)).save(path)
         return Truth.load(path)
 
-    def task(self, block: Block, truth: Truth) -> Task:
+    def observations(self, block: Block, truth: Truth) -> Observations:
         with one_thread():
             if block.told is None:
-                return calibrated_task(truth, SPLITS[self.split])
+                return calibrated_observations(truth, SPLITS[self.split])
             if isinstance(block.told, str):
-                return regressed_task(truth, SPLITS[self.split])
-            return presented_task(truth, SPLITS[self.split], block.told)
+                return regressed_observations(truth, SPLITS[self.split])
+            return presented_observations(truth, SPLITS[self.split], block.told)
 
-    def fit(self, task: Task, preset: FitConfig, place: Path) -> None:
+    def fit(self, observed: Observations, preset: FitConfig, place: Path) -> None:
         begun = time.process_time()
-        fitted = fit(task.problem, task.starts, preset)
-        seconds = (time.process_time() - begun) / task.problem.num_bodies
+        fitted = fit(observed.problem, observed.starts, preset)
+        seconds = (time.process_time() - begun) / observed.problem.num_bodies
         reasons = np.array([stage.reasons for stage in fitted.stages])
         variables: dict[str, Any] = {name: value.numpy() for name, value in fitted.variables.items()}
         with atomic_write(place) as file:
@@ -135,10 +142,10 @@ class Benchmark:
         return self.folder / f"fit-{key}.npz"
 
 
-def load_fit(task: Task, place: Path) -> tuple[Fit, float]:
+def load_fit(observed: Observations, place: Path) -> tuple[Fit, float]:
     """A fit from its file, and its seconds."""
     with np.load(place, allow_pickle=False) as stored:
         content: Mapping[str, np.ndarray] = dict(stored)
-    variables = {name: torch.from_numpy(content[name]) for name in task.starts}
+    variables = {name: torch.from_numpy(content[name]) for name in observed.starts}
     stages = [StageReport("", list(reasons), [], {}, variables) for reasons in content["reasons"]]
-    return Fit(task.problem, variables, stages), float(content["seconds"])
+    return Fit(observed.problem, variables, stages), float(content["seconds"])

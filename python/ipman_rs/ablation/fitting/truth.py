@@ -99,10 +99,10 @@ def correspondence() -> tuple[NDArray[np.int64], Array]:
     for point, vertices in zip(lite.v_template, near, strict=True):
         faces = full.faces[np.isin(full.faces, vertices).any(axis=1)]
         triangles = full.v_template[faces]
-        found = closest_point(triangles, np.tile(point, (len(faces), 1)))
-        best = np.linalg.norm(found - point, axis=1).argmin()
+        closest = closest_point(triangles, np.tile(point, (len(faces), 1)))
+        best = np.linalg.norm(closest - point, axis=1).argmin()
         corners.append(faces[best])
-        weights.append(points_to_barycentric(triangles[best : best + 1], found[best : best + 1])[0])
+        weights.append(points_to_barycentric(triangles[best : best + 1], closest[best : best + 1])[0])
     return np.array(corners), np.array(weights)
 
 

@@ -10,7 +10,7 @@ from ...fitting.terms import PHYSICS
 
 
 @dataclass(frozen=True)
-class Variant:
+class FittingVariant:
     """preset: less the terms of `without`. snap: the fitted body is then put onto the floor."""
 
     name: str
@@ -19,17 +19,17 @@ class Variant:
     snap: bool = False
 
 
-def rows(literal: str, with_physics: str, ours: str) -> list[Variant]:
+def rows(literal: str, with_physics: str, ours: str) -> list[FittingVariant]:
     """Baseline: the preset with both terms less them, so that all rows free the same variables in the same stages."""
     return [
-        Variant("baseline", with_physics, PHYSICS),
-        Variant("+ ground", with_physics, ("stability",)),
-        Variant("+ stability", with_physics, ("ground",)),
-        Variant("both", with_physics),
-        Variant("ours", ours),
-        Variant("ours without physics", ours, PHYSICS),
-        Variant("as published", literal),
-        Variant("baseline, snapped", with_physics, PHYSICS, snap=True),
+        FittingVariant("baseline", with_physics, PHYSICS),
+        FittingVariant("+ ground", with_physics, ("stability",)),
+        FittingVariant("+ stability", with_physics, ("ground",)),
+        FittingVariant("both", with_physics),
+        FittingVariant("ours", ours),
+        FittingVariant("ours without physics", ours, PHYSICS),
+        FittingVariant("as published", literal),
+        FittingVariant("baseline, snapped", with_physics, PHYSICS, snap=True),
     ]
 
 
@@ -37,7 +37,7 @@ CALIBRATED = rows("smplify-x", "ipman-o-star", "fast")
 PRESENTED = rows("smplify-xmc", "ipman-o", "balanced")
 
 
-def config(row: Variant, iterations: int) -> FitConfig:
+def config(row: FittingVariant, iterations: int) -> FitConfig:
     """The preset of a row; stages that would run longer end after `iterations`."""
     preset = limit_iterations(load(row.preset), iterations)
     stages = (replace(stage, weights=_less(stage.weights, row.without)) for stage in preset.stages)
@@ -48,4 +48,4 @@ def _less(weights: Mapping[str, float], names: Collection[str]) -> dict[str, flo
     return {name: weight for name, weight in weights.items() if name not in names}
 
 
-__all__ = ["CALIBRATED", "PRESENTED", "Variant", "config", "rows"]
+__all__ = ["CALIBRATED", "PRESENTED", "FittingVariant", "config", "rows"]

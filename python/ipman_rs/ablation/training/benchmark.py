@@ -8,10 +8,12 @@ from pathlib import Path
 from ipman_rs.progress import Progress, silent
 
 from . import report
-from .run import TILTS, Benchmark
+from .run import TILTS, TrainingBenchmark
 
 
-def benchmark(run: Benchmark, tilts: Sequence[float] = (), workers: int = 1, progress: Progress = silent) -> Path:
+def benchmark(
+    run: TrainingBenchmark, tilts: Sequence[float] = (), workers: int = 1, progress: Progress = silent
+) -> Path:
     """Train the regressors of a benchmark; the page of its folder. Interrupted, it continues.
 
     tilts: degrees by which labels lean; those of the task where there is none. workers: processes.

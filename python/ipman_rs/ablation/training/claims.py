@@ -53,10 +53,10 @@ CLAIMS = (
 
 def judge_claims(blocks: Sequence[dict[str, Any]]) -> list[tuple[Claim, list[tuple[Verdict, Sequence[float]]]]]:
     """Every claim with its verdict and the interval, of each block of the record (each tilt)."""
-    return [(claim, [_judged(claim, block) for block in blocks]) for claim in CLAIMS]
+    return [(claim, [_verdict(claim, block) for block in blocks]) for claim in CLAIMS]
 
 
-def _judged(claim: Claim, block: dict[str, Any]) -> tuple[Verdict, Sequence[float]]:
+def _verdict(claim: Claim, block: dict[str, Any]) -> tuple[Verdict, Sequence[float]]:
     row = next(row for row in block["rows"] if row["name"] == claim.row)
     interval = row["against baseline"][claim.figure]
     return claim.verdict(interval), interval

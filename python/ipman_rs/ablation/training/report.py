@@ -19,11 +19,11 @@ from ipman_rs.files.page_templates import environment
 from ...training.metrics import COLUMNS, PoseMetrics, columns
 from .claims import UNITS, judge_claims
 from .intervals import paired_over_seeds
-from .run import TILTS, Benchmark, VariantResult
+from .run import TILTS, TrainingBenchmark, TrainingVariantResult
 from .variants import BASELINE, CONTROL, OURS
 
 Array = NDArray[np.floating]
-Found = Mapping[float, Sequence[VariantResult]]
+ResultsByTilt = Mapping[float, Sequence[TrainingVariantResult]]
 
 PAGES = {"keypoints": "training_benchmark", "images": "training_benchmark_images"}
 TEMPLATE = "training_benchmark.md.j2"
@@ -32,7 +32,7 @@ DIFFERENCES = {"PVE": 1, "BoSE": 1, "strict BoSE (exact CoM)": 1, "tilt": 2, "pe
 ASKED = 8.0  # degrees: the tilt at which something was to be shown
 
 
-def write(found: Found, run: Benchmark) -> Path:
+def write(results_by_tilt: ResultsByTilt, run: TrainingBenchmark) -> Path:
     """The files into the folder of the run; the page's path."""
     name = PAGES[run.task.name]
     record = {
@@ -45,10 +45,10 @@ def write(found: Found, run: Benchmark) -> Path:
         },
         "plan": asdict(run.plan),
         "rows": [asdict(row) for row in run.rows],
-        "blocks": [_record(tilt, results) for tilt, results in found.items()],
+        "blocks": [_record(tilt, results) for tilt, results in results_by_tilt.items()],
     }
     write_whole(run.folder / f"{name}.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
-    _write_csv(found, run.folder / f"{name}.csv")
+    _write_csv(results_by_tilt, run.folder / f"{name}.csv")
     _plot(record["blocks"], run.folder / f"{name}.svg")
     path = run.folder / f"{name}.md"
     write_whole(path, page(record))
@@ -67,7 +67,7 @@ def page(record: dict[str, Any]) -> str:
     )  # fmt: skip
 
 
-def _record(tilt: float, results: Sequence[VariantResult]) -> dict[str, Any]:
+def _record(tilt: float, results: Sequence[TrainingVariantResult]) -> dict[str, Any]:
     """Means and intervals of the labels of one tilt."""
     tables = {result.row.name: _stacked(result.figures) for result in results}
     baseline = tables[BASELINE]
@@ -114,8 +114,8 @@ def verdicts(blocks: Sequence[dict[str, Any]]) -> list[tuple[str, bool, str]]:
             for key, gain, unit in (("PVE", pve, "mm"), ("BoSE", bose, "points")):
                 lost = control["against baseline"][key]
                 gone = lost[2] >= 0 if key == "PVE" else lost[1] <= 0
-                said = f"{_interval(lost)}, not {_interval(gain)} {unit}"
-                lines.append((f"{title}: the gain in {key} is lost with a shuffled camera", gone, said))
+                numbers = f"{_interval(lost)}, not {_interval(gain)} {unit}"
+                lines.append((f"{title}: the gain in {key} is lost with a shuffled camera", gone, numbers))
     return lines
 
 
@@ -128,12 +128,12 @@ def _signed(value: float, digits: int = 1) -> str:
     return f"{value:+.{digits}f}".replace("-", "−")
 
 
-def _write_csv(found: Found, path: Path) -> None:
+def _write_csv(results_by_tilt: ResultsByTilt, path: Path) -> None:
     """One line per body, row and seed."""
     file = io.StringIO(newline="")
     lines = csv.writer(file)
     lines.writerow(["labels", "row", "seed", "body", *COLUMNS])
-    for tilt, results in found.items():
+    for tilt, results in results_by_tilt.items():
         for result in results:
             for seed, figures in enumerate(result.figures):
                 numbers = columns(figures)

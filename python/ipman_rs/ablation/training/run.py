@@ -15,6 +15,7 @@ import torch
 from ipman_rs.files import atomic_write
 from ipman_rs.presets import get
 from ipman_rs.processes import end_with_parent
+from ipman_rs.renamed import old_names
 from ipman_rs.torch.threads import one_thread
 
 from ...training.batch import Batch
@@ -24,17 +25,19 @@ from ...training.tilted_labels import TiltAxis, tilt_labels
 from ...training.train_loop import TrainingPlan, estimate_all, run_plan
 from .shuffled_camera import shuffled_camera
 from .task import Plan, Task, key_of
-from .variants import Variant, ablation_of
+from .variants import TrainingVariant, ablation_of
+
+__getattr__ = old_names(__name__, {"Benchmark": "TrainingBenchmark"})
 
 LEANS, DEALS = 35_000, 36_000  # seeds of the labels' leans, and of the shuffled cameras
 TILTS = {"keypoints": (0.0, 4.0, 8.0, 12.0), "images": (0.0, 8.0)}
 
 
 @dataclass(frozen=True)
-class VariantResult:
+class TrainingVariantResult:
     """A row, and its figures for each seed."""
 
-    row: Variant
+    row: TrainingVariant
     figures: list[PoseMetrics]
 
 
@@ -44,11 +47,11 @@ class Job:
 
     seed: int
     tilt: float | None = None
-    row: Variant | None = None
+    row: TrainingVariant | None = None
 
 
 @dataclass(frozen=True)
-class Benchmark:
+class TrainingBenchmark:
     """seeds: of weights and batches. part: of the settings' steps, for trials. lean: as in `tilt_labels`."""
 
     folder: Path
@@ -59,7 +62,7 @@ class Benchmark:
 
     def run(
         self, tilts: Sequence[float], workers: int = 1, progress: Callable[[int, int], None] | None = None
-    ) -> dict[float, list[VariantResult]]:
+    ) -> dict[float, list[TrainingVariantResult]]:
         """All rows with labels that lean by `tilts` degrees. progress: how many trainings of how many are done."""
         self.folder.mkdir(parents=True, exist_ok=True)
         self.task.make()
@@ -78,7 +81,7 @@ class Benchmark:
         return Plan(self._shortened(plan.base), self._shortened(plan.fine), plan.first and self._shortened(plan.first))
 
     @property
-    def rows(self) -> tuple[Variant, ...]:
+    def rows(self) -> tuple[TrainingVariant, ...]:
         return ablation_of(self.task.name).rows
 
     def _shortened(self, plan: TrainingPlan) -> TrainingPlan:
@@ -166,8 +169,10 @@ class Benchmark:
         """The file of what the first stage sees."""
         return self._place(Job(seed)) if self.plan.first else None
 
-    def _result(self, tilt: float, row: Variant) -> VariantResult:
-        return VariantResult(row, [PoseMetrics.load(self._place(Job(seed, tilt, row))) for seed in range(self.seeds)])
+    def _result(self, tilt: float, row: TrainingVariant) -> TrainingVariantResult:
+        return TrainingVariantResult(
+            row, [PoseMetrics.load(self._place(Job(seed, tilt, row))) for seed in range(self.seeds)]
+        )
 
     def _place(self, job: Job) -> Path:
         """The file of a result: named by all that decides it."""
@@ -187,10 +192,10 @@ class Benchmark:
 
 
 # The benchmark of a working process, which keeps the data of its last tilt.
-_BENCHMARK: list[Benchmark] = []
+_BENCHMARK: list[TrainingBenchmark] = []
 
 
-def _in_process(benchmark: Benchmark) -> None:
+def _in_process(benchmark: TrainingBenchmark) -> None:
     end_with_parent()
     _BENCHMARK[:] = [benchmark]
 

@@ -72,6 +72,6 @@ class Task(Protocol):
     def posing(self) -> Posing: ...
 
 
-def key_of(told: Any) -> str:
+def key_of(settings: Any) -> str:
     """A short hash of the settings that determine a result."""
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+    return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:16]

@@ -19,7 +19,7 @@ CONTROL = f"{OURS}, shuffled camera"
 
 
 @dataclass(frozen=True)
-class Variant:
+class TrainingVariant:
     """One row of the table: fine-tuning with the terms of a preset, or with none. weights: λ unlike the preset's.
     shuffled: the physics terms see the cameras of other images."""
 
@@ -37,7 +37,7 @@ class Ablation:
     """The variants compared on one task, and the plan by which each is trained."""
 
     plan: Plan
-    rows: tuple[Variant, ...]
+    rows: tuple[TrainingVariant, ...]
 
 
 @cache
@@ -48,7 +48,7 @@ def ablation_of(task: str) -> Ablation:
     stages = {name: TrainingPlan(**stage) for name, stage in content["plans"][task].items()}
     own = content["weights"][task]  # of presets
     rows = (
-        Variant(**{**row, "weights": own.get(row.get("preset"), {}) | row.get("weights", {})})
+        TrainingVariant(**{**row, "weights": own.get(row.get("preset"), {}) | row.get("weights", {})})
         for row in content["rows"]
     )
     return Ablation(Plan(**stages), tuple(rows))

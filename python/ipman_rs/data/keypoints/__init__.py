@@ -159,8 +159,8 @@ def _tracked(
     ]
     if not rows:
         raise ValueError(f"{source}: expected a point with confidence above 0 in track {track}, all have 0")
-    said = f"took number {track}, in {len(rows)} of {len(images)} images"
-    return rows, [f"{source}: {len(tracks)} people followed over time; {said}"]
+    note = f"took number {track}, in {len(rows)} of {len(images)} images"
+    return rows, [f"{source}: {len(tracks)} people followed over time; {note}"]
 
 
 def _sizes(
@@ -172,9 +172,9 @@ def _sizes(
         if known and any(image.size is None for image in images):
             raise ValueError(f"{source}: some images have a width and height and others have none; give image_size")
         return [image.size for image in images], []
-    said = " and ".join(f"{width:g} × {height:g}" for width, height in sorted(known - {given})[:3])
-    other = f"the file says that its image has {said} pixels; {given[0]:g} × {given[1]:g} were given"
-    return [given] * len(images), [other] if said else []
+    sizes = " and ".join(f"{width:g} × {height:g}" for width, height in sorted(known - {given})[:3])
+    other = f"the file says that its image has {sizes} pixels; {given[0]:g} × {given[1]:g} were given"
+    return [given] * len(images), [other] if sizes else []
 
 
 def _assumed(images: Sequence[Image]) -> list[str]:

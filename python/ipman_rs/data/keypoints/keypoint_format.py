@@ -11,7 +11,7 @@ import numpy as np
 
 from ipman_rs.files import read_json
 
-from ..judge import RELATIVE
+from ..plausibility import RELATIVE
 from .layouts import Layout
 from .people import Array, Image
 

@@ -115,7 +115,7 @@ def _people(given: dict[str, Any], place: str) -> list[Person | str]:
     )
     if worlds and len(worlds) != len(people):
         worlds, unused = [], (*unused, str(world_key))
-    found: list[Person | str] = []
+    read: list[Person | str] = []
     for index, points in enumerate(people):
         where = f"{place}: {key}" + (f"[{index}]" if len(people) > 1 else "")
         try:
@@ -124,10 +124,10 @@ def _people(given: dict[str, Any], place: str) -> list[Person | str]:
             if world is not None:
                 world = np.nan_to_num(world)
                 world[:, 3] = world[:, 3].clip(0, 1)
-            found.append(Person(NAMES, four[:, [0, 1, 3]], world, notes=notes, unused=unused))
+            read.append(Person(NAMES, four[:, [0, 1, 3]], world, notes=notes, unused=unused))
         except ValueError as error:
-            found.append(str(error))
-    return found
+            read.append(str(error))
+    return read
 
 
 def _listed(value: Any) -> list[Any]:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..judge import RELATIVE
+from ..plausibility import RELATIVE
 from . import layouts
 from .hand import hand
 from .keypoint_format import KeypointFormat, relative_to_pixels

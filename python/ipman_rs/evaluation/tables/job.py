@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ipman_rs import __version__, data
-from ipman_rs.data import check, judge
+from ipman_rs.data import check, plausibility
 from ipman_rs.data.frames import DataSet, Frames, Rows
 from ipman_rs.ground import Ground
 from ipman_rs.volume import mass_properties
@@ -190,7 +190,7 @@ class Job(Resumable):
         if self.predictions == TRUTH:
             return ()
         findings = [*(self._axes() or self._turned()), *self._masses(), *self._betas(), *self._of_truth()]
-        return (*self.estimates.flags, *judge.admit(self.predictions, findings, self.force))
+        return (*self.estimates.flags, *plausibility.admit(self.predictions, findings, self.force))
 
     def _of_truth(self) -> list[check.Finding]:
         """Findings about arrays of the user's own truth that no metric uses."""
@@ -204,7 +204,7 @@ class Job(Resumable):
             return []
         masses = mass_properties(bodies.vertices, bodies.model.template).mass
         finite = masses[np.isfinite(masses)]
-        return judge.mass(float(np.median(finite))) if len(finite) else []
+        return plausibility.mass(float(np.median(finite))) if len(finite) else []
 
     def _betas(self) -> list[check.Finding]:
         """Findings if the predictions have more shape components than the body model."""

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.data import check, judge
+from ipman_rs.data import check, plausibility
 from ipman_rs.data.frames import Frames, Rows
 from ipman_rs.files import regular_file, safe_npz
 from ipman_rs.ground import Ground
@@ -91,7 +91,7 @@ class Predictions:
     def flags(self) -> tuple[str, ...]:
         """What is unusual about a sample, in words. ValueError, naming the option to use, for what is wrong."""
         findings = [each for each in check.check_frames(check.sample(self)) if not each.what.startswith("lowest of")]
-        return judge.admit(self.path, [*findings, *self.unused()], self.options.force)
+        return plausibility.admit(self.path, [*findings, *self.unused()], self.options.force)
 
     def unused(self) -> list[check.Finding]:
         """Findings about arrays that no metric uses."""

@@ -49,14 +49,14 @@ def drop_repeated_faces(mesh: Mesh) -> Mesh:
     """Without faces that use a vertex twice, and without the second of two equal faces."""
     faces = mesh.faces
     flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
-    kept = np.flatnonzero(~flat)
-    first = _first_of_equal_faces(faces[kept])
-    again = len(kept) - len(first)
+    unique = np.flatnonzero(~flat)
+    first = _first_of_equal_faces(faces[unique])
+    again = len(unique) - len(first)
     if not flat.any() and not again:
         return mesh
-    kept = kept[first]
-    face_map = kept if mesh.face_map is None else mesh.face_map[kept]
-    mesh = replace(mesh, faces=faces[kept], face_map=face_map)
+    unique = unique[first]
+    face_map = unique if mesh.face_map is None else mesh.face_map[unique]
+    mesh = replace(mesh, faces=faces[unique], face_map=face_map)
     if flat.any():
         mesh = mesh.noting(f"{text.count_of(int(flat.sum()), 'face')} without area (a vertex twice) left out")
     if again:
@@ -136,15 +136,15 @@ def _open_edges(faces: Indices) -> Indices:
 
 def _merge(mesh: Mesh, target: Indices) -> Mesh:
     """Each vertex becomes its target, a vertex with a lower number or itself; the order stays the file's."""
-    kept = np.flatnonzero(target == np.arange(len(target)))
-    return _renumber(mesh, kept, np.searchsorted(kept, target))
+    remaining = np.flatnonzero(target == np.arange(len(target)))
+    return _renumber(mesh, remaining, np.searchsorted(remaining, target))
 
 
-def _renumber(mesh: Mesh, kept: Indices, number: Indices) -> Mesh:
+def _renumber(mesh: Mesh, remaining: Indices, number: Indices) -> Mesh:
     """The vertices ``kept``; ``number`` (V,) is the new one of each, −1 for those left out."""
     old = mesh.vertex_map
     vertex_map = number if old is None else np.where(old < 0, -1, number[old])
-    return replace(mesh, vertices=mesh.vertices[kept], faces=number[mesh.faces], vertex_map=vertex_map)
+    return replace(mesh, vertices=mesh.vertices[remaining], faces=number[mesh.faces], vertex_map=vertex_map)
 
 
 def _nearby(points: Array, distance: float) -> Indices:

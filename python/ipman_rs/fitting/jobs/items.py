@@ -113,7 +113,7 @@ def _admitted(
 
     Raises FileError where nobody's can.
     """
-    from ...data import judge
+    from ...data import plausibility
 
     admitted: list[tuple[Detections, tuple[str, ...]]] = []
     notes: list[str] = []
@@ -122,8 +122,8 @@ def _admitted(
         assert one.image_size is not None
         points = np.column_stack([one.points[0], one.confidence[0]])
         try:
-            odd = judge.admit(one.sources[0], judge.keypoints(points, one.image_size[0]), force)
-        except judge.NoPerson as error:
+            odd = plausibility.admit(one.sources[0], plausibility.keypoints(points, one.image_size[0]), force)
+        except plausibility.NoPerson as error:
             refused.append(str(error))
             continue
         admitted.append((one, odd))

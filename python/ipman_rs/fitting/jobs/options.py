@@ -17,7 +17,7 @@ from ...data.keypoints.detections import Detections
 from .. import camera_file, config, detection_problem, presented
 from ..camera_file import KnownCamera
 from ..config import FitConfig, uses_terms
-from ..presented import PresentedBody
+from ..presented import PoseSource, PresentedBody
 from ..problem import Problem
 
 
@@ -26,10 +26,9 @@ class FitOptions:
     """All that decides how bodies come out, beside the inputs.
 
     model: name or file of the body model. focal: pixels. pitch: degrees that the camera looks down. ground: height of
-    the floor, m; None: under the feet. height, mass: of the person, m and kg. pose: name or file of a presented pose,
-    with its frame, its up axis and the file of its contact. Of marker files: subject, up (in the file's own axes),
-    units (metres in one of its lengths), rate (Hz), markers (a file of marker names and their places), force (fit
-    markers that cannot be a person's, too). obj: write meshes as .obj, too.
+    the floor, m; None: under the feet. height, mass: of the person, m and kg. pose: what is presented. Of marker files:
+    subject, up (in the file's own axes), units (metres in one of its lengths), rate (Hz), markers (a file of marker
+    names and their places), force (fit markers that cannot be a person's, too). obj: write meshes as .obj, too.
     """
 
     config: FitConfig
@@ -40,10 +39,7 @@ class FitOptions:
     ground: float | None = None
     height: float | None = None
     mass: float | None = None
-    pose: str | None = None
-    pose_frame: int | None = None
-    pose_up: tuple[float, float, float] | None = None
-    contact: Path | None = None
+    pose: PoseSource | None = None
     subject: str | None = None
     up: tuple[float, float, float] | None = None
     units: float | None = None
@@ -54,22 +50,19 @@ class FitOptions:
 
     def identity(self) -> str:
         """Text that differs wherever the fits could: the version, the options, and the bytes of their files."""
-        files = [path for path in (self.pose, self.contact, self.markers) if path is not None and Path(path).is_file()]
-        content = [hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in files]
+        files = [] if self.pose is None else self.pose.files
+        files += [path for path in (self.markers,) if path is not None and path.is_file()]
+        content = [hashlib.sha256(path.read_bytes()).hexdigest() for path in files]
         return json.dumps([ip.__version__, asdict(self), content], default=str, sort_keys=True)
 
     def presented(self, body: BodyModel) -> PresentedBody | None:
         """The presented pose, if one is named. Raises ValueError."""
-        if self.pose is None:
-            return None
-        return presented.load(self.pose, body, contact=self.contact, frame=self.pose_frame, up=self.pose_up)
+        return None if self.pose is None else self.pose.load(body)
 
     def check(self) -> None:
         """ValueError where the preset needs what is not given, or options contradict each other."""
         if self.pose is None and uses_terms(self.config, "presented_pose", "presented_contact"):
             raise ValueError(f"preset {self.config.name} imitates a pose: give its name or file with --pose")
-        if self.pose is None and (self.contact or self.pose_frame is not None or self.pose_up):
-            raise ValueError("--contact, --pose-frame and --pose-up say more of a --pose: give that, too")
         if self.height is None and self.mass is None and uses_terms(self.config, "measured_shape"):
             raise ValueError(f"preset {self.config.name} knows the person's size: give --height or --mass, or both")
 
@@ -98,12 +91,20 @@ def fit_options(
     iterations: int | None = None,
     camera: str | Path | None = None,
     markers: str | Path | None = None,
+    *,
+    pose: str | None = None,
+    pose_frame: int | None = None,
+    pose_up: tuple[float, float, float] | None = None,
+    contact: Path | None = None,
     **others: Any,
 ) -> FitOptions:
     """The options of a fit by a preset's name or file.
 
-    iterations: end each stage after so many at most. camera: a JSON file (`camera_file`). markers, others: as in
-    `FitOptions`. Raises ValueError for a preset, camera or markers that cannot be read.
+    iterations: end each stage after so many at most. camera: a JSON file (`camera_file`). pose: name or file of a
+    presented pose, with its frame, its up axis and the file of its contact. markers, others: as in `FitOptions`.
+
+    Raises:
+        ValueError: a preset, camera or markers that cannot be read, or details of a pose without one.
     """
     from ...data.markers import own
 
@@ -116,4 +117,5 @@ def fit_options(
     if names is not None:
         own.read(names, ip.load_body(model))  # before anything is fitted
     known = None if camera is None else camera_file.read(camera)
-    return FitOptions(chosen, model, camera=known, markers=names, **others)
+    imitated = PoseSource.of(pose, pose_frame, pose_up, contact)
+    return FitOptions(chosen, model, camera=known, markers=names, pose=imitated, **others)

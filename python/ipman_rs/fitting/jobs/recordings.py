@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...data import judge
+from ...data import plausibility
 from ...files import read_json, safe_npz
 from ...files.errors import FileError
 from ...progress import Progress, silent
@@ -144,7 +144,7 @@ def _fit_markers(
 
     from ...data import markers
     from ...data.markers import own
-    from ...data.markers.judged import check_skin, check_tracks
+    from ...data.markers.plausibility import check_skin, check_tracks
     from .. import config, marker_fit
 
     preset, path = _preset(recording, options), recording.paths[0]
@@ -152,8 +152,8 @@ def _fit_markers(
     body = ipt.BodyModel(options.model)
     names = None if options.markers is None else own.read(options.markers, body.body)
     tracks = markers.read(path, options.up, options.subject, options.units, options.rate)
-    issues = check_tracks(tracks, names, options.up is not None, options.ground or 0.0)
-    flags = judge.admit(path, issues, options.force)
+    findings = check_tracks(tracks, names, options.up is not None, options.ground or 0.0)
+    flags = plausibility.admit(path, findings, options.force)
     count = len(range(0, len(tracks), pace.every))
     with progress(f"fitting {recording.name}", count) as step:
         fitted = marker_fit.fit_tracks(
@@ -161,7 +161,7 @@ def _fit_markers(
             progress=lambda _stage, done: step.to(min(done, count)),
         )  # fmt: skip
     findings, distances = marker_fit.check_fit(fitted), fitted.skin_distances
-    flags = (*flags, *judge.admit(path, [*findings, *check_skin(distances)], options.force))
+    flags = (*flags, *plausibility.admit(path, [*findings, *check_skin(distances)], options.force))
     errors = fitted.errors
     by_marker = {name: _mean(column) for name, column in zip(fitted.tracks.names, errors.T, strict=True)}
     sites = {name: site if isinstance(site, str) else asdict(site) for name, site in fitted.sites.items()}
@@ -281,7 +281,7 @@ def study_of(fitted: FittedRecording, model: str) -> Study:
     arrays, record = fitted.arrays, fitted.record
     ground = float(arrays["ground_height"][0]) if "ground_height" in arrays else None
     analyzed = analyze_file(fitted.path, Request(model=model, ground=ground), arrays=arrays)
-    slow = judge.rate(float(arrays["mocap_frame_rate"]))  # some of the recording's frames are left out
+    slow = plausibility.rate(float(arrays["mocap_frame_rate"]))  # some of the recording's frames are left out
     of_pace = {finding.what for finding in slow}
     flags = [flag for flag in analyzed.flags if flag.partition(";")[0] not in of_pace]
     return replace(

@@ -203,7 +203,7 @@ def _fit_batch(
         if not result.finite:
             item.failure = "the fit found no finite body; check focal length, image size and points"
             continue
-        item.flags += result.doubts()
+        item.flags += result.flags()
         yield item, result
 
 
@@ -216,8 +216,6 @@ def _refuse(item: Item, model: ipt.BodyModel, camera: KnownCamera | None) -> boo
     if item.failure is not None:
         return True
     assert shared.image_size is not None
-    item.flags += detection_problem.suspicious_keypoints(
-        names, shared.points[0], shared.confidence[0], shared.image_size[0]
-    )
-    item.flags += [] if camera is None else detection_problem.camera_mismatch(camera, shared.image_size[0])
+    item.flags += detection_problem.keypoint_flags(names, shared.points[0], shared.confidence[0], shared.image_size[0])
+    item.flags += [] if camera is None else detection_problem.camera_flags(camera, shared.image_size[0])
     return False

@@ -6,11 +6,15 @@ depend on its batch.
 
 from __future__ import annotations
 
+from ipman_rs.renamed import old_names
+
 from .drive import minimise
 from .lbfgs import lbfgs
 from .levenberg import levenberg
-from .outcome import Options, Outcome, ValueAndGradient
+from .outcome import Outcome, SolverOptions, ValueAndGradient
+
+__getattr__ = old_names(__name__, {"Options": "SolverOptions"})
 
 SOLVERS = {"lbfgs": lbfgs, "levenberg": levenberg}
 
-__all__ = ["SOLVERS", "ValueAndGradient", "Options", "Outcome", "minimise"]
+__all__ = ["SOLVERS", "ValueAndGradient", "SolverOptions", "Outcome", "minimise"]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 
-from .outcome import Options, Outcome, ValueAndGradient, Vector
+from .outcome import Outcome, SolverOptions, ValueAndGradient, Vector
 
 Solver = Generator[Vector, ValueAndGradient, Outcome]
 # The bodies' indices and their points (n, P) -> the value and gradient of each.
@@ -14,10 +14,10 @@ Evaluate = Callable[[Sequence[int], Vector], Sequence[ValueAndGradient]]
 
 
 def minimise(
-    solver: Callable[[Vector, Options], Solver],
+    solver: Callable[[Vector, SolverOptions], Solver],
     starts: Vector,
     evaluate: Evaluate,
-    options: Options,
+    options: SolverOptions,
     progress: Callable[[int], None] | None = None,
 ) -> list[Outcome]:
     """One `Outcome` per row of `starts` (B, P). `progress` is called with the number of bodies that have finished."""

@@ -10,7 +10,7 @@ from collections.abc import Generator
 
 import numpy as np
 
-from .outcome import Options, Outcome, ValueAndGradient, Vector
+from .outcome import Outcome, SolverOptions, ValueAndGradient, Vector
 
 MEMORY = 10
 SUFFICIENT, CURVATURE = 1e-4, 0.9  # the constants of the Wolfe conditions
@@ -20,7 +20,7 @@ STILL = 3  # iterations with hardly any decrease that count as the end
 Search = Generator[Vector, ValueAndGradient, "tuple[float, ValueAndGradient] | None"]
 
 
-def lbfgs(start: Vector, options: Options) -> Generator[Vector, ValueAndGradient, Outcome]:
+def lbfgs(start: Vector, options: SolverOptions) -> Generator[Vector, ValueAndGradient, Outcome]:
     """A step that does not end lower is undone and shrunk; the best point is never lost."""
     point, evaluation = start, (yield start)
     if not evaluation.finite:
@@ -35,13 +35,13 @@ def lbfgs(start: Vector, options: Options) -> Generator[Vector, ValueAndGradient
             memory.clear()
             direction = -evaluation.gradient
         first = 1.0 if memory else min(1.0, 1.0 / np.abs(evaluation.gradient).sum())
-        found = yield from _search(point, evaluation, direction, first)
-        if found is None:
+        searched = yield from _search(point, evaluation, direction, first)
+        if searched is None:
             if not memory:
                 return Outcome(point, evaluation.value, iteration, "no descent")
             memory.clear()
             continue
-        step, new = found
+        step, new = searched
         change, turn = step * direction, new.gradient - evaluation.gradient
         if change @ turn > 1e-10 * (turn @ turn):
             memory.append((change, turn))

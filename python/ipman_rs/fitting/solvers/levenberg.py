@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from .outcome import Options, Outcome, ValueAndGradient, Vector
+from .outcome import Outcome, SolverOptions, ValueAndGradient, Vector
 
 STILL = 3  # iterations with hardly any decrease that count as the end
 START, STIFFEST = 1e-3, 1e12  # damping
 
 
 def levenberg(
-    start: Vector, options: Options, solve: Callable[[Any, float], tuple[Vector, float]] | None = None
+    start: Vector, options: SolverOptions, solve: Callable[[Any, float], tuple[Vector, float]] | None = None
 ) -> Generator[Vector, ValueAndGradient, Outcome]:
     """Looks must carry a model of the Hessian, positive semidefinite. A step that does not end lower is undone.
 

@@ -14,7 +14,7 @@ CONVERGED = ("gradient", "decrease")  # reasons of an outcome
 
 
 @dataclass(frozen=True)
-class Options:
+class SolverOptions:
     """When to stop. Tolerances are absolute: a saturated ground term is a constant that would fool relative ones."""
 
     iterations: int = 100

@@ -12,7 +12,7 @@ from .hand_prior import HandPrior
 from .jaw_prior import JawPrior
 from .joint_limits import JointLimits
 from .measured_shape import MeasuredShape
-from .physics import Balance, Ground, Stability
+from .physics import BalanceTerm, GroundTerm, StabilityTerm
 from .points_3d import Points3D
 from .pose_prior import PosePrior
 from .presented_contact import PresentedContact
@@ -21,7 +21,7 @@ from .presented_pose import PresentedPose
 from .reprojection import Reprojection
 from .seat import Seat
 from .segment_balance import SegmentBalance
-from .self_contact import SelfContact, SelfPenetration
+from .self_contact import SelfContactTerm, SelfPenetrationTerm
 from .shape_prior import ShapePrior
 from .term import LeastSquares, Term
 from .vposer import VPoser
@@ -44,13 +44,13 @@ TERMS: dict[str, type[Term]] = {
     "jaw_prior": JawPrior,
     "expression_prior": ExpressionPrior,
     "flat_soles": FlatSoles,
-    "stability": Stability,
-    "ground": Ground,
-    "balance": Balance,
+    "stability": StabilityTerm,
+    "ground": GroundTerm,
+    "balance": BalanceTerm,
     "seat": Seat,
     "segment_balance": SegmentBalance,
-    "self_contact": SelfContact,
-    "self_penetration": SelfPenetration,
+    "self_contact": SelfContactTerm,
+    "self_penetration": SelfPenetrationTerm,
     "contact_normals": ContactNormals,
 }
 

@@ -27,7 +27,7 @@ from ..problem import Problem
 from .term import Term
 
 
-class Physics(Term):
+class PhysicsTerm(Term):
     """preset: a name of `ipman_rs.presets`, `usual` if None.
     samples: of the body's surface, those of its template if None; fewer are faster and coarser.
     only_static: leave alone a body that was in the air or falling where the stage began (`problem.static`). Balance on
@@ -62,11 +62,11 @@ class Physics(Term):
         return total if self.gate is None else torch.where(self.gate, total, 0)
 
 
-class Stability(Physics):
+class StabilityTerm(PhysicsTerm):
     quantities = ("stability",)
 
 
-class Ground(Physics):
+class GroundTerm(PhysicsTerm):
     """pull: a factor on that part. All that is within some 30 cm of the floor feels the pull, the soles alone the push:
     at 1 a body that is free to move comes to rest centimetres inside the floor."""
 
@@ -78,7 +78,7 @@ class Ground(Physics):
         self.factors = {"pull": not_negative("pull", pull)}
 
 
-class Balance(Physics):
+class BalanceTerm(PhysicsTerm):
     """wrap: as in `balance_cost`; "saturate" lets a body that falls alone."""
 
     usual = "balanced"

@@ -16,7 +16,7 @@ from ..problem import Problem
 from .term import Term
 
 
-class SelfContact(Term):
+class SelfContactTerm(Term):
     """Push and pull. Widths, near and geodesic in metres, as in `ipman_rs.torch.self_contact_loss`."""
 
     needs_mesh = True
@@ -38,7 +38,7 @@ class SelfContact(Term):
         return push + pull
 
 
-class SelfPenetration(Term):
+class SelfPenetrationTerm(Term):
     """Push alone."""
 
     needs_mesh = True

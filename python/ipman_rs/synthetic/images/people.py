@@ -42,8 +42,8 @@ class DrawnPerson:
 
     def posed(self) -> tuple[Array, Array]:
         """Vertices (V, 3) and joints (24, 3), float64 m, of the parameters as they are written."""
-        found = load_body(self.body)(*(np.float64(value) for value in (self.pose, self.betas, self.transl)))
-        return found.vertices, found.joints
+        body = load_body(self.body)(*(np.float64(value) for value in (self.pose, self.betas, self.transl)))
+        return body.vertices, body.joints
 
 
 def draw_person(draw: np.random.Generator, body: str, family: str, moving: float) -> DrawnPerson:

@@ -49,10 +49,10 @@ class Solid:
     def met(self, starts: Array, ways: Array) -> tuple[NDArray[np.integer], Array, Array]:
         """The face (N,) that each ray meets first, -1 for none; the point's weights (N, 3); the distance (N,) m."""
         starts = np.broadcast_to(starts, ways.shape)
-        found = self.scene.run(float32(starts), float32(ways), query="INTERSECT", output=True)
-        u, v = found["u"].astype(float), found["v"].astype(float)
-        distance = np.where(found["primID"] >= 0, found["tfar"].astype(float), np.inf)
-        return found["primID"], np.stack([1 - u - v, u, v], axis=1), distance
+        hits = self.scene.run(float32(starts), float32(ways), query="INTERSECT", output=True)
+        u, v = hits["u"].astype(float), hits["v"].astype(float)
+        distance = np.where(hits["primID"] >= 0, hits["tfar"].astype(float), np.inf)
+        return hits["primID"], np.stack([1 - u - v, u, v], axis=1), distance
 
     def hides(self, starts: Array, ways: Array) -> NDArray[np.bool_]:
         """Which rays (N,) meet it."""

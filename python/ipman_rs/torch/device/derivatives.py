@@ -10,7 +10,7 @@ from torch.autograd import Function
 
 from .. import reference
 from . import triton_terms
-from .stability_terms import Options
+from .stability_terms import StabilityOptions
 from .stability_terms import values as torch_values
 from .stability_terms import values_and_gradient as torch_values_and_gradient
 from .tables import tables
@@ -86,7 +86,7 @@ def _values(problem: Problem, vertices: Tensor, normal: Tensor, height: Tensor) 
     if triton_terms.serves(vertices):
         return triton_terms.values(vertices, normal, height, template._key, curve, options)
     known = tables(template, vertices.device, vertices.dtype)
-    return torch_values(known, Options(*options), curve, vertices, normal, height)
+    return torch_values(known, StabilityOptions(*options), curve, vertices, normal, height)
 
 
 def _values_and_gradient(
@@ -97,7 +97,7 @@ def _values_and_gradient(
     if triton_terms.serves(vertices):
         return triton_terms.values_and_gradient(vertices, normal, height, weights, template._key, curve, options)
     known = tables(template, vertices.device, vertices.dtype)
-    return torch_values_and_gradient(known, Options(*options), curve, vertices, normal, height, weights)
+    return torch_values_and_gradient(known, StabilityOptions(*options), curve, vertices, normal, height, weights)
 
 
 def _needs_graph() -> bool:

@@ -20,7 +20,7 @@ NUMBERS = ("stability", "pull", "push")
 """What is computed here and in the Triton kernels, in this order."""
 
 
-class Options(NamedTuple):
+class StabilityOptions(NamedTuple):
     """The options of the paper's terms, in their order."""
 
     alpha: float
@@ -51,21 +51,21 @@ class Stage(NamedTuple):
     length: Tensor  # (B,) wide
 
 
-def values(tables: Tables, o: Options, curve: str, vertices: Tensor, normal: Tensor, height: Tensor) -> Tensor:
+def values(tables: Tables, o: StabilityOptions, curve: str, vertices: Tensor, normal: Tensor, height: Tensor) -> Tensor:
     """(B, 3): stability, pull, push; NaN if a vertex is not finite. vertices (B, V, 3), normal (B, 3), height (B,)."""
     return _values(tables, o, curve, vertices, normal, height)[0]
 
 
 def values_and_gradient(
-    tables: Tables, o: Options, curve: str, vertices: Tensor, normal: Tensor, height: Tensor, weights: Tensor
+    tables: Tables, o: StabilityOptions, curve: str, vertices: Tensor, normal: Tensor, height: Tensor, weights: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Values (B, 3), and the gradient (B, V, 3) of Σ weights (B, 3) · values; 0 for a body that is not finite."""
-    found, stage = _values(tables, o, curve, vertices, normal, height)
-    return found, _gradient(tables, o, curve, stage, weights)
+    terms, stage = _values(tables, o, curve, vertices, normal, height)
+    return terms, _gradient(tables, o, curve, stage, weights)
 
 
 def _values(
-    tables: Tables, o: Options, curve: str, vertices: Tensor, normal: Tensor, height: Tensor
+    tables: Tables, o: StabilityOptions, curve: str, vertices: Tensor, normal: Tensor, height: Tensor
 ) -> tuple[Tensor, Stage]:
     wide = widest(vertices.device)
     finite = vertices.isfinite().flatten(1).all(dim=1)
@@ -101,14 +101,14 @@ def _values(
     # (Eq. 6) and (Eq. 7)
     pull = o.alpha1 * _wave(curve, at_samples.clamp(min=0) / o.alpha2)[0].mean(dim=-1, dtype=wide)
     push = o.beta1 * _wave(curve, at_samples.clamp(max=0) / o.beta2)[0].mean(dim=-1, dtype=wide)
-    found = torch.stack([length, pull, push], dim=-1).to(points.dtype)
-    found = torch.where(finite[:, None], found, torch.nan)
-    return found, Stage(
+    terms = torch.stack([length, pull, push], dim=-1).to(points.dtype)
+    terms = torch.where(finite[:, None], terms, torch.nan)
+    return terms, Stage(
         finite, points, narrow, at_samples, density, load, total, cop, area, volume, sums, com, offset, length
     )
 
 
-def _gradient(tables: Tables, o: Options, curve: str, s: Stage, weights: Tensor) -> Tensor:
+def _gradient(tables: Tables, o: StabilityOptions, curve: str, s: Stage, weights: Tensor) -> Tensor:
     dtype, wide = s.points.dtype, s.total.dtype
     # 0 where the two points coincide.
     unit = s.offset / torch.where(s.length > 0, s.length, 1)[:, None]
@@ -152,7 +152,7 @@ def _weight(tables: Tables, volume: Tensor) -> Tensor:
     return (volume.abs() * tables.part_sizes.to(volume.dtype)).sum(dim=-1)
 
 
-def _density(o: Options, height: Tensor) -> Tensor:
+def _density(o: StabilityOptions, height: Tensor) -> Tensor:
     """ρ (Eq. 2); without ε a hovering body is first lowered onto the ground, which leaves its centre as it is."""
     if o.epsilon == 0:
         height = height - height.amin(dim=-1, keepdim=True).clamp(min=0)

@@ -40,9 +40,9 @@ def self_contact_loss(
         squared = (body - nearest).square().sum(dim=-1)
         distance = torch.where(squared > 0, squared, 1).sqrt() * (squared > 0)
         out = ((nearest - body) * normal).sum(dim=-1) >= FACING * normal.norm(dim=-1) * distance
-        found = (face >= 0) & (out | ~inside)
-        push = (distance / push_width).tanh().square() * (inside & found)
-        pull = (distance / pull_width).tanh().square() * (~inside & found & (distance < near))
+        opposite = (face >= 0) & (out | ~inside)
+        push = (distance / push_width).tanh().square() * (inside & opposite)
+        pull = (distance / pull_width).tanh().square() * (~inside & opposite & (distance < near))
         both = torch.stack([0.5 * push.sum(), 0.5 * pull_weight * pull.sum()])
         rows.append(torch.where(finite, both, math.nan))
     both = torch.stack(rows) if rows else vertices.new_zeros(0, 2)

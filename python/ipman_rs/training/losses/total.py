@@ -50,8 +50,8 @@ class Loss(nn.Module):
         total = torch.stack([getattr(self.weights, name) * value for name, value in terms.items()]).sum()
         terms = {name: value.detach() for name, value in terms.items()}
         if self.physics is not None:
-            physics, found = self.physics(posed, batch)
-            total, terms = total + physics, terms | found
+            physics, physics_terms = self.physics(posed, batch)
+            total, terms = total + physics, terms | physics_terms
         return self.weights.all * total, terms
 
     def of(self, model: HMR, batch: Batch) -> tuple[Tensor, dict[str, Tensor]]:
@@ -61,8 +61,8 @@ class Loss(nn.Module):
             return self(model(batch.inputs), batch)
         estimate, maps = model.with_maps(batch.inputs)
         total, terms = self(estimate, batch)
-        found = keypoint_maps_loss(maps, batch.keypoints)
-        return total + self.weights.all * weight * found, terms | {"keypoint_maps": found.detach()}
+        maps_loss = keypoint_maps_loss(maps, batch.keypoints)
+        return total + self.weights.all * weight * maps_loss, terms | {"keypoint_maps": maps_loss.detach()}
 
     def _data_terms(self, estimate: Estimate, posed: Posed, batch: Batch) -> dict[str, Tensor]:
         return {

@@ -36,9 +36,11 @@ def load_spin(model: HMR, path: str | os.PathLike[str]) -> None:
         ),
         _listed("is not finite in", [name for name, value in weights.items() if not value.isfinite().all()]),
     ]  # fmt: skip
-    said = "; ".join(complaint for complaint in complaints if complaint)
-    if said:
-        raise ValueError(f"{path}: expected SPIN's weights for HMR with a ResNet-50 and {_body(wanted)}, but it {said}")
+    faults = "; ".join(complaint for complaint in complaints if complaint)
+    if faults:
+        raise ValueError(
+            f"{path}: expected SPIN's weights for HMR with a ResNet-50 and {_body(wanted)}, but it {faults}"
+        )
     model.load_state_dict(weights, strict=False)
 
 
@@ -46,8 +48,8 @@ def _weights(path: str | os.PathLike[str]) -> dict[str, Tensor]:
     content = read_checkpoint(path)
     weights = content.get("model") if isinstance(content, Mapping) else None
     if not isinstance(weights, Mapping) or not all(isinstance(value, Tensor) for value in weights.values()):
-        found = ", ".join(map(str, list(content)[:8])) if isinstance(content, Mapping) else type(content).__name__
-        raise ValueError(f"{path}: expected a dictionary with weights under 'model', as SPIN saves it, got {found}")
+        names = ", ".join(map(str, list(content)[:8])) if isinstance(content, Mapping) else type(content).__name__
+        raise ValueError(f"{path}: expected a dictionary with weights under 'model', as SPIN saves it, got {names}")
     return dict(weights)
 
 

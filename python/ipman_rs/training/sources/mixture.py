@@ -47,7 +47,7 @@ class Mixture(Dataset):
 
     def __getitem__(self, number: int) -> dict[str, Tensor]:
         draw = np.random.default_rng([self.seed, number])
-        said = ""
+        message = ""
         for _ in range(TRIES):
             # By the last end's rounding a draw may lie beyond it.
             chosen = self.shares[
@@ -57,11 +57,11 @@ class Mixture(Dataset):
             try:
                 return chosen.source.sample(row, draw)
             except BadSample as error:
-                said = f"{chosen.name}: {error}"
-                if said not in self._bad:
-                    self._bad.add(said)
-                    warnings.warn(f"skipped: {said}", stacklevel=2)
-        raise ValueError(f"data: {TRIES} bad samples in a row, the last: {said}")
+                message = f"{chosen.name}: {error}"
+                if message not in self._bad:
+                    self._bad.add(message)
+                    warnings.warn(f"skipped: {message}", stacklevel=2)
+        raise ValueError(f"data: {TRIES} bad samples in a row, the last: {message}")
 
 
 class Steps(Sampler[list[int]]):

@@ -36,8 +36,8 @@ class Curve(lightning.Callback):
 
     def on_validation_end(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
         if trainer.is_global_zero:
-            found = {key: float(value) for key, value in trainer.callback_metrics.items() if "/" in key}
-            self._write("validation.csv", trainer.global_step, found)
+            metrics = {key: float(value) for key, value in trainer.callback_metrics.items() if "/" in key}
+            self._write("validation.csv", trainer.global_step, metrics)
 
     def _write(self, name: str, step: int, numbers: Mapping[str, float]) -> None:
         path, text = self.folder / name, io.StringIO()
@@ -65,5 +65,5 @@ def drop_after(path: Path, last: int) -> None:
         path.unlink()
         return
     # A kill may have cut the last line short.
-    kept = [line for line in lines if line.endswith("\n") and int(line.partition(",")[0]) <= last]
-    write_whole(path, "".join([head, *kept]))
+    remaining = [line for line in lines if line.endswith("\n") and int(line.partition(",")[0]) <= last]
+    write_whole(path, "".join([head, *remaining]))

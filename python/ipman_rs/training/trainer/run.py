@@ -83,11 +83,11 @@ def _keep(settings: TrainingConfig, folder: Path) -> None:
 
 
 def _callbacks(settings: TrainingConfig, folder: Path) -> list[lightning.Callback]:
-    found: list[lightning.Callback] = [Curve(folder)]
+    callbacks: list[lightning.Callback] = [Curve(folder)]
     validated = settings.validate if settings.validation else 0
     if validated:
-        found.append(ModelCheckpoint(folder, BEST, monitor="PVE", mode="min", enable_version_counter=False))
-    return [*found, LastCheckpoint(folder / LAST, settings.save, validated)]
+        callbacks.append(ModelCheckpoint(folder, BEST, monitor="PVE", mode="min", enable_version_counter=False))
+    return [*callbacks, LastCheckpoint(folder / LAST, settings.save, validated)]
 
 
 def _logger(folder: Path) -> TensorBoardLogger | bool:

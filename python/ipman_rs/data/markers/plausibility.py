@@ -1,4 +1,4 @@
-"""Plausibility checks of recorded markers, with the limits of `ipman_rs.data.judge`."""
+"""Plausibility checks of recorded markers, with the limits of `ipman_rs.data.plausibility`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ipman_rs.data import check, judge
+from ipman_rs.data import check, plausibility
 from ipman_rs.data.check import Finding
 from ipman_rs.data.tracks import TO_Y_UP, Tracks
 from ipman_rs.ground import Ground
@@ -82,7 +82,7 @@ def check_tracks(
     names, _ = seen_names(tracks)
     meant = meanings_of(names, own)
     unknown = [name for name in names if name not in meant]
-    findings = judge.known_markers([*meant], unknown, FEWEST_POINTS) + check_rate(tracks)
+    findings = plausibility.known_markers([*meant], unknown, FEWEST_POINTS) + check_rate(tracks)
     if not meant:
         return findings
     placed = check_points(tracks, meant, up_is_said)
@@ -111,7 +111,7 @@ def check_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bo
     if any(each.level == "wrong" for each in findings):
         return findings
     with np.errstate(invalid="ignore"):
-        findings += judge.far("markers", points[np.isfinite(points).all(axis=-1)])
+        findings += plausibility.far("markers", points[np.isfinite(points).all(axis=-1)])
     rotation = TO_Y_UP[tracks.up]
     up = feet_to_head(points @ rotation, known, meanings)
     findings += check_sides(points, known, meanings)
@@ -147,7 +147,7 @@ def check_floor(tracks: Tracks, meanings: Mapping[str, Meaning], ground: float =
 
 
 def check_rate(tracks: Tracks) -> list[Finding]:
-    return judge.rate(tracks.rate) if len(tracks) > 1 else []
+    return plausibility.rate(tracks.rate) if len(tracks) > 1 else []
 
 
 def sampled_rows(tracks: Tracks) -> NDArray[np.int64]:

@@ -1,4 +1,4 @@
-"""The judge that every door asks, on the named poses turned every way: what is refused, what is odd, what passes."""
+"""The checks of all input, on the named poses turned every way: what is refused, what is odd, what passes."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import ipman_rs as ip
-from ipman_rs.data import judge
+from ipman_rs.data import plausibility
 from ipman_rs.data.check import Finding, near_origin
+from ipman_rs.data.plausibility import NoPerson, admit
 
 UPRIGHT = tuple(name for name in ip.body.poses.NAMES if name != "lying")
 ON_FEET = ("standing", "t_pose", "a_pose", "walking", "one_leg", "warrior", "lunge", "chair", "squat", "kneeling")
@@ -23,7 +24,8 @@ def levels(name, up=(0, 1, 0), scale=1.0, parts=True, **said):
     body = ip.load_body("anny-lite")
     vertices = ip.body.posed(body, name) * scale
     template = body.template if parts else ip.BodyTemplate(ip.body.posed(body, name), body.faces)
-    return [each for each in judge.bodies(vertices[None], template, np.array(up, float), **said) if each.level != "ok"]
+    findings = plausibility.bodies(vertices[None], template, np.array(up, float), **said)
+    return [each for each in findings if each.level != "ok"]
 
 
 @pytest.mark.parametrize("name", UPRIGHT)
@@ -38,7 +40,7 @@ def test_no_turned_body_passes(body, name, turn):
     order, signs = TURNS[turn]
     body = ip.load_body(body)
     vertices = ip.body.posed(body, name)[:, order] * signs
-    found = judge.bodies(vertices[None], body.template, np.array([0.0, 1.0, 0.0]))
+    found = plausibility.bodies(vertices[None], body.template, np.array([0.0, 1.0, 0.0]))
     odd = [each for each in found if each.level != "ok"]
     assert odd
     assert odd[0].option.removeprefix("--up ").lstrip("-") == turn[-1]
@@ -54,9 +56,9 @@ def test_who_lies_is_odd_unless_up_is_said():
 def test_who_stands_on_the_head_is_refused(name):
     (found,) = levels(name, up=(0, -1, 0))
     assert (found.level, found.option) == ("wrong", "--up y")
-    with pytest.raises(judge.NoPerson, match=r"^a\.obj: stands on its head.*--up y if so.*--force"):
-        judge.admit("a.obj", [found])
-    assert judge.admit("a.obj", [found], force=True) == ("stands on its head, with its feet in the air; --up y if so",)
+    with pytest.raises(NoPerson, match=r"^a\.obj: stands on its head.*--up y if so.*--force"):
+        admit("a.obj", [found])
+    assert admit("a.obj", [found], force=True) == ("stands on its head, with its feet in the air; --up y if so",)
     assert levels(name, up=(0, -1, 0), up_is_said=True) == []
 
 
@@ -67,7 +69,7 @@ def test_another_axis_is_odd_in_one_body_and_wrong_in_many(name):
     for up in ((0, 0, 1), (1, 0, 0)):
         (found,) = levels(name, up=up)
         assert (found.level, found.option) == ("odd", "--up y")
-        *fine, found = judge.bodies(vertices, body.template, np.array(up, float))
+        *fine, found = plausibility.bodies(vertices, body.template, np.array(up, float))
         assert {each.level for each in fine} == {"ok"}
         assert (found.level, found.option) == ("wrong", "--up y")
 
@@ -100,7 +102,7 @@ def test_other_units_are_refused(scale, option):
     ("kilograms", "level"), [(70, None), (2.1, None), (1.5, "odd"), (300, "odd"), (0.6, "wrong"), (5.9e10, "wrong")]
 )
 def test_mass(kilograms, level):
-    assert [each.level for each in judge.mass(kilograms)] == ([level] if level else [])
+    assert [each.level for each in plausibility.mass(kilograms)] == ([level] if level else [])
 
 
 @pytest.mark.parametrize(
@@ -109,32 +111,32 @@ def test_mass(kilograms, level):
      (11, 1.8, "odd"), (3.8, 1.8, "wrong"), (4.6, 1.8, "wrong"), (4.4, 0.2, "wrong"), (200, 0.9, "odd")],
 )  # fmt: skip
 def test_mass_against_size(kilograms, span, level):
-    assert [each.level for each in judge.mass(kilograms, span)] == ([level] if level else [])
+    assert [each.level for each in plausibility.mass(kilograms, span)] == ([level] if level else [])
 
 
 @pytest.mark.parametrize(
     ("hertz", "level"), [(30, None), (1, "odd"), (1e5, "odd"), (0, "wrong"), (np.nan, "wrong"), (-30, "wrong")]
 )
 def test_rate(hertz, level):
-    assert [each.level for each in judge.rate(hertz)] == ([level] if level else [])
+    assert [each.level for each in plausibility.rate(hertz)] == ([level] if level else [])
 
 
 @pytest.mark.parametrize(("metres", "level"), [(0.01, None), (0.05, "odd"), (416, "wrong")])
 def test_marker_error(metres, level):
-    assert [each.level for each in judge.marker_error(metres)] == ([level] if level else [])
+    assert [each.level for each in plausibility.marker_error(metres)] == ([level] if level else [])
 
 
 @pytest.mark.parametrize(
     ("known", "unknown", "level"), [(55, 0, None), (40, 15, "odd"), (6, 49, "wrong"), (3, 2, "wrong")]
 )
 def test_known_markers(known, unknown, level):
-    found = judge.known_markers(*([f"m{index}" for index in range(count)] for count in (known, unknown)))
+    found = plausibility.known_markers(*([f"m{index}" for index in range(count)] for count in (known, unknown)))
     assert [each.level for each in found] == ([level] if level else [])
     assert level is None or f"{unknown} of {known + unknown} markers" in found[0].what
 
 
 def test_admit_passes_what_is_merely_missing():
-    assert judge.admit("a", [Finding("ok", "x"), Finding("missing", "y"), Finding("odd", "z", "look")]) == ("z; look",)
+    assert admit("a", [Finding("ok", "x"), Finding("missing", "y"), Finding("odd", "z", "look")]) == ("z; look",)
 
 
 IMAGE = np.array([640.0, 480.0])
@@ -145,7 +147,7 @@ PERSON = np.array(
 
 def of_keypoints(points, size=IMAGE, confidence=0.9):
     given = np.broadcast_to(confidence, len(points))
-    return judge.keypoints(np.column_stack([points, given]), np.array(size, float))
+    return plausibility.keypoints(np.column_stack([points, given]), np.array(size, float))
 
 
 @pytest.mark.parametrize(
@@ -178,9 +180,9 @@ def test_keypoints_that_the_detector_is_not_sure_of_may_lie_outside():
 
 
 def test_keypoints_of_another_image_size_name_the_option():
-    with pytest.raises(judge.NoPerson, match=r"a.json: 9 of 9 .*is that its size\? \(--image-size WxH\) \(--force"):
-        judge.admit("a.json", of_keypoints(PERSON * 3))
-    (said,) = judge.admit("a.json", of_keypoints(PERSON * 3), force=True)
+    with pytest.raises(NoPerson, match=r"a.json: 9 of 9 .*is that its size\? \(--image-size WxH\) \(--force"):
+        admit("a.json", of_keypoints(PERSON * 3))
+    (said,) = admit("a.json", of_keypoints(PERSON * 3), force=True)
     assert "lie outside the image" in said
 
 
@@ -189,7 +191,7 @@ def test_a_body_in_another_world_is_refused_and_one_high_up_is_odd():
     standing = ip.body.posed(body, "standing")[None]
     up = np.array([0.0, 1.0, 0.0])
     for away, level in (((900, 0, 0), "wrong"), ((0, 60, 0), "odd"), ((0, -60, 0), "odd"), ((60, 3, 0), "ok")):
-        found = judge.bodies(standing + away, body.template, up, up_is_said=True)
+        found = plausibility.bodies(standing + away, body.template, up, up_is_said=True)
         assert found[-1].level == level
 
 
@@ -197,7 +199,8 @@ def test_one_body_of_another_size_among_many_is_odd():
     body = ip.load_body("anny-lite")
     bodies = np.repeat(ip.body.posed(body, "standing")[None], 9, axis=0)
     bodies[4] *= 0.01
-    found = [each for each in judge.bodies(bodies, body.template, np.array([0.0, 1.0, 0.0])) if each.level != "ok"]
+    findings = plausibility.bodies(bodies, body.template, np.array([0.0, 1.0, 0.0]))
+    found = [each for each in findings if each.level != "ok"]
     assert [each.level for each in found] == ["odd"]
     assert "1 of 9 bodies" in found[0].what
 
@@ -212,14 +215,14 @@ def test_places_of_people_about_the_origin(unit, option):
 @pytest.mark.parametrize(("metres", "levels"), [(0.02, []), (2.0, ["odd"])])
 def test_speed(metres, levels):
     places = np.outer(np.arange(50), [metres, 0, 0])
-    assert [each.level for each in judge.speed("trans", places, np.arange(50) / 60)] == levels
-    assert judge.speed("trans", places, None) == []
+    assert [each.level for each in plausibility.speed("trans", places, np.arange(50) / 60)] == levels
+    assert plausibility.speed("trans", places, None) == []
 
 
 def test_speed_of_places_that_are_not_finite(recwarn):
     places = np.outer(np.arange(50), [2.0, 0, 0])
     places[[3, 4, 20]] = np.inf, np.inf, np.nan
     places[30], places[31] = 1.5e308, -1.5e308
-    assert [each.level for each in judge.speed("trans", places, np.arange(50) / 60)] == ["odd"]
-    assert judge.speed("trans", np.full((5, 3), np.inf), np.arange(5.0)) == []
+    assert [each.level for each in plausibility.speed("trans", places, np.arange(50) / 60)] == ["odd"]
+    assert plausibility.speed("trans", np.full((5, 3), np.inf), np.arange(5.0)) == []
     assert not recwarn
