@@ -85,7 +85,7 @@ def load(
     if str(name) in poses.NAMES:
         if frame is not None or up is not None:
             raise ValueError(
-                f"pose {name}: is a named pose, of which there is one: leave out --pose-frame and --pose-up"
+                f"pose {name}: is a named pose, of which there is one: leave out `pose_frame` and `pose_up`"
             )
         return presented_body(str(name), poses.pose_of(body, str(name)), body, given)
     path = Path(name)

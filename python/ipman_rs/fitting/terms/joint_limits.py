@@ -29,6 +29,7 @@ from ipman_rs.body import joints
 from ipman_rs.checks import not_negative
 
 from ..candidate import Candidate
+from ..forward_mode import dual
 from ..problem import Problem
 from ..rotations import quaternion
 from ..variables import pose_joints
@@ -102,8 +103,8 @@ class JointLimits(LeastSquares):
         bodies, count = pose.shape[:2]
         directions = torch.eye(3, dtype=pose.dtype)[:, None, None].expand(3, bodies, count, 3).flatten(0, 1)
         with forward_ad.dual_level():
-            dual = forward_ad.make_dual(pose.repeat(3, 1, 1), directions.contiguous())
-            values, slopes = forward_ad.unpack_dual(self._of(dual))
+            moved = dual(pose.repeat(3, 1, 1), directions.contiguous())
+            values, slopes = forward_ad.unpack_dual(self._of(moved))
         slopes = torch.zeros_like(values) if slopes is None else slopes
         blocks = slopes.reshape(3, bodies, count, 3).permute(1, 2, 0, 3)  # body, joint, by which number, which residual
         jacobian = pose.new_zeros(bodies, candidate.variables["pose"].shape[1], 3, count, 3)
