@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from .errors import one_line_errors
-from .options import several_processes
+from .options import resumes, several_processes
 
 
 @click.group()
@@ -32,6 +32,7 @@ def benchmark() -> None:
     help="Whose people: settings are chosen on the one and reported on the other.",
 )  # fmt: skip
 @click.option("--only", multiple=True, metavar="BLOCK", help="A block by the start of its name; may be repeated.")
+@resumes
 def fit(output: Path, bodies: int, controls: int, iterations: int, split: str, only: tuple[str, ...]) -> None:
     """Fitting with and without intuitive physics, on people whose bodies the fitter does not have.
 
@@ -81,6 +82,7 @@ def fit(output: Path, bodies: int, controls: int, iterations: int, split: str, o
 )  # fmt: skip
 @click.option("--part", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Of the steps, for a trial.")
 @several_processes
+@resumes
 def train(
     output: Path,
     images: Path | None,

@@ -15,7 +15,8 @@ from .data import data
 from .evaluate import evaluate
 from .figure import figure
 from .fit import fit
-from .options import GROUND, PRESETS, UP, of_files
+from .flags import usage, with_flags
+from .options import GROUND, RESUMES, UP, of_files, preset
 from .predict import predict
 from .simulate import simulate
 from .train import train
@@ -28,10 +29,6 @@ if TYPE_CHECKING:
 _LEAST = 400_000_000  # bytes of address space: with less, NumPy and SciPy take minutes to load, or fail in C
 
 _CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
-
-_preset = click.option(
-    "--preset", type=click.Choice(PRESETS), default="paper-r", show_default=True, help="Constants of the formulas."
-)
 
 
 def _version(context: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
@@ -66,6 +63,15 @@ class _Commands(click.Group):
         try:
             if not message:
                 return super().invoke(ctx)
+        except KeyboardInterrupt:
+            kept = "; what is finished is kept" if RESUMES in ctx.meta else ""
+            click.echo(f"ipman: interrupted{kept}", err=True)
+            sys.exit(130)
+        except click.UsageError as error:
+            with error.ctx or ctx:
+                words = usage(with_flags(error.message), error.ctx)
+                error.message = words  # pyright: ignore[reportAttributeAccessIssue] - each kind formats it its own way
+            raise
         except MemoryError:
             message = "needs more memory than there is"
         except OSError as error:
@@ -107,7 +113,7 @@ main.add_command(figure)
 
 @main.command()
 @click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Report folder.")
-@_preset
+@preset
 def demo(output: Path, preset: str) -> None:
     """Analyse the named poses of the built-in body: a table here, the report in the output folder."""
     import ipman_rs as ip
@@ -143,7 +149,7 @@ def demo(output: Path, preset: str) -> None:
     help="Body parts of a mesh: JSON {part: [vertex ids]}, or one label a face (.json, .npy, .npz).",
 )  # fmt: skip
 @of_files
-@_preset
+@preset
 @click.option("--json", "as_json", is_flag=True, help="Print report.json to stdout and nothing else there.")
 def analyze(
     bodies: tuple[Path, ...],

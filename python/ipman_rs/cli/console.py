@@ -13,6 +13,7 @@ from rich.text import Text
 from ..files.errors import one_line
 from ..study.study import Study
 from ..study.table import fit_table, study_table
+from .flags import with_flags
 
 
 def error(text: str) -> None:
@@ -32,13 +33,13 @@ def warn_of(path: object, flags: Iterable[str]) -> None:
 def _line(text: str) -> None:
     import click
 
-    click.echo(one_line(text, 600), err=True)
+    click.echo(one_line(with_flags(text), 600), err=True)
 
 
 def say(text: str) -> None:
     import click
 
-    click.echo(text)
+    click.echo(with_flags(text))
 
 
 class Step:
@@ -81,7 +82,7 @@ def print_rows(head: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
     for number, title in enumerate(head):
         table.add_column(title, justify="left" if number == 0 else "right", overflow="fold")
     for line in lines:
-        table.add_row(*(Text(one_line(cell)) for cell in line))
+        table.add_row(*map(_cell, line))
     _print(table, 200)
 
 
@@ -101,9 +102,12 @@ def print_colored(
         else:
             table.add_column(title, justify="left" if title == colored else "right", no_wrap=True)
     for cells, color in rows:
-        texts = [Text(one_line(cell), style=color if head[k] == colored else "") for k, cell in enumerate(cells)]
-        table.add_row(*texts)
+        table.add_row(*(_cell(cell, color if head[k] == colored else "") for k, cell in enumerate(cells)))
     _print(table, width)
+
+
+def _cell(text: str, style: str = "") -> Text:
+    return Text(one_line(with_flags(text)), style=style)
 
 
 def _table() -> Table:
@@ -126,7 +130,7 @@ def print_table(studies: Sequence[Study]) -> None:
 def print_fits(studies: Sequence[Study]) -> None:
     """A line for each fitted body: see `fit_table`."""
     head, rows = fit_table(studies)
-    print_colored(head, map(_green_or_red, rows), "converged", {"item": None, "look": None})
+    print_colored(head, map(_green_or_red, rows), "converged", {"item": None, "notes": None})
 
 
 def _green_or_red(row: tuple[list[str], bool]) -> tuple[list[str], str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .errors import one_line_errors
-from .options import PRESETS, SETTING, SHARD, degrees, force, units
+from .options import PRESET, SETTING, SHARD, degrees, force, resumes, units
 
 if TYPE_CHECKING:
     from ..evaluation.tables import Evaluation
@@ -37,15 +37,14 @@ TABLES = ("rich", "h36m", "moyo", "biomech", "com", "3dpw", "push-pull", "rich-o
     help="J_regressor_h36m.npy: compare the 14 joints of the literature instead of the body model's. "
     "J_regressor_extra.npy: SPIN's joints that SMPL does not have. May be given twice.",
 )  # fmt: skip
-@click.option(
-    "--preset", type=click.Choice(PRESETS), default="paper-r", show_default=True, help="Constants of the pressure."
-)
+@click.option("--preset", type=PRESET, default="paper-r", show_default=True, help="Constants of the pressure.")
 @click.option("--partial", is_flag=True, help="Leave out frames without prediction (otherwise an error).")
 @units
 @degrees
 @force
 @click.option("--shard", type=SHARD, help="Do this part only, such as 2/7; the last one writes the report.")
 @click.option("--ray", is_flag=True, help="Do the shards on Ray (RAY_ADDRESS: a cluster; else this machine).")
+@resumes
 def evaluate(
     predictions: tuple[Path, ...], output: Path, shard: tuple[int, int] | None, ray: bool, **options: Any
 ) -> None:

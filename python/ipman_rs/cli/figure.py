@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import functools
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .errors import one_line_errors
-from .options import GROUND, PRESETS, SETTING, UP, of_files
+from .errors import one_line_errors, writing
+from .options import GROUND, SETTING, UP, of_files, preset
 
 if TYPE_CHECKING:
     from ..paper_figures import PaperFigure
-    from ..paper_figures.inputs import Body, DataSets
+    from ..paper_figures.inputs import DataSets
 
 PEOPLE = 210  # built ones: seven families in turn
 
-_preset = click.option(
-    "--preset", type=click.Choice(PRESETS), default="paper-r", show_default=True, help="Constants of the formulas."
-)
 _models = click.option(
     "--models", type=click.Path(path_type=Path), metavar="FOLDER",
     help="Body models: SMPL_NEUTRAL.pkl, SMPLX_MALE.npz … anywhere below it.",
@@ -44,11 +39,16 @@ def _drawn(command: Callable[..., PaperFigure]) -> Callable[..., None]:
     def run(output: Path, **options: Any) -> None:
         from . import console
 
-        with one_line_errors(output, memory="take fewer frames"), _few_warnings():
+        with one_line_errors(output, memory="take fewer frames"):
             from .. import paper_figures
+            from ..paper_figures.estimated_people import distinct_warnings
 
-            figure = command(**options)
-            paper_figures.write(figure, output)
+            with distinct_warnings() as said:
+                figure = command(**options)
+            for warning in said:
+                console.warn(warning)
+            with writing(output, "the figure"):
+                paper_figures.write(figure, output)
         if figure.summary_table is not None:
             console.print_rows(*figure.summary_table)
         for line in (*figure.summary, f"figure: {(output / f'{figure.name}.png').resolve()}"):
@@ -56,25 +56,6 @@ def _drawn(command: Callable[..., PaperFigure]) -> Callable[..., None]:
 
     folder = click.Path(file_okay=False, path_type=Path)
     return click.option("-o", "--output", required=True, type=folder, help="Output folder.")(run)
-
-
-@contextmanager
-def _few_warnings() -> Iterator[None]:
-    """A warning about units is one line, one about an image is one for each."""
-    import ipman_rs as ip
-
-    from ..paper_figures.estimated_people import ImageWarning
-    from . import console
-
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("ignore")
-        for kind in (ip.UnitsWarning, ImageWarning):
-            warnings.simplefilter("always", kind)
-        yield
-    units = [str(each.message) for each in caught if issubclass(each.category, ip.UnitsWarning)]
-    images = [str(each.message) for each in caught if issubclass(each.category, ImageWarning)]
-    for warning in (*units[:1], *dict.fromkeys(images)):
-        console.warn(warning)
 
 
 def _data_sets(command: Callable[..., PaperFigure]) -> Callable[..., PaperFigure]:
@@ -129,7 +110,7 @@ def figure() -> None:
 @_models
 @_people
 @click.option("--every", type=click.IntRange(1), default=1, show_default=True, help="Take each n-th frame.")
-@_preset
+@preset
 def stability(data: DataSets, people: int, every: int, preset: str) -> PaperFigure:
     """The distribution of L_stability, CoM to CoP on the ground, over data sets; the paper says that it peaks at 0.
 
@@ -150,11 +131,19 @@ def stability(data: DataSets, people: int, every: int, preset: str) -> PaperFigu
 @figure.command()
 @_drawn
 @click.option(
-    "--width", type=float, default=0.15, show_default=True, metavar="M", help="α2, the width of the pull's tanh."
+    "--width",
+    "alpha2",
+    type=float,
+    default=0.15,
+    show_default=True,
+    metavar="M",
+    help="α2, the width of the pull's tanh.",
+)  # fmt: skip
+@click.option(
+    "--push-width", "beta2", type=float, default=0.15, show_default=True, metavar="M", help="β2, that of the push."
 )
-@click.option("--push-width", type=float, default=0.15, show_default=True, metavar="M", help="β2, that of the push.")
 @click.option("--body", default="anny", show_default=True, metavar="NAME", help="Whose pictures: anny or anny-lite.")
-def pull(width: float, push_width: float, body: str) -> PaperFigure:
+def pull(alpha2: float, beta2: float, body: str) -> PaperFigure:
     """The gradient of L_pull over height, and a floating and a sinking body in the colours of pull and push.
 
     The paper says that the gradient is minimal beyond 15 to 20 cm; the numbers say what of its peak is left there.
@@ -163,17 +152,14 @@ def pull(width: float, push_width: float, body: str) -> PaperFigure:
     ipman figure pull -o out
     ipman figure pull --width 0.5 -o out       the width of the authors' class, before the trained configuration
     """
-    from ..body import embedded
     from ..paper_figures.pull_gradient import pull_gradient
     from . import console
 
-    for name, value in (("--width", width), ("--push-width", push_width)):
-        if not 0 < value < 100:
-            raise click.UsageError(f"{name}: expected metres above 0, got {value:g}")
-    if body not in embedded.NAMES:
-        raise click.UsageError(f"--body: expected one of {', '.join(embedded.NAMES)}, got {body!r}")
-    with console.busy("drawing"):
-        return pull_gradient(alpha2=width, beta2=push_width, body=body)
+    try:
+        with console.busy("drawing"):
+            return pull_gradient(alpha2=alpha2, beta2=beta2, body=body)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
 
 
 @figure.command()
@@ -188,7 +174,7 @@ def pull(width: float, push_width: float, body: str) -> PaperFigure:
 )  # fmt: skip
 @click.option("--parts", type=click.Path(path_type=Path), metavar="FILE", help="Body parts, as of `ipman analyze`.")
 @of_files
-@_preset
+@preset
 def com(body: str, frame: int | None, preset: str, **request: Any) -> PaperFigure:
     """The formulations of the centre of mass on one body, with the CoP and that of binary contact (Fig. S.3).
 
@@ -199,33 +185,17 @@ def com(body: str, frame: int | None, preset: str, **request: Any) -> PaperFigur
     ipman figure com scan.ply --up z -o out
     """
     from ..paper_figures.center_of_mass import center_of_mass
+    from ..paper_figures.inputs import body_of
+    from ..study.from_file import Request
     from . import console
 
-    one = _one_body(body, frame, request)
+    try:
+        one = body_of(body, frame, Request(**request))
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
     console.warn_of(body, one.flags)
     with console.busy("drawing"):
         return center_of_mass(one.vertices, one.template, one.ground, one.name, preset)
-
-
-def _one_body(body: str, frame: int | None, request: dict[str, Any]) -> Body:
-    """A file, or a named pose; `request`: the fields of `study.from_file.Request`."""
-    import ipman_rs as ip
-
-    from ..paper_figures.inputs import named_pose, one_body
-    from ..study.from_file import Request
-
-    poses = ip.body.poses.NAMES
-    if body in poses and not Path(body).exists():
-        for option, value in (("--frame", frame), ("--up", request["up"]), ("--parts", request["parts"])):
-            if value is not None:
-                raise click.UsageError(f"{option}: is for files; {body} is a named pose, one body with y up")
-        return named_pose(body, ip.load_body(request["model"] or "anny"), request["ground"] or 0.0)
-    if not Path(body).suffix and not Path(body).exists():
-        raise click.UsageError(f"BODY: expected a file, or a pose such as {', '.join(poses)}; got {body!r}")
-    try:
-        return one_body(Path(body), frame or 0, Request(**request))
-    except IndexError as error:
-        raise click.UsageError(f"--frame: {error}") from error
 
 
 @figure.command()
@@ -236,7 +206,7 @@ def _one_body(body: str, frame: int | None, request: dict[str, Any]) -> Body:
 @_option
 @_models
 @click.option("--frame", metavar="NAME|N", help="Name of the frame, or its number from 0. Default: the heaviest map's.")
-@_preset
+@preset
 def pressure(name: str, path: Path, frame: str | None, preset: str, **options: Any) -> PaperFigure:
     """Estimated beside measured pressure of one frame on a mat, with CoPs and CoM (Fig. 6).
 
@@ -305,7 +275,7 @@ def poses(data: DataSets, people: int, most: int, perplexity: float, seed: int) 
     help="With --data: where the paths of its images begin.",
 )  # fmt: skip
 @_models
-@_preset
+@preset
 def compare(
     methods: tuple[Path, ...],
     titles: tuple[str, ...],

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..spellings import METRES
 from .errors import writing
-from .options import FLOOR, METRES, SETTING, SIZE, UNIT, UP, force, needs, of_unknown_camera, rate, subject
+from .options import FLOOR, SETTING, SIZE, UNIT, UP, force, needs, of_unknown_camera, rate, resumes, subject
 
 if TYPE_CHECKING:
     from ..fitting.jobs.run import Fits
@@ -61,7 +61,9 @@ if TYPE_CHECKING:
     help="The vertices that touch in that pose: a JSON list, or contact in an .npz or .pkl. Default: the pose file's, "
     "or those that the self-contact engine finds on the presented body.",
 )  # fmt: skip
-@click.option("--image", type=click.Path(path_type=Path), metavar="PHOTO", help="Photo to draw under a keypoint file.")
+@click.option(
+    "--image", "photo", type=click.Path(path_type=Path), metavar="PHOTO", help="Photo to draw under a keypoint file."
+)
 @click.option("--image-size", type=SIZE, metavar="WxH", help="Pixels of the image, where a keypoint file does not say.")
 @click.option(
     "--person", type=int, metavar="N",
@@ -116,10 +118,11 @@ if TYPE_CHECKING:
     "--image-folder", type=click.Path(file_okay=False, path_type=Path), default=Path(),
     help="With --data: where the paths of its images begin.",
 )  # fmt: skip
+@resumes
 def fit(
     inputs: tuple[Path, ...],
     output: Path,
-    image: Path | None,
+    photo: Path | None,
     pictures: int,
     resume: bool,
     sequence: bool,
@@ -163,7 +166,6 @@ def fit(
     if bool(inputs) == (data is not None) or (data is None) != (path is None):
         raise click.UsageError("expected INPUT..., or --data with --path")
     needs("torch", "roma", "yaml")
-    warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
     from . import console
 
     if data is not None:
@@ -171,7 +173,7 @@ def fit(
 
         where = {"name": data, "path": str(path), "split": split, "options": settings}
         sys.exit(fit_data(where, output, models, keypoints, image_folder, every, options))
-    fits = _fit(inputs, output, image, sequence, (every, fps), resume, pictures, options)
+    fits = _fit(inputs, output, photo, sequence, (every, fps), resume, pictures, options)
     for source, flags in fits.flags:
         console.warn_of(source, flags)
     for source, what in fits.failures:
@@ -194,7 +196,7 @@ def fit(
 def _fit(
     inputs: tuple[Path, ...],
     output: Path,
-    image: Path | None,
+    photo: Path | None,
     sequence: bool,
     pace: tuple[int, float],
     resume: bool,
@@ -209,7 +211,7 @@ def _fit(
     from . import console
 
     options["preset"], options["model"] = options["preset"] or "fast", options["model"] or "anny-lite"
-    reading = InputOptions(options.pop("person"), options.pop("image_size"), image, sequence, options["force"])
+    reading = InputOptions(options.pop("person"), options.pop("image_size"), photo, sequence, options["force"])
     try:
         chosen = fit_options(**options)
         with writing(output, "outputs"):

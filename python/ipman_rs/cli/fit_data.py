@@ -11,7 +11,7 @@ from click.core import ParameterSource
 from . import console
 
 NOT_OF_DATA = (
-    "camera", "focal", "pitch", "ground", "image", "person", "image_size", "obj", "pictures", "sequence", "fps",
+    "camera", "focal", "pitch", "ground", "photo", "person", "image_size", "obj", "pictures", "sequence", "fps",
     "resume",
 )  # fmt: skip
 

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
-import math
 import os
 from collections.abc import Callable
 from typing import Any
 
 import click
 
-# Kept equal to `ipman_rs.presets.PRESETS` by a test.
-PRESETS = ("paper-r", "paper-o", "released", "balanced")
+from .. import presets, spellings
+from ..spellings import METRES
 
-METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "ft": 0.3048, "yd": 0.9144}
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+RESUMES = "ipman.resumes"  # in the meta of a context
 
 
-class Parsed(click.ParamType):
-    """A word of the command line, read by a function that raises ValueError with what is wrong; `kind`: of a default
-    that is read already."""
+class Spelled(click.ParamType):
+    """What `ipman_rs.spellings` reads; `kind`: of a default that is read already."""
 
-    def __init__(self, name: str, read: Callable[[str], Any], kind: type) -> None:
-        self.name, self._read, self._kind = name, read, kind
+    def __init__(self, read: Callable[[str], Any], kind: type, name: str = "text") -> None:
+        self._read, self._kind, self.name = read, kind, name
 
     def convert(self, value, param, ctx):
         if value is None or isinstance(value, self._kind):
@@ -33,98 +31,23 @@ class Parsed(click.ParamType):
             self.fail(str(error), param, ctx)
 
 
-def _up(text: str) -> tuple[float, ...]:
-    """A unit axis or a normal as three numbers."""
-    word = text.strip().lower()
-    if word.lstrip("+-") in _AXES and len(word) <= 2:
-        sign = -1.0 if word.startswith("-") else 1.0
-        return tuple(sign * x for x in _AXES[word.lstrip("+-")])
-    normal = tuple(map(_number, word.split(",")))
-    if len(normal) != 3 or not all(map(math.isfinite, normal)) or not any(normal):
-        raise ValueError(f"{text!r} is neither one of x, y, z, -x, -y, -z nor a normal such as 0,0,1")
-    return normal
+UP, SIZE, TIMES = (Spelled(read, tuple) for read in (spellings.axis, spellings.image_size, spellings.times))
+SETTING, SHARD = Spelled(spellings.setting, tuple, "name=value"), Spelled(spellings.shard, tuple, "i/n")
+UNIT, RATE = Spelled(spellings.unit, float), Spelled(spellings.rate, float)
+GROUND, FLOOR = (Spelled(spellings.height_or(word), float) for word in ("auto", "found"))
+PRESET = click.Choice(tuple(presets.PRESETS))
+preset = click.option("--preset", type=PRESET, default="paper-r", show_default=True, help="Constants of the formulas.")
 
 
-def _unit(text: str) -> float:
-    """Metres in one of it."""
-    word = text.strip().lower()
-    metres = METRES.get(word, _number(word))
-    if not 0 < metres < math.inf:
-        raise ValueError(f"{text!r} is none of {', '.join(METRES)}, and no number of metres such as 0.001")
-    return metres
+def resumes(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command that goes on where it was, when it is run again: it says so where it is interrupted."""
 
+    @functools.wraps(command)
+    def run(*words: Any, **options: Any) -> Any:
+        click.get_current_context().meta[RESUMES] = True
+        return command(*words, **options)
 
-def _rate(text: str) -> float:
-    """Frames a second."""
-    hertz = _number(text)
-    if not 0 < hertz < math.inf:
-        raise ValueError(f"{text!r} is no number of frames a second above 0")
-    return hertz
-
-
-def _height_or(word: str) -> Callable[[str], float | None]:
-    """Metres, or None for the word."""
-
-    def read(text: str) -> float | None:
-        height = _number(text)
-        if text.strip().lower() == word:
-            return None
-        if not math.isfinite(height):
-            raise ValueError(f"{text!r} is neither a height in metres nor {word}")
-        return height
-
-    return read
-
-
-def _size(text: str) -> tuple[float, ...]:
-    """Width and height in pixels."""
-    sides = tuple(map(_number, text.lower().split("x")))
-    if len(sides) != 2 or not all(0 < side < math.inf for side in sides):
-        raise ValueError(f"{text!r} is no width and height in pixels such as 1920x1080")
-    return sides
-
-
-def _times(text: str) -> tuple[float, ...]:
-    """Ascending seconds."""
-    times = tuple(map(_number, text.split(",")))
-    if not all(0 <= time < math.inf for time in times) or list(times) != sorted(times):
-        raise ValueError(f"{text!r} is no ascending list of seconds such as 0.41667,2")
-    return times
-
-
-def _setting(text: str) -> tuple[str, str | int | float]:
-    """A name and a word or number."""
-    name, equals, word = text.partition("=")
-    if not name or not equals:
-        raise ValueError(f"{text!r} is no option such as frame=camera")
-    for number in (int, float):
-        try:
-            return name, number(word)
-        except ValueError:
-            continue
-    return name, word
-
-
-def _shard(text: str) -> tuple[int, ...]:
-    """Number and count, from 1."""
-    words = text.split("/")
-    if len(words) != 2 or not all(word.isdecimal() for word in words) or not 1 <= int(words[0]) <= int(words[1]):
-        raise ValueError(f"{text!r} is no shard such as 2/7, the second of seven")
-    return tuple(map(int, words))
-
-
-def _number(text: str) -> float:
-    """NaN for what is none."""
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
-
-
-UP, SIZE, TIMES = Parsed("axis", _up, tuple), Parsed("size", _size, tuple), Parsed("seconds", _times, tuple)
-SETTING, SHARD = Parsed("name=value", _setting, tuple), Parsed("i/n", _shard, tuple)
-UNIT, RATE = Parsed("unit", _unit, float), Parsed("hz", _rate, float)
-GROUND, FLOOR = (Parsed("height", _height_or(word), float) for word in ("auto", "found"))
+    return run
 
 
 def several_processes(command):

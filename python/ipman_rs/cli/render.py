@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from .errors import one_line_errors, writing
-from .options import several_processes
+from .options import resumes, several_processes
 
 
 @click.command()
@@ -27,6 +27,7 @@ from .options import several_processes
 )  # fmt: skip
 @click.option("--shard-size", type=click.IntRange(1), default=500, show_default=True, help="Images a shard.")
 @several_processes
+@resumes
 def render(
     output: Path,
     images: int,

@@ -7,12 +7,14 @@ from pathlib import Path
 import click
 
 from .errors import extra, one_line_errors
+from .options import resumes
 
 
 @click.command()
 @click.argument("config", type=click.Path(dir_okay=False, path_type=Path))
 @click.argument("changes", nargs=-1, metavar="[NAME=VALUE]...")
 @click.option("-o", "--output", required=True, type=click.Path(file_okay=False, path_type=Path), help="Folder.")
+@resumes
 def train(config: Path, changes: tuple[str, ...], output: Path) -> None:
     """Train a regressor of bodies with the intuitive-physics losses.
 

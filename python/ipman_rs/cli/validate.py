@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ..files.errors import one_line
+from ..spellings import METRES
 from .errors import writing
-from .options import METRES, RATE, UNIT, UP, force, needs, subject
+from .options import RATE, UNIT, UP, force, needs, resumes, subject
 
 
 @click.command()
@@ -28,7 +28,7 @@ from .options import METRES, RATE, UNIT, UP, force, needs, subject
     "finds its own.",
 )  # fmt: skip
 @click.option(
-    "--rate", type=click.FloatRange(min=0, min_open=True), default=50.0, show_default=True, metavar="HZ",
+    "--rate", "pace", type=click.FloatRange(min=0, min_open=True), default=50.0, show_default=True, metavar="HZ",
     help="Fit about so many frames a second. Accelerations, and with them the ZMP, need 24 or more.",
 )  # fmt: skip
 @click.option(
@@ -49,8 +49,9 @@ from .options import METRES, RATE, UNIT, UP, force, needs, subject
     help="What points up in .mot and .sto files of forces, where markers have other axes. Default: as --up.",
 )  # fmt: skip
 @click.option(
-    "--recorded-rate", type=RATE, metavar="HZ", help="Frames a second of the markers, where their files are wrong."
-)
+    "--recorded-rate", "rate", type=RATE, metavar="HZ",
+    help="Frames a second of the markers, where their files are wrong.",
+)  # fmt: skip
 @click.option(
     "--markers", type=click.Path(path_type=Path), metavar="FILE",
     help="Places of markers with other names, as `ipman fit --markers` has them.",
@@ -58,14 +59,14 @@ from .options import METRES, RATE, UNIT, UP, force, needs, subject
 @subject
 @force
 @click.option("--fresh", is_flag=True, help="Fit again what was fitted before with the same files and options.")
+@resumes
 def validate(
     folder: Path,
     output: Path,
     model: str,
     person: str,
-    rate: float,
+    pace: float,
     fresh: bool,
-    recorded_rate: float | None,
     **options: Any,
 ) -> None:
     """Compare the engine's centre of mass, centre of pressure and pressure with measurements.
@@ -89,13 +90,11 @@ def validate(
     Exit code: 0 when every recording was compared, 1 when one was not (the others are), 2 for wrong usage.
     """
     needs("torch", "roma", "yaml")
-    warnings.filterwarnings("ignore", message="`torch.jit.script`", category=FutureWarning)  # in an import of roma's
     from ..validation import report, run
     from . import console
 
     try:
-        options["rate"] = recorded_rate
-        plan = run.plan(folder, output, model, person, rate, not fresh, **options)
+        plan = run.plan(folder, output, model, person, pace, not fresh, **options)
     except (ValueError, ImportError) as error:
         raise click.UsageError(str(error)) from error
     with writing(output, "outputs"):

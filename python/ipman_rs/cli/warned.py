@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from ..files.errors import one_line
+from .flags import with_flags
 
 
 @contextmanager
@@ -17,7 +18,7 @@ def warnings_in_one_line() -> Iterator[None]:
 
     def show(message: Warning | str, category: type[Warning], *_place: Any) -> None:
         if not issubclass(category, (DeprecationWarning, ImportWarning)):
-            click.echo(one_line(f"ipman: warning: {message}"), err=True)
+            click.echo(one_line(with_flags(f"ipman: warning: {message}")), err=True)
 
     with warnings.catch_warnings():
         warnings.showwarning = show

@@ -168,7 +168,7 @@ def read(path: str | os.PathLike[str]) -> C3DFile:
         notes=content.notes,
     )
     if screen.strip() and axis not in TO_Y_UP:
-        note = f"its Y_SCREEN is {screen!r}, which is no axis: taken as {file.up} up (--up)"
+        note = f"its Y_SCREEN is {screen!r}, which is no axis: taken as {file.up} up (`up`)"
         file = replace(file, notes=(*file.notes, note))
     if str(file.unit).strip():
         return file

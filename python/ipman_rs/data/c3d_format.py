@@ -255,7 +255,7 @@ def _compare_rates(of_header: float, header: list[int], parameters: Parameters, 
         others.append((f"ANALOG:RATE and {header[9]} samples a frame say", analogs / header[9]))
     for what, other in others:
         if math.isfinite(other) and other > 0 and abs(other / rate - 1) > UNLIKE:
-            notes.append(f"{what} {other:.4g} Hz, POINT:RATE says {rate:.4g} Hz, which is believed (--rate)")
+            notes.append(f"{what} {other:.4g} Hz, POINT:RATE says {rate:.4g} Hz, which is believed (`rate`)")
 
 
 def _said_frames(header: list[int], parameters: Parameters) -> list[int]:

@@ -42,7 +42,7 @@ DS = TypeVar("DS", bound=DataSet)
 
 @dataclass(frozen=True)
 class Finding:
-    """One result of a check, with advice; `option` is the command's option that corrects it, if there is one.
+    """One result of a check, with advice; `option` names the argument that corrects it, if there is one.
 
     odd: unusual, but possible. missing: not there. wrong: cannot be a person, or cannot be right.
     """
@@ -54,7 +54,7 @@ class Finding:
 
     @property
     def remedy(self) -> str:
-        """The advice, and the option of the commands that take such data."""
+        """The advice, and the argument of fits that take such data."""
         option = "" if self.option in self.advice else f"for ipman fit: {self.option}"
         return "; ".join(part for part in (self.advice, option) if part)
 
@@ -167,11 +167,11 @@ def size_of_body(what: str, points: NDArray[Any]) -> list[Finding]:
     units = [each for each in units_of(extent) if each[1] != "m"]
     names = " or ".join(unit for unit, _, _ in units)
     message = f"a body spans {extent:.4g}, expected {low} to {high} metres"
-    option = " or ".join(f"--units {option}" for _, option, _ in units)
+    option = " or ".join(f"`units={option!r}`" for _, option, _ in units)
     if low <= extent < SMALL:
-        return [Finding("odd", f"{what}: a body spans {extent:.2f} metres: a newborn child?", option="--units UNIT")]
+        return [Finding("odd", f"{what}: a body spans {extent:.2f} metres: a newborn child?", option="`units=UNIT`")]
     if not units:
-        return [Finding("wrong", f"{what}: no unit of length fits a person: {message}", option="--units UNIT")]
+        return [Finding("wrong", f"{what}: no unit of length fits a person: {message}", option="`units=UNIT`")]
     metres = units[0][2]
     advice = f"divide by {1 / metres:g}" if metres in (0.1, 0.01, 1e-3) else f"multiply by {metres:g}"
     return [Finding("wrong", f"{what}: looks like {names}: {message}", advice, option)]
@@ -213,9 +213,9 @@ def near_origin(what: str, positions: NDArray[Any]) -> list[Finding]:
     if not len(distance) or np.median(distance) <= WORLD:
         return []
     middle = float(np.median(distance))
-    unit, advice, option = ("millimetres", "divide by 1000", "--units mm")
+    unit, advice, option = ("millimetres", "divide by 1000", "`units='mm'`")
     if middle < NEAR_IN_CENTIMETRES:
-        unit, advice, option = ("centimetres", "divide by 100", "--units cm")
+        unit, advice, option = ("centimetres", "divide by 100", "`units='cm'`")
     message = f"{what}: looks like {unit}: {middle:.4g} from the origin, expected up to {WORLD:g} metres"
     return [Finding("wrong", message, advice, option)]
 
@@ -227,7 +227,7 @@ def radians(what: str, pose: NDArray[Any]) -> list[Finding]:
     if not len(largest) or np.median(largest) <= 2 * np.pi:
         return []
     message = f"{what}: looks like degrees: rotations by up to {largest.max():.4g}, expected radians"
-    return [Finding("wrong", message, "multiply by π/180", "--degrees")]
+    return [Finding("wrong", message, "multiply by π/180", "`degrees`")]
 
 
 def upright(what: str, up: NDArray[Any], ground: Ground) -> list[Finding]:
@@ -252,7 +252,7 @@ def upright(what: str, up: NDArray[Any], ground: Ground) -> list[Finding]:
         return []
     message = f"{what}: looks like {AXES[axis]} up: heads lie that way from the feet, but up is said to be {expected}"
     advice = "these are other axes than the data set's own: were they turned or not turned?"
-    return [Finding("wrong", message, advice, f"--up {AXES[axis].lstrip('+')}")]
+    return [Finding("wrong", message, advice, f"`up={AXES[axis].lstrip('+')!r}`")]
 
 
 def stance(frames: Frames, ground: Ground) -> list[Finding]:

@@ -273,7 +273,7 @@ def check_longest_axis(what: str, markers: Array, visible: NDArray[np.bool_], up
         return []
     reach = f"from {lowest[longest]:.2f} m along {axis} over {extent[longest]:.2f} m"
     message = f"{what}: looks like {axis} up: markers reach {reach}, but up is said to be {up}"
-    return [Finding("wrong", message, "or does this person lie?", f"--up {axis}")]
+    return [Finding("wrong", message, "or does this person lie?", f"`up={axis!r}`")]
 
 
 def _loads(file: Path, of_points: Sequence[str]) -> list[Finding]:

@@ -206,17 +206,17 @@ def _check_plates(plates: ForcePlates, up: str) -> None:
         return
     away = float(np.nanmedian(np.abs(plates.points[heavy]).max(axis=-1)))
     if away > FAR:
-        other = "" if away > 100 * FAR else ", or unit='cm' for centimetres (--force-units cm)"
+        other = "" if away > 100 * FAR else ", or unit='cm' for centimetres (`force_unit='cm'`)"
         raise ValueError(
             f"{plates.source}: looks like millimetres: centres of pressure {away:.4g} from the origin, expected "
-            f"metres, up to {FAR:g}; say unit='mm' if so (--force-units mm){other}"
+            f"metres, up to {FAR:g}; say unit='mm' if so (`force_unit='mm'`){other}"
         )
     push = np.median(np.abs(plates.forces[heavy]), axis=0)  # of either sign: see `reverse_forces_on_plates`
     axis = "xyz"[int(push.argmax())]
     if axis != up:
         raise ValueError(
             f"{plates.source}: looks like {axis} up: loaded plates push along {axis} ({push[0]:.0f}, {push[1]:.0f}, "
-            f"{push[2]:.0f} N), expected along {up}; say up={axis!r} if so (--force-up {axis})"
+            f"{push[2]:.0f} N), expected along {up}; say up={axis!r} if so (`force_up={axis!r}`)"
         )
 
 

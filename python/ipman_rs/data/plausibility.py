@@ -1,12 +1,13 @@
-"""Plausibility checks of all input: can it be a person, and if not, which option corrects it?
+"""Plausibility checks of all input: can it be a person, and if not, which argument corrects it?
 
 Every function takes the rows that it judges (a few hundred are enough) and returns findings. `admit` refuses what is
-wrong, in one line that names the option to use, and returns in words what is unusual.
+wrong, in one line that names the argument to use, and returns in words what is unusual.
 """
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -44,7 +45,7 @@ Array = NDArray[np.floating[Any]]
 
 
 class NoPerson(ValueError):
-    """The input cannot be a person; the message names the option that corrects it."""
+    """The input cannot be a person; the message names the argument that corrects it."""
 
 
 def admit(path: str | os.PathLike[str], findings: Iterable[Finding], force: bool = False) -> tuple[str, ...]:
@@ -53,13 +54,12 @@ def admit(path: str | os.PathLike[str], findings: Iterable[Finding], force: bool
     wrong = [each for each in findings if each.level == "wrong"]
     if wrong and not force:
         message = ". ".join(_advised(each) for each in wrong)
-        raise NoPerson(f"{path}: {message} (--force: it is right as it is)")
+        raise NoPerson(f"{path}: {message} (`force`: it is right as it is)")
     return tuple(_advised(each) for each in findings if each.level in ("odd", "wrong"))
 
 
 def _advised(finding: Finding) -> str:
-    named = finding.option.split()[-1:]
-    ending = "says otherwise" if named and named[0].isupper() else "if so"  # --units UNIT, and --units mm
+    ending = "says otherwise" if re.search("=[A-Z]", finding.option) else "if so"  # `units=UNIT`, and `units='mm'`
     mends = f"{finding.option} {ending}" if finding.option else finding.advice
     return f"{finding.what}; {mends}" if mends else finding.what
 
@@ -115,7 +115,7 @@ def _height(vertices: Array, normal: Array) -> list[Finding]:
         return []
     side = "above" if height > 0 else "below"
     message = f"vertices: {abs(height):.4g} m {side} the origin of their world"
-    return [Finding("odd", message, "is the unit of their places another (--units), or their origin?")]
+    return [Finding("odd", message, "is the unit of their places another (`units`), or their origin?")]
 
 
 def _stance(vertices: Array, template: BodyTemplate, normal: Array) -> list[Finding]:
@@ -134,7 +134,7 @@ def _stance(vertices: Array, template: BodyTemplate, normal: Array) -> list[Find
     ways, up = ways[~on_hands_and_feet], (ways @ ground.normal)[~on_hands_and_feet]
     if not len(up):
         return [Finding("ok", "bodies: on hands and feet")]
-    axis = f"--up {_axis(_unit(ways.mean(axis=0)))}"
+    axis = f"`up={_axis(_unit(ways.mean(axis=0)))!r}`"
     if len(vertices) > 1:
         message = f"bodies: heads are above feet in {(up > UPRIGHT).sum()} of {len(up)}"
         return upright("bodies", ways, ground) or [Finding("ok" if up.mean() > 0.5 else "odd", message, option=axis)]
@@ -160,11 +160,11 @@ def _shape(vertices: Array, template: BodyTemplate, normal: Array) -> list[Findi
     axis = int(extent.argmax())
     if np.ptp(height) < LIES * extent[axis] and abs(normal[axis]) < 0.5:
         message = f"lies: {np.ptp(height):.2f} m high and {extent[axis]:.2f} m long"
-        return [Finding("odd", message, option="--up AXIS")]
+        return [Finding("odd", message, option="`up=AXIS`")]
     middle = float(np.median(height[np.unique(template.faces)]) - height.min()) / max(float(np.ptp(height)), 1e-9)
     below, above = (_ends(first, height, normal, end) for end in ("low", "high"))
     if below == 1 and above == 2 and middle < 0.5:
-        return [Finding("odd", "its head seems to be below its feet", option=f"--up {_axis(-normal)}")]
+        return [Finding("odd", "its head seems to be below its feet", option=f"`up={_axis(-normal)!r}`")]
     return []
 
 
@@ -185,7 +185,7 @@ def _of_parts(template: BodyTemplate, word: str) -> NDArray[np.int64]:
 
 
 def _axis(way: Array) -> str:
-    """The axis, as `--up` takes it, that is nearest to a direction."""
+    """The axis, as `up` takes it, that is nearest to a direction."""
     return AXES[int(np.concatenate([way, -way]).argmax())].lstrip("+")
 
 
@@ -199,7 +199,7 @@ def mass(kilograms: float, span: float | None = None) -> list[Finding]:
     message = f"a person of {kilograms:.4g} kg"
     if not USUAL_MASS[0] <= kilograms <= USUAL_MASS[1]:
         level = "odd" if MASS[0] <= kilograms <= MASS[1] else "wrong"
-        return [Finding(level, message, option="--units UNIT")]
+        return [Finding(level, message, option="`units=UNIT`")]
     build = 10.0 if span is None else kilograms / span**3
     if USUAL_BUILD[0] <= build <= USUAL_BUILD[1]:
         return []
@@ -222,7 +222,7 @@ def rate(hertz: float) -> list[Finding]:
     if np.isfinite(hertz) and USUAL_RATE[0] <= hertz <= USUAL_RATE[1]:
         return []
     level = "odd" if np.isfinite(hertz) and hertz > 0 else "wrong"
-    return [Finding(level, f"{hertz:.4g} frames a second", option="--rate HZ")]
+    return [Finding(level, f"{hertz:.4g} frames a second", option="`rate=HZ`")]
 
 
 def speed(what: str, positions: Array, seconds: Array | None) -> list[Finding]:
@@ -235,7 +235,7 @@ def speed(what: str, positions: Array, seconds: Array | None) -> list[Finding]:
     if usual <= USUAL_SPEED:
         return []
     message = f"{what}: moves at {usual:.4g} m/s in the median, expected up to {USUAL_SPEED:g}"
-    return [Finding("odd", message, "is its unit (--units) or its rate (--rate) another?")]
+    return [Finding("odd", message, "is its unit (`units`) or its rate (`rate`) another?")]
 
 
 def degrees(rotations: Sequence[Array]) -> list[Finding]:
@@ -244,7 +244,7 @@ def degrees(rotations: Sequence[Array]) -> list[Finding]:
     largest = max((float(np.median(each[np.isfinite(each)])) for each in largest if np.isfinite(each).any()), default=0)
     if not 0 < largest <= SMALLEST_TURN:
         return []
-    message = f"the pose: with --degrees no joint turns by more than {np.degrees(largest):.2g} degrees"
+    message = f"the pose: with `degrees` no joint turns by more than {np.degrees(largest):.2g} degrees"
     return [Finding("odd", message, "is it in radians?")]
 
 
@@ -254,7 +254,7 @@ def marker_error(metres: float) -> list[Finding]:
         return []
     level = "odd" if metres <= MARKER_ERROR else "wrong"
     message = f"markers lie {1e3 * metres:.0f} mm from the fitted body in the mean, expected under 30"
-    return [Finding(level, message, "are units, axes and names of the markers right? (--units, --up, --markers)")]
+    return [Finding(level, message, "are units, axes and names of the markers right? (`units`, `up`, `markers`)")]
 
 
 def known_markers(known: Sequence[str], unknown: Sequence[str], fewest: int = 6) -> list[Finding]:
@@ -264,7 +264,7 @@ def known_markers(known: Sequence[str], unknown: Sequence[str], fewest: int = 6)
         return []
     message = f"{len(unknown)} of {count} markers have names without a known place: {first_names(unknown)}"
     wrong = len(known) < fewest or 3 * len(known) < count
-    return [Finding("wrong" if wrong else "odd", message, "--markers FILE says where they are")]
+    return [Finding("wrong" if wrong else "odd", message, "`markers=FILE` says where they are")]
 
 
 def keypoints(points: Array, size: Array) -> list[Finding]:
@@ -292,8 +292,8 @@ def keypoints(points: Array, size: Array) -> list[Finding]:
         x, y = visible[:, 0], visible[:, 1]
         message = f"{outside.sum()} of {len(visible)} points lie outside the image of {image}"
         message += f": x from {x.min():.0f} to {x.max():.0f}, y from {y.min():.0f} to {y.max():.0f}"
-        return [Finding("wrong", message, "is that its size? (--image-size WxH)")]
+        return [Finding("wrong", message, "is that its size? (`image_size=WxH`)")]
     if extent < SMALL_PERSON:
         message = f"the person is {extent:.2g} pixels large in an image of {image}"
-        return [Finding("odd", message, "is that its size? (--image-size WxH)")]
+        return [Finding("odd", message, "is that its size? (`image_size=WxH`)")]
     return [Finding("ok", f"keypoints: a person of {extent:.0f} pixels in an image of {image}")]

@@ -239,9 +239,7 @@ def select_markers(
     chosen = _person([*people], split, visible, source, subject)
     joined = [*dict.fromkeys(w for c, (who, _, _) in split.items() if (w := who.strip()) and visible[:, c].any())]
     if chosen is None and len(joined) > 1:
-        notes.append(
-            f"the markers of {list_names(joined)} are taken as one person's (subject, --subject: those of one)"
-        )
+        notes.append(f"the markers of {list_names(joined)} are taken as one person's (`subject`: those of one)")
     if chosen is not None:
         own = {split[column][2].strip() for column in chosen_columns if split[column][0].strip() == chosen}
         nobodys = {split[column][2].strip() for column in chosen_columns if not split[column][0].strip()}
@@ -305,7 +303,7 @@ def _person(
     first, *more = [person for person in people if person in rivals]
     of = [f"{person or NO_SUBJECT} ({_count(len(markers[person]), 'marker')})" for person in [first, *more]]
     one = first or more[0]
-    raise ValueError(f"{source}: two people in it, {_and(of)}: say which one (subject={one!r}, --subject {one})")
+    raise ValueError(f"{source}: two people in it, {_and(of)}: say which one (`subject={one!r}`)")
 
 
 def _and(people: Sequence[str], most: int = 4) -> str:
@@ -331,7 +329,7 @@ def likely_unit(points: Array) -> str:
 
 def unit_note(unit: str | float) -> str:
     """The note for a file that does not state its unit."""
-    return f"its unit of length is not given: taken as {unit} (--units)"
+    return f"its unit of length is not given: taken as {unit} (`units`)"
 
 
 def _count(number: int, what: str) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 
-METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "um": 1e-6, "in": 0.0254}
+from .. import spellings
+
+METRES = {**spellings.METRES, "meters": 1.0, "metres": 1.0, "um": 1e-6}
 WORDS = {  # in full, so that what a field of four characters left of one is known by its beginning
     "metres": 1.0,
     "meters": 1.0,
@@ -20,7 +22,7 @@ WORDS = {  # in full, so that what a field of four characters left of one is kno
     "feet": 0.3048,
     "foot": 0.3048,
 }
-SHORT = METRES | {"ft": 0.3048, "inch": 0.0254, "mtr": 1.0, "mtrs": 1.0, "mms": 0.001, "cms": 0.01}
+SHORT = METRES | {"inch": 0.0254, "mtr": 1.0, "mtrs": 1.0, "mms": 0.001, "cms": 0.01}
 LEAST = 4  # letters of the beginning of a word
 NEWTONS = {"newtons": 1.0, "newton": 1.0, "newt": 1.0, "nts": 1.0, "nt": 1.0, "kn": 1000.0, "n": 1.0}
 

@@ -133,10 +133,10 @@ class DataFit(Resumable):
         """Makes the folder. ValueError where it holds other fits, or something that all frames need is missing."""
         first = self.data[slice(0, 1)]
         if self.body is None and first.body is None:
-            raise ValueError(f"{self.source.name}: has no body model of its own; name one with --body")
+            raise ValueError(f"{self.source.name}: has no body model of its own; name one with `model`")
         body = self.model(self._gender(first))
         if self.imitates and self.pose is None and first.pose is None:
-            raise ValueError(f"{self.source.name}: has no poses to present; give one with --pose")
+            raise ValueError(f"{self.source.name}: has no poses to present; give one with `pose`")
         if first.cameras is None and not self.config.moves_camera:
             raise ValueError(f"{self.source.name}: has no cameras here, and the preset needs them")
         if self.pose is not None:
@@ -245,7 +245,7 @@ class DataFit(Resumable):
                     if why is not None or detections.image_size is None:
                         raise ValueError(why or "the size of its image is not known")
                 except ImportError as error:
-                    left_out[name] = f"{error}; or give keypoint files (--keypoints)"
+                    left_out[name] = f"{error}; or give keypoint files (`keypoints`)"
                     continue
                 except ValueError as error:
                     left_out[name] = str(error)
@@ -305,7 +305,7 @@ class DataFit(Resumable):
         if self.height is not None and self.mass is not None:
             return self.height, self.mass
         if frame.pose is None or frame.body is None:
-            raise ValueError(f"{self.source.name}: does not know how tall its people are: give --height and --mass")
+            raise ValueError(f"{self.source.name}: does not know how tall its people are: give `height` and `mass`")
         gender = "neutral" if frame.genders is None else str(frame.genders[0])
         body = self.bodies.get(frame.body, gender, rest_shape=frame.rest_shape)
         known = frame.betas is not None and frame.rest_shape is None

@@ -11,6 +11,7 @@ from torch import Tensor
 from torch.autograd import forward_ad
 
 from .candidate import Candidate
+from .forward_mode import dual
 from .problem import Problem
 from .solvers import ValueAndGradient
 from .terms import TERMS, LeastSquares, Term
@@ -122,7 +123,7 @@ class Objective:
         rows = torch.from_numpy(points).repeat_interleave(size, dim=0)
         directions = torch.eye(size, dtype=torch.float64).repeat(bodies, 1)
         with forward_ad.dual_level():
-            candidate = self._repeated.candidate(forward_ad.make_dual(rows, directions))
+            candidate = self._repeated.candidate(dual(rows, directions))
             residuals = []
             for name in names:
                 term = self._repeated.terms[name]

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 import ipman_rs as ip
 import ipman_rs.torch as ipt
+from ipman_rs import spellings
 from ipman_rs.body import BodyModel, poses
 
 from . import presented_files
@@ -71,8 +72,11 @@ class PoseSource:
 
     name: str
     frame: int | None = None
-    up: Axis | None = None
+    up: spellings.Spelled | None = None
     contact: Path | None = None
+
+    def __post_init__(self) -> None:
+        spellings.read_fields(self, up=spellings.axis)
 
     @classmethod
     def of(
@@ -82,7 +86,7 @@ class PoseSource:
         if pose is not None:
             return cls(pose, pose_frame, pose_up, contact)
         if pose_frame is not None or pose_up is not None or contact is not None:
-            raise ValueError("--contact, --pose-frame and --pose-up say more of a --pose: give that, too")
+            raise ValueError("`contact`, `pose_frame` and `pose_up` say more of a `pose`: give that, too")
         return None
 
     @property
@@ -115,7 +119,7 @@ def load(
     if str(name) in poses.NAMES:
         if frame is not None or up is not None:
             raise ValueError(
-                f"pose {name}: is a named pose, of which there is one: leave out --pose-frame and --pose-up"
+                f"pose {name}: is a named pose, of which there is one: leave out `pose_frame` and `pose_up`"
             )
         return presented_body(str(name), poses.pose_of(body, str(name)), body, given)
     path = Path(name)

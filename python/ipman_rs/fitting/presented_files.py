@@ -79,11 +79,11 @@ def read(path: Path, body: BodyModel, frame: int | None = None, up: Axis | None 
         notes.append(f"{stored.path}: is of another body than {body.name}: its floor and contact are not used")
     normal, height = _ground(stored, row) if own else (None, None)
     if normal is not None and up is not None:
-        notes.append(f"{stored.path}: has a ground, whose normal is up: --pose-up is not needed")
+        notes.append(f"{stored.path}: has a ground, whose normal is up: `pose_up` is not needed")
     if normal is None and stored.names >= {"names", "body"} and up is None:
         raise ValueError(
             f"{stored.path}: predictions for a data set, whose axes are its own, without a ground: say what points up "
-            "(--pose-up)"
+            "(`pose_up`)"
         )
     turn = y_up(np.array(up or stored.up) if normal is None else normal)
     pose[0] = (turn * Rotation.from_rotvec(pose[0])).as_rotvec()
@@ -224,7 +224,7 @@ def _check_angles(stored: _Stored, pose: Array) -> None:
 
 def _row(stored: _Stored, length: int, frame: int | None) -> int:
     if frame is None and length > 1:
-        raise ValueError(f"{stored.path}: holds {length} poses; say which is presented (--pose-frame, from 0)")
+        raise ValueError(f"{stored.path}: holds {length} poses; say which is presented (`pose_frame`, from 0)")
     if not 0 <= (frame or 0) < length:
         raise ValueError(f"{stored.path}: frame: expected 0 to {length - 1}, got {frame}")
     return frame or 0

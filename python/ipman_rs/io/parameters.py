@@ -95,7 +95,7 @@ def _read_vertices(stored: StoredArrays, model: str, unit: float, rate: float | 
         body = ip.load_body(model)
         if body.num_vertices != vertices.shape[1]:
             what = f"has {vertices.shape[1]} vertices and no faces, but the body {body.name} has {body.num_vertices}"
-            raise FileError(stored.path, f"{what}; add faces, or name the body with --body")
+            raise FileError(stored.path, f"{what}; add faces, or name the body with `model`")
         faces = body.faces
     if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0 or faces.dtype.kind not in "iu":
         raise FileError(stored.path, f"faces are {faces.dtype} {faces.shape}; expected whole numbers (F, 3)")
@@ -236,7 +236,7 @@ def _betas(stored: StoredArrays, body: Any, frames: int, of_smpl: bool) -> tuple
     name = str(stored.name(*_BETAS))
     embedded = body.name in ip.body.embedded.NAMES
     if embedded and (of_smpl or name == "smpl_betas"):
-        return None, [f"shape: the mean of {body.name} (the file's betas belong to SMPL; --body FILE uses them)"]
+        return None, [f"shape: the mean of {body.name} (the file's betas belong to SMPL; `model=FILE` uses them)"]
     rows = _rows(stored, name, betas, frames)
     used = min(rows.shape[1], body.num_betas)
     if used < rows.shape[1]:
@@ -275,7 +275,7 @@ def _seconds(stored: StoredArrays, frames: int, rate: float | None) -> tuple[np.
         same = np.unique(given)  # some files have it for each frame
         if len(same) != 1:
             message = f"{stored.name(*_FRAME_RATES)} holds {len(same)} different numbers, expected one"
-            return None, [Finding("wrong", message, option="--rate HZ")]
+            return None, [Finding("wrong", message, option="`rate=HZ`")]
         hertz = float(same[0])
     assert hertz is not None
     findings = plausibility.rate(hertz)
@@ -324,7 +324,7 @@ def _gender(stored: StoredArrays, body: Any, model: str) -> list[Finding]:
     if not own or own == gender:
         return []
     what = f"the file's gender is {gender}, and the body model {body.name} is {own}"
-    return [Finding("odd", what, f"--body with the {gender} model")]
+    return [Finding("odd", what, f"`model` with the {gender} model")]
 
 
 def _pass_over_repeated(stored: StoredArrays, pieces: Sequence[pose_arrays.Piece]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -33,6 +34,20 @@ class ImageWarning(UserWarning):
     """An image that is not there or cannot be read; its person is drawn on white."""
 
 
+@contextmanager
+def distinct_warnings() -> Iterator[list[str]]:
+    """Collects what is odd as text instead of warning: one line about units, one about each image."""
+    said: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("ignore")
+        for kind in (ip.UnitsWarning, ImageWarning):
+            warnings.simplefilter("always", kind)
+        yield said
+    units = [str(each.message) for each in caught if issubclass(each.category, ip.UnitsWarning)]
+    images = [str(each.message) for each in caught if issubclass(each.category, ImageWarning)]
+    said += [*units[:1], *dict.fromkeys(images)]
+
+
 @dataclass(frozen=True)
 class FittedFolder:
     """The outputs of `ipman fit` or `ipman predict`, one folder per person. `photos`: the folder of their photos,
@@ -47,7 +62,7 @@ class FittedFolder:
         names = [record.parent.name for record in sorted(self.path.glob(f"*/{RECORD}"))] if self.path.is_dir() else []
         if not names and (self.path / PREDICTIONS).is_file():
             raise ValueError(
-                f"{self.path}: holds the predictions for a data set; name that with --data and --path, for its images "
+                f"{self.path}: holds the predictions for a data set; name that with `data` and `path`, for its images "
                 "and cameras"
             )
         if not names:
@@ -88,7 +103,7 @@ class FittedFolder:
             return ip.load_body(self.body)
         if named in embedded.NAMES:
             return ip.load_body(named)
-        raise ValueError(f"{path}: is of the body {named}, whose file is not known here; give --body FILE")
+        raise ValueError(f"{path}: is of the body {named}, whose file is not known here; give `model=FILE`")
 
     def _photo(self, name: str) -> NDArray[np.uint8] | None:
         """The pixels of a person's photo, None where there is none."""
@@ -160,12 +175,12 @@ class Predicted:
         guess = self._read[0][np.array([number])]
         bodies = self.models.posed(guess)
         if bodies.vertices is None or bodies.model is None:
-            raise ValueError(f"{self.path}: has no bodies whose model is here: give --models FOLDER")
+            raise ValueError(f"{self.path}: has no bodies whose model is here: give `models=FOLDER`")
         ground = guess.ground if guess.ground is not None else true.ground
         if ground is None:
             raise ValueError(f"{name}: the data set has no ground for it")
         if true.cameras is None:
-            raise ValueError(f"{name}: the data set has no camera for it; of moyo one is chosen by --option camera=1")
+            raise ValueError(f"{name}: the data set has no camera for it; of moyo one is chosen by the option camera=1")
         ground = ip.Ground(np.reshape(ground.normal, (-1, 3))[0], np.ravel(ground.height)[0])
         photo = self._photo(row, true)
         matrix = true.cameras.intrinsics[0]

@@ -79,6 +79,27 @@ def named_pose(pose: str, body: BodyModel, height: float = 0.0) -> Body:
     return Body(ip.body.posed(body, pose), body.template, ip.Ground.y_up(height), pose)
 
 
+def body_of(source: str | Path, frame: int | None = None, request: Request = AS_IT_IS) -> Body:
+    """A frame of a file, or a named pose of the body model that is requested, y up.
+
+    Raises:
+        FileError: as `one_body`.
+        ValueError: neither a file nor a pose, options of files beside a pose, or a frame that there is not.
+    """
+    poses = ip.body.poses.NAMES
+    if str(source) in poses and not Path(source).exists():
+        for name, value in (("frame", frame), ("up", request.up), ("parts", request.parts)):
+            if value is not None:
+                raise ValueError(f"{name}: is for files; {source} is a named pose, one body with y up")
+        return named_pose(str(source), ip.load_body(request.model or "anny"), request.ground or 0.0)
+    if not Path(source).suffix and not Path(source).exists():
+        raise ValueError(f"expected a file, or a pose such as {', '.join(poses)}; got {str(source)!r}")
+    try:
+        return one_body(Path(source), frame or 0, request)
+    except IndexError as error:
+        raise ValueError(f"frame: {error}") from error
+
+
 def one_body(path: Path, frame: int = 0, request: Request = AS_IT_IS) -> Body:
     """One frame of a file, as `ipman analyze` reads it.
 

@@ -54,4 +54,4 @@ def posed_bodies(
 def _lacking(frames: Frames) -> str:
     if frames.body is None or (frames.pose is None and frames.vertices is None):
         return "has no bodies, neither parameters nor vertices of a body model"
-    return f"its bodies need the model file {file_of(frames)}.npz or .pkl: give --models FOLDER"
+    return f"its bodies need the model file {file_of(frames)}.npz or .pkl: give `models=FOLDER`"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 import ipman_rs as ip
 from ipman_rs import quantities, view
 from ipman_rs.arrays import Bodies
+from ipman_rs.body import embedded
 from ipman_rs.checks import positive
 from ipman_rs.view import cells, colors
 from ipman_rs.view.picture import camera_around
@@ -44,7 +45,16 @@ def pull_gradient(
     alpha1: float = 1.0, alpha2: float = 0.15, beta1: float = 10.0, beta2: float = 0.15, body: str = "anny"
 ) -> PaperFigure:
     """L_pull and its gradient over height; a floating and a sinking `body` of `ipman_rs.load_body`, each point in the
-    colour of its own term's gradient. alpha1, beta1: weights; alpha2, beta2: widths, m."""
+    colour of its own term's gradient. alpha1, beta1: weights; alpha2, beta2: widths, m.
+
+    Raises:
+        ValueError: weights or widths that are not above 0, widths of 100 m or more, or another body.
+    """
+    for name, width in (("alpha2", alpha2), ("beta2", beta2)):
+        if not 0 < width < 100:
+            raise ValueError(f"{name}: expected metres above 0 and below 100, got {width:g}")
+    if body not in embedded.NAMES:
+        raise ValueError(f"body: expected one of {', '.join(embedded.NAMES)}, got {body!r}")
     weights = positive("alpha1", alpha1), positive("alpha2", alpha2), positive("beta1", beta1), positive("beta2", beta2)
     reach = REACH * max(1, int(np.ceil(TAIL * max(alpha2, beta2) / REACH)))
     heights = np.arange(STEPS + 1) * (1000 * reach / STEPS) / 1000

@@ -8,7 +8,7 @@ that moves its soles by up to a voxel, so it is put on the lowest point of these
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -122,17 +122,8 @@ def simulate(
         ImportError: the engine is not installed.
     """
     bodies = Bodies(vertices, template)
-    choice("engine", engine, Engine)
-    options = _Options(
-        shape=choice("shape", shape, Shape),
-        resolution=whole("resolution", resolution, 2, 1024),
-        densities=densities(density, template),
-        contact=positive("contact", contact),
-        snap=bool(snap),
-        step=positive("step", step, "seconds"),
-        friction=not_negative("friction", friction),
-        looks=_looks(times, step),
-    )
+    options = checked_options(engine, shape, times, step, friction, snap, contact, resolution)
+    options = replace(options, densities=densities(density, template))
     placed, normal, height = bodies.over(ground)
     status, places = [], []
     for first in range(0, len(placed), PIECE):
@@ -149,12 +140,35 @@ def simulate(
 class _Options:
     shape: str
     resolution: int
-    densities: list[float]
     contact: float
     snap: bool
     step: float
     friction: float
     looks: list[int]
+    densities: list[float] = field(default_factory=list)
+
+
+def checked_options(
+    engine: Engine,
+    shape: Shape,
+    times: Sequence[float],
+    step: float,
+    friction: float,
+    snap: bool,
+    contact: float = CONTACT,
+    resolution: int = 64,
+) -> _Options:
+    """The options of `simulate` that need no body. ValueError or TypeError, naming the argument."""
+    choice("engine", engine, Engine)
+    return _Options(
+        shape=choice("shape", shape, Shape),
+        resolution=whole("resolution", resolution, 2, 1024),
+        contact=positive("contact", contact),
+        snap=bool(snap),
+        step=positive("step", step, "seconds"),
+        friction=not_negative("friction", friction),
+        looks=_looks(times, step),
+    )
 
 
 def _looks(times: Sequence[float], step: float) -> list[int]:

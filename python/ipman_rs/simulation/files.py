@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from .. import spellings
 from ..files import path_list
 from ..files.errors import FileError
 from ..files.names import Paths
@@ -23,6 +24,7 @@ from .comparison_report import (
     pairs,
     write_comparison,
 )
+from .fall import checked_options
 from .inputs import GroundedBodies, read_bodies
 from .report import Fall, run_falls, write_falls
 
@@ -98,13 +100,15 @@ def simulate_files(
         options: engine, shape, times (s), step (s), friction, snap, tip_only; see `simulation.simulate` and `OPTIONS`.
 
     Raises:
+        ValueError, TypeError: options of a wrong kind or range.
         ImportError: the engine is not installed.
     """
+    options = _checked(options)
     result = Falls()
     for path in path_list(paths):
         with result._reported():
             bodies = result._read(path, request, progress)
-            result.falls.append(run_falls(bodies, films, **{**OPTIONS, **options}, progress=progress))
+            result.falls.append(run_falls(bodies, films, **options, progress=progress))
     return result
 
 
@@ -118,6 +122,7 @@ def compare_files(
 ) -> Falls:
     """Let the same people's bodies by two methods go, and compare them; nothing is simulated where they cannot be
     paired, which is among the failures. Arguments as of `simulate_files`; raises as it does."""
+    options = _checked(options)
     result = Falls()
     both: list[GroundedBodies] = []
     for each in (Path(path), Path(other)):
@@ -126,7 +131,17 @@ def compare_files(
     with result._reported():
         if not result.failures:
             pairs(*both)
-            options = {**OPTIONS, **options}
             result.falls += [run_falls(bodies, films, **options, progress=progress) for bodies in both]
             result.compared = compare_falls(*result.falls)
     return result
+
+
+def _checked(options: dict[str, Any]) -> dict[str, Any]:
+    """All options, so that what is wrong with one is no failure of each file."""
+    unknown = [name for name in options if name not in OPTIONS]
+    if unknown:
+        raise TypeError(f"options: expected some of {', '.join(OPTIONS)}, got {', '.join(unknown)}")
+    options = {**OPTIONS, **options}
+    options["times"] = spellings.argument("times", spellings.times, options["times"])
+    checked_options(**{name: options[name] for name in ("engine", "shape", "times", "step", "friction", "snap")})
+    return options

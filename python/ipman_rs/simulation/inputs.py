@@ -1,6 +1,6 @@
 """The bodies that `ipman simulate` drops: a file as `ipman analyze` reads it, predictions, or a folder of fits.
 
-Predictions and fits bring a ground of their own; `--up` or `--ground` take its place.
+Predictions and fits bring a ground of their own; `up` or `ground` take its place.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def _with_model(path: Path, request: Request, arrays: dict[str, np.ndarray]) -> 
     if request.model is not None or named is None:
         return request
     if named not in embedded.NAMES:
-        raise FileError(path, f"its bodies are of {named!r}, which is not included; name the model's file with --body")
+        raise FileError(path, f"its bodies are of {named!r}, which is not included; name the model's file with `model`")
     return replace(request, model=named)
 
 

@@ -63,7 +63,7 @@ class Fall:
             return ""
         return (
             f"no verdict at {self.run.times[-1]:.3g} s, displacement only: who stands is judged after {VERDICT:g} s "
-            f"or later (--times {self.run.times[-1]:.5g},{VERDICT:g})"
+            f"or later (`times={self.run.times[-1]:.5g},{VERDICT:g}`)"
         )
 
     def stands(self) -> np.ndarray | None:

@@ -13,6 +13,7 @@ import numpy as np
 
 import ipman_rs as ip
 
+from .. import presets, spellings
 from ..analysis import PIECE
 from ..body.sequence import pieces
 from ..data import check, plausibility, separate_pieces
@@ -35,17 +36,33 @@ LISTED = 12  # names of arrays
 
 @dataclass(frozen=True)
 class Request:
-    """The options that every body of one command shares."""
+    """The options that every body of one command shares, as numbers or as the words of the command line
+    (`ipman_rs.spellings`), which become numbers.
 
-    model: str | None = None  # the one that a file names, or anny
-    up: tuple[float, float, float] | None = None
-    ground: float | None = None
-    parts: Path | None = None
+    model: name or file; None: the one that a file names, or anny. up: an axis such as "-z", or a normal; None: y, or z
+    of AMASS files. ground: m along it; None or "auto": the lowest vertex. parts: a file of body parts. units: "mm", or
+    metres in one of the files' lengths. rate: Hz, instead of the files'. force: what cannot be a person is let in, too.
+
+    Raises:
+        ValueError: what is none of these; the message names the argument.
+    """
+
+    model: str | None = None
+    up: spellings.Spelled | None = None
+    ground: spellings.Spelled | None = None
+    parts: str | Path | None = None
     preset: str = "paper-r"
-    units: float = 1.0  # metres in one of the files' lengths
+    units: spellings.Spelled = 1.0
     degrees: bool = False
-    rate: float | None = None  # Hz, instead of the files'
-    force: bool = False  # what cannot be a person is let in, too
+    rate: spellings.Spelled | None = None
+    force: bool = False
+
+    def __post_init__(self) -> None:
+        presets.get(self.preset)
+        spellings.read_fields(
+            self, up=spellings.axis, ground=spellings.height_or("auto"), units=spellings.unit, rate=spellings.rate,
+            parts=Path,
+        )  # fmt: skip
 
 
 _DEFAULT = Request()
@@ -123,9 +140,9 @@ def on_ground(
     recording = replace(recording, flags=(*admitted, *plausibility.admit(path, findings, request.force)))
     notes = [*recording.notes, *notes, *_not_used(recording, read_elsewhere)]
     if own is not None:
-        return recording, template, own, [*notes, "ground: the file's own (--up and --ground say otherwise)"]
+        return recording, template, own, [*notes, "ground: the file's own (`up` and `ground` say otherwise)"]
     if request.up is None:
-        notes.append(f"up: {recording.up_name} (assumed{recording.up_why}; --up says otherwise)")
+        notes.append(f"up: {recording.up_name} (assumed{recording.up_why}; `up` says otherwise)")
     height = request.ground
     if height is None:
         height = _lowest(recording, ip.Ground(normal).normal, progress)
@@ -133,7 +150,7 @@ def on_ground(
             raise FileError(path, "no vertex is a finite number; export it again")
         whole = "of all frames " if len(recording.vertices) > 1 else ""
         where = f"{round(height, 4) + 0.0:+.4f} m"
-        notes.append(f"ground: through the lowest vertex {whole}({where}; --ground HEIGHT says otherwise)")
+        notes.append(f"ground: through the lowest vertex {whole}({where}; `ground=HEIGHT` says otherwise)")
     return recording, template, ip.Ground(normal, height), notes
 
 
@@ -209,11 +226,11 @@ def _template(recording: BodySequence, request: Request) -> tuple[Any, list[str]
     if first is None:
         raise FileError(recording.path, "no frame has finite vertices only; export it again")
     if request.parts is not None:
-        face_parts, names = read_parts(request.parts, faces, recording.vertex_map, recording.face_map)
+        face_parts, names = read_parts(Path(request.parts), faces, recording.vertex_map, recording.face_map)
         template = ip.BodyTemplate(first, faces, face_parts, names)
         return template, [f"parts: {len(names)} from {request.parts}"]
     body = match_body(faces, len(first), request.model or "anny")
     if body is not None:
         return body.template, [f"parts: the {len(body.part_names)} of the body {body.name}, whose topology it has"]
     template = ip.BodyTemplate(first, faces)
-    return template, ["parts: none known, so it is analysed as one part (--parts FILE names them)"]
+    return template, ["parts: none known, so it is analysed as one part (`parts=FILE` names them)"]

@@ -10,7 +10,7 @@ from ..files.errors import one_line
 from .study import Study, flagged_name
 
 STUDIES = ("kg", "CoM–CoP mm", "margin mm", "BoS cm²", "contacts", "balance", "stable")
-FITS = ("item", "converged", "iterations", "error px", "error %", "CoM–CoP mm", "margin mm", "look")
+FITS = ("item", "converged", "iterations", "error px", "error %", "CoM–CoP mm", "margin mm", "notes")
 
 Row = tuple[list[str], bool]
 
@@ -53,7 +53,7 @@ def _row(study: Study, frames: int | slice) -> Row:
 
 
 def fit_table(studies: Sequence[Study]) -> tuple[list[str], list[Row]]:
-    """A row for each fitted body: how its fit went, how it stands, and what to look at; good if it converged."""
+    """A row for each fitted body: how its fit went, how it stands, and the notes on it; good if it converged."""
     return list(FITS), [_fit_row(study) for study in studies if study.fitted is not None]
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import spellings
 from ..body.sites import FEWEST_POINTS
 from ..data import check, markers, opensim, plausibility
 from ..data.force_plates import ForcePlates
@@ -93,7 +94,7 @@ def plan(
     pace: float = 50.0,
     resume: bool = True,
     force_unit: str = "m",
-    force_up: tuple[float, float, float] | None = None,
+    force_up: spellings.Axis | str | None = None,
     **of_markers: Any,
 ) -> Plan:
     """`pace`: frames a second to fit; `of_markers`: what `FitOptions` has of marker files.
@@ -105,8 +106,9 @@ def plan(
     trials, notes, unreadable = find_trials(folder, KINDS, output)
     names = [trial.name for trial in trials]
     if person not in ("auto", "none", *names):
-        raise ValueError(f"--person: expected auto, none or one of {', '.join(names)}, got {person!r}")
+        raise ValueError(f"person: expected auto, none or one of {', '.join(names)}, got {person!r}")
     settings = FitOptions(config.load("markers"), model, **of_markers)
+    force_up = spellings.argument("force_up", spellings.axis, force_up)
     body = ip.load_body(model)  # before anything is fitted
     if settings.markers is not None:
         own.read(settings.markers, body)
@@ -226,13 +228,12 @@ def _tracks(plan: Plan, trial: Trial) -> Tracks:
 
 
 def _marker_findings(plan: Plan, tracks: Tracks) -> list[check.Finding]:
-    """Findings about the markers before they are fitted; here --rate is another one."""
+    """Findings about the markers before they are fitted; here `rate` is another one."""
     import ipman_rs as ip
 
     settings = plan.settings
     names = None if settings.markers is None else own.read(settings.markers, ip.load_body(settings.model))
-    findings = check_tracks(tracks, names, settings.up is not None)
-    return [replace(each, option=each.option.replace("--rate", "--recorded-rate")) for each in findings]
+    return check_tracks(tracks, names, settings.up is not None)
 
 
 def _flags(path: Path, findings: Iterable[check.Finding], force: bool) -> tuple[str, ...]:

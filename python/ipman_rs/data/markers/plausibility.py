@@ -100,7 +100,7 @@ def seen_names(tracks: Tracks) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def check_points(tracks: Tracks, meanings: Mapping[str, Meaning], up_is_said: bool = False) -> list[Finding]:
     """Size, place and stance of the markers whose places are known; `up_is_said`: by the user, who knows.
 
-    Axes are the file's own: option `--up` names them.
+    Axes are the file's own: the argument `up` names them.
     """
     known = tracks.select([name for name in tracks.names if name in meanings])
     rows = sampled_rows(known)
@@ -125,9 +125,9 @@ def check_size(points: Array, unit: float) -> list[Finding]:
         return findings
     fits = [each for each in check.units_of(check.extent_of(points) / unit) if each[2] != unit]
     if not fits:
-        return [Finding("wrong", findings[0].what, option="--units UNIT")]
+        return [Finding("wrong", findings[0].what, option="`units=UNIT`")]
     message = findings[0].what.rpartition(": ")[2]
-    option = " or ".join(f"--units {option}" for _, option, _ in fits)
+    option = " or ".join(f"`units={option!r}`" for _, option, _ in fits)
     return [Finding("wrong", f"markers: {message}, if the file's unit is right", option=option)]
 
 
@@ -143,7 +143,7 @@ def check_floor(tracks: Tracks, meanings: Mapping[str, Meaning], ground: float =
     if middle >= -BELOW:
         return []
     message = f"the lowest markers are {-middle:.2f} m below the floor in the median"
-    return [Finding("odd", message, option="--ground HEIGHT")]
+    return [Finding("odd", message, option="`ground=HEIGHT`")]
 
 
 def check_rate(tracks: Tracks) -> list[Finding]:
@@ -182,7 +182,7 @@ def check_sides(points: Array, tracks: Tracks, meanings: Mapping[str, Meaning]) 
     if not swapped:
         return []
     sure = len(swapped) == len(signs) and (len(swapped) > 1 or "pelvis" in swapped)
-    advice = "are names exchanged (--markers FILE gives others), or axes mirrored?"
+    advice = "are names exchanged (`markers=FILE` gives others), or axes mirrored?"
     return [Finding("wrong" if sure else "odd", f"left and right look swapped of {' and '.join(swapped)}", advice)]
 
 
@@ -231,4 +231,4 @@ def check_skin(distances: Mapping[str, float]) -> list[Finding]:
     worst = sorted(off, key=lambda name: -abs(off[name] - 0.01))
     listed = ", ".join(f"{name} {1e3 * off[name]:+.0f} mm" for name in worst[:6]) + (", …" if len(off) > 6 else "")
     what = f"{len(off)} of {len(distances)} markers are not on the skin of the fitted body ({listed}; 7 to 15 is usual)"
-    return [Finding("odd", what, "are they where their names say? (--markers)")]
+    return [Finding("odd", what, "are they where their names say? (`markers`)")]

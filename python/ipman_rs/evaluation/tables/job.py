@@ -177,7 +177,7 @@ class Job(Resumable):
         if self.predictions != TRUTH and len(self.estimates) < len(self.data) and not self.partial:
             raise ValueError(
                 f"{self.predictions}: has {len(self.estimates):,} frames, but the data set {self.source.name} has "
-                f"{len(self.data):,}; --partial leaves out those without prediction"
+                f"{len(self.data):,}; `partial` leaves out those without prediction"
             )
         _ = self.flags
         _ = self.definition
@@ -271,7 +271,7 @@ class Job(Resumable):
     def _other_frame(self) -> str:
         """The option of the data set's reader that gives its people in other axes, where it has one."""
         options = () if self.source.name == OWN else inspect.signature(data.module(self.source.name).open).parameters
-        return ", or --option frame=camera or frame=world" if "frame" in options else ""
+        return ", or the option frame=camera or frame=world" if "frame" in options else ""
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
@@ -336,7 +336,7 @@ class Job(Resumable):
             raise ValueError(
                 f"{self.predictions}: no prediction for {len(lacking)} of the frames {true.names[0]} to "
                 f"{true.names[-1]} of {self.source.name}, such as {str(lacking[0])!r}; the file's names are like "
-                f"{str(self.estimates.columns['names'][:1][0])!r}; --partial leaves them out"
+                f"{str(self.estimates.columns['names'][:1][0])!r}; `partial` leaves them out"
             )
         paired = np.flatnonzero(matches >= 0)
         return true[paired], self.estimates[matches[paired]], rows.start + paired

@@ -100,7 +100,7 @@ def define(
     """
     if truth.missing_model is not None and estimate.vertices is not None and estimate.file_joints is None:
         raise ValueError(
-            f"{data}: its truth is bodies of {truth.kind}, to which predicted bodies are compared: --models FOLDER "
+            f"{data}: its truth is bodies of {truth.kind}, to which predicted bodies are compared: `models=FOLDER` "
             f"with {truth.missing_model}.npz or .pkl"
         )
     makers = _makers(truth, estimate, regressors, data)
@@ -170,8 +170,8 @@ def _maker_as_measured(estimate: FrameBodies, regressors: Regressors, data: str)
     if (regressors.human36m if maker == "h36m" else regressors.extra) is None:
         raise ValueError(
             f"{data}: has measured joints and no bodies here, and the predictions are bodies, whose own hips, pelvis, "
-            f"neck and head are other points: --regressor {file} makes the measured ones of the predicted vertices "
-            "(or give joints and joint_names beside the pose)"
+            f"neck and head are other points: `regressors` with {file} makes the measured ones of the predicted "
+            "vertices (or give joints and joint_names beside the pose)"
         )
     return maker
 

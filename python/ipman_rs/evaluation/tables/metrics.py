@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-_JOINTS = "joints of the same names, pelvis or hips among them, in the data and in the predictions (or a --regressor)"
+_JOINTS = "joints of the same names, pelvis or hips among them, in the data and in the predictions (or `regressors`)"
 _MESH = "bodies of one mesh in the data and in the predictions"
-_ALIGNED = f"{_MESH}, and a pelvis of one definition (the same body model, or --regressor)"
+_ALIGNED = f"{_MESH}, and a pelvis of one definition (the same body model, or `regressors`)"
 _FLOOR = "a body model for the predictions, and a ground"
 _COM = "a measured centre of mass, and a body model for the predictions"
 _COP = "a measured centre of pressure, and what BoSE needs"

@@ -128,7 +128,7 @@ class Models:
         path = self._found(kind, gender)
         if path is not None:
             return path
-        where = "no folder is named by --models" if self.folder is None else f"there is none under {self.folder}"
+        where = "no folder is named by `models`" if self.folder is None else f"there is none under {self.folder}"
         raise ValueError(f"the body {kind} ({gender}) needs its model file, {_stem(kind, gender)}.npz or .pkl: {where}")
 
     def _found(self, kind: str, gender: str) -> Path | None:

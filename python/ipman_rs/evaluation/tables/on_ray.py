@@ -26,7 +26,7 @@ def run(jobs: list[Job], progress: Callable[[int], None], address: str | None = 
     try:
         import ray  # pyright: ignore[reportMissingImports]
     except ImportError as error:
-        raise ValueError("--ray needs ray: pip install 'ipman_rs[ray]'") from error
+        raise ValueError("`ray` needs ray: pip install 'ipman_rs[ray]'") from error
     begun_here = not ray.is_initialized()
     if begun_here:
         quiet = {"include_dashboard": False, "log_to_driver": False, "configure_logging": False}

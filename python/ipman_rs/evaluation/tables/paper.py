@@ -42,11 +42,11 @@ def _rows(figures: tuple[str, ...], rows: Mapping[str, tuple[float | None, ...]]
 _POSE = ("mpjpe", "pa_mpjpe", "pve", "bose")
 _STILL = {"frames": "selected"}
 _STILLS = (
-    "One still frame a pose: of the authors' choice with --option frames=constants.py, the list in their toolkit, else "
-    "by this project's rule (`ipman data layout moyo`). Without the authors' list the figures are not exactly the "
+    "One still frame a pose: of the authors' choice with the option frames=constants.py, the list in their toolkit, "
+    "else by this project's rule (`ipman data layout moyo`). Without the authors' list the figures are not exactly the "
     "paper's."
 )
-_TEMPLATE = "The authors pose a template of her own: --option v_template=mesh.ply, from their toolkit."
+_TEMPLATE = "The authors pose a template of her own: the option v_template=mesh.ply, from their toolkit."
 
 TABLES = {
     "rich": Table(
@@ -60,8 +60,8 @@ TABLES = {
             "HMR* + L_stability": (81.0, 47.5, 90.8, 69.6),
             "IPMAN-R": (79.0, 47.6, 89.9, 71.2),
         }),
-        "All cameras of the test sequences, in the form of IPMAN's code, bodies SMPL; --split test takes camera 0 "
-        "only. For SMPL-X methods --data rich, its own files.",
+        "All cameras of the test sequences, in the form of IPMAN's code, bodies SMPL; `split='test'` takes camera 0 "
+        "only. For SMPL-X methods `data='rich'`, its own files.",
         regressor=True,
     ),
     "h36m": Table(
@@ -85,7 +85,7 @@ TABLES = {
             "HMR* + L_stability, all data sets": (61.2, 41.9),
             "IPMAN-R, all data sets": (60.6, 41.8),
         }),
-        "Subjects 9 and 11, frontal camera; --split valid-p1 takes all cameras. The paper compares with the joints "
+        "Subjects 9 and 11, frontal camera; `split='valid-p1'` takes all cameras. The paper compares with the joints "
         "that the marker system measured, which is done here unless the file has bodies, too.",
         regressor=True,
     ),
@@ -107,7 +107,7 @@ TABLES = {
         {"paper": {"pressure_iou_chosen": 0.32, "cop_error_chosen": 57.3, "com_error": 53.3}},
         "The paper chooses the pressure's parameters for each frame by what was measured there (chosen); beside it, "
         "the figures at fixed parameters. The paper's bodies are the data set's own: PRED truth. Its scripts measure "
-        "pressure in the session 20220923_20220926_with_hands and the centre of mass in 20221004_with_com: --path "
+        "pressure in the session 20220923_20220926_with_hands and the centre of mass in 20221004_with_com: `path` "
         f"takes one session, or both. {_STILLS} {_TEMPLATE}",
         options=_STILL,
     ),

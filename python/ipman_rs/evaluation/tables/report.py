@@ -49,7 +49,7 @@ class Report:
         lines = [f"{', '.join(names)}: {words}." for words, names in methods.items()]
         makers = {each.estimate for each in self.definitions.values() if each is not None}
         if self.table is not None and self.table.regressor and makers & {"own", "extra"}:
-            lines.append(f"The paper compares {len(COUNTED)} other joints here: give --regressor J_regressor_h36m.npy.")
+            lines.append(f"The paper compares {len(COUNTED)} other joints: give `regressors=J_regressor_h36m.npy`.")
         return lines
 
     @property

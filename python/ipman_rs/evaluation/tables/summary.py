@@ -90,7 +90,7 @@ def difference(job: Job, baseline: Job, progress: Callable[[int], None] = lambda
 
 
 def _common(own: Columns, other: Columns) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """The frames that two pieces share, and their rows in each: with --partial each may lack some."""
+    """The frames that two pieces share, and their rows in each: with `partial` each may lack some."""
     if np.array_equal(own["names"], other["names"]):
         rows = np.arange(len(own["names"]))
         return own["names"], rows, rows

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ... import spellings
 from ...data.keypoints import suffixes
-from ...files import regular_file
+from ...files import regular_file, safe_names
 from ...files.errors import FileError
 from ...files.image import focal_length
 
@@ -43,13 +44,16 @@ class Item:
 @dataclass(frozen=True)
 class InputOptions:
     """How inputs are read. photo: the image of a keypoint file, drawn under its body. image_size: its width and height
-    in pixels, where the file does not say."""
+    in pixels or "1920x1080", where the file does not say; ValueError for what is none."""
 
     person: int | None = None
-    image_size: tuple[float, float] | None = None
+    image_size: spellings.Spelled | None = None
     photo: Path | None = None
     sequence: bool = False  # the images of a file are frames of one person
     force: bool = False  # keypoints that cannot be a person's are fitted, too
+
+    def __post_init__(self) -> None:
+        spellings.read_fields(self, image_size=spellings.image_size)
 
 
 def expand(inputs: Iterable[Path]) -> list[Path]:
@@ -64,6 +68,39 @@ def expand(inputs: Iterable[Path]) -> list[Path]:
             raise FileError(path, f"no input in this folder; expected files ending in {' '.join(ENDINGS)}")
         files += inside
     return files
+
+
+def expand_all(inputs: Iterable[Path]) -> tuple[list[Path], list[tuple[str, str]]]:
+    """`expand` of each, and (folder, reason) of folders without any."""
+    files: list[Path] = []
+    failures: list[tuple[str, str]] = []
+    for path in inputs:
+        try:
+            files += expand([path])
+        except FileError as error:
+            failures.append((str(path), error.what))
+    return files, failures
+
+
+def is_markers(path: Path) -> bool:
+    """Whether a file, by its name, holds markers."""
+    return path.suffix.lower() in MARKERS
+
+
+def read_all(paths: Iterable[Path], options: InputOptions) -> tuple[list[Item], list[tuple[str, str]]]:
+    """The people in photos and keypoint files, under names of their own; and (input, reason) of the others."""
+    items: list[Item] = []
+    failures: list[tuple[str, str]] = []
+    for path in paths:
+        try:
+            items += read_items(path, options)
+        except FileError as error:
+            failures.append((str(path), error.what))
+        except (OSError, ValueError) as error:
+            failures.append((str(path), str(error)))
+    for item, name in zip(items, safe_names([item.name for item in items]), strict=True):
+        item.name = name
+    return items, failures
 
 
 def read_items(path: Path, options: InputOptions) -> list[Item]:
@@ -85,11 +122,11 @@ def read_items(path: Path, options: InputOptions) -> list[Item]:
     except ValueError as error:
         raise FileError(path, _advice(str(error))) from error
     if detections.image_size is None:
-        raise FileError(path, "does not say how large its image is; give --image-size WIDTHxHEIGHT, or --image PHOTO")
+        raise FileError(path, "does not say how large its image is; give `image_size=WIDTHxHEIGHT` or `photo=PHOTO`")
     people, notes = _admitted(path, [_row(detections, row) for row in range(len(detections))], options.force)
     many = len(detections) > 1
     if many and not options.sequence:
-        notes.append(f"{path}: {len(detections)} images, each fitted on its own; --sequence fits one person over time")
+        notes.append(f"{path}: {len(detections)} images, each fitted on its own; `sequence` fits one person over time")
     items = [
         Item(
             f"{path.stem}_{number}" if many else path.stem,
@@ -159,13 +196,13 @@ def _size(options: InputOptions) -> tuple[tuple[float, float] | None, list[str]]
     size, given = (float(width), float(height)), options.image_size
     if given is None or given == size:
         return size, []
-    said = f"{options.photo}: the photo has {width} × {height} pixels, --image-size says {given[0]:g} × {given[1]:g}"
+    said = f"{options.photo}: the photo has {width} × {height} pixels, `image_size` says {given[0]:g} × {given[1]:g}"
     return given, [said]
 
 
 def _advice(what: str) -> str:
     if "image_size" in what and "need it" in what:
-        return f"{what}; give --image-size WIDTHxHEIGHT, or --image PHOTO"
+        return f"{what}; give `image_size=WIDTHxHEIGHT` or `photo=PHOTO`"
     return what
 
 

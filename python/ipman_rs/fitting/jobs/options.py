@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import ipman_rs as ip
 import ipman_rs.torch as ipt
 
+from ... import spellings
 from ...body import BodyModel
 from ...data.keypoints.detections import Detections
 from .. import camera_file, config, detection_problem, presented
@@ -19,6 +20,13 @@ from ..camera_file import KnownCamera
 from ..config import FitConfig, uses_terms
 from ..presented import PoseSource, PresentedBody
 from ..problem import Problem
+
+# Options of one kind of input, here or in `InputOptions`, which mean nothing to the other.
+OF_MARKERS = ("up", "units", "rate", "markers", "subject")
+OF_IMAGES = (
+    "camera", "focal", "pitch", "height", "mass", "pose", "pose_frame", "pose_up", "contact", "person", "image_size",
+    "photo",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -29,6 +37,9 @@ class FitOptions:
     the floor, m; None: under the feet. height, mass: of the person, m and kg. pose: what is presented. Of marker files:
     subject, up (in the file's own axes), units (metres in one of its lengths), rate (Hz), markers (a file of marker
     names and their places), force (fit markers that cannot be a person's, too). obj: write meshes as .obj, too.
+
+    Axes, units, rate and ground ("found") may be the words of the command line (`ipman_rs.spellings`), which become
+    numbers. Raises ValueError, naming the argument, for others.
     """
 
     config: FitConfig
@@ -36,17 +47,23 @@ class FitOptions:
     focal: float | None = None
     pitch: float | None = None
     camera: KnownCamera | None = None
-    ground: float | None = None
+    ground: spellings.Spelled | None = None
     height: float | None = None
     mass: float | None = None
     pose: PoseSource | None = None
     subject: str | None = None
-    up: tuple[float, float, float] | None = None
-    units: float | None = None
-    rate: float | None = None
+    up: spellings.Spelled | None = None
+    units: spellings.Spelled | None = None
+    rate: spellings.Spelled | None = None
     markers: Path | None = None
     force: bool = False
     obj: bool = False
+
+    def __post_init__(self) -> None:
+        spellings.read_fields(
+            self, ground=spellings.height_or("found"), up=spellings.axis, units=spellings.unit,
+            rate=spellings.rate,
+        )  # fmt: skip
 
     def identity(self) -> str:
         """Text that differs wherever the fits could: the version, the options, and the bytes of their files."""
@@ -62,9 +79,9 @@ class FitOptions:
     def check(self) -> None:
         """ValueError where the preset needs what is not given, or options contradict each other."""
         if self.pose is None and uses_terms(self.config, "presented_pose", "presented_contact"):
-            raise ValueError(f"preset {self.config.name} imitates a pose: give its name or file with --pose")
+            raise ValueError(f"preset {self.config.name} imitates a pose: give its name or file with `pose`")
         if self.height is None and self.mass is None and uses_terms(self.config, "measured_shape"):
-            raise ValueError(f"preset {self.config.name} knows the person's size: give --height or --mass, or both")
+            raise ValueError(f"preset {self.config.name} knows the person's size: give `height` or `mass`, or both")
 
     def problem(
         self,
@@ -83,6 +100,12 @@ class FitOptions:
         if presented_body is None:
             return problem
         return presented.present(problem, [presented_body], self.config.moves_camera)
+
+
+def changed(options: Any) -> dict[str, Any]:
+    """The fields of a dataclass that are not as they are by default."""
+    every = {field.name: (getattr(options, field.name), field.default) for field in fields(options)}
+    return {name: value for name, (value, default) in every.items() if value != default}
 
 
 def fit_options(

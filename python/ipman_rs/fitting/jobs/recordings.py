@@ -49,9 +49,9 @@ class Pace:
     def check(self) -> None:
         """ValueError for what is no pace."""
         if self.every < 1:
-            raise ValueError(f"--every: expected 1 or more, got {self.every}")
+            raise ValueError(f"every: expected 1 or more, got {self.every}")
         if not 0 < self.fps < float("inf"):
-            raise ValueError(f"--fps: expected more than 0, got {self.fps}")
+            raise ValueError(f"fps: expected more than 0, got {self.fps}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +182,7 @@ def _own_notes(own: Mapping[str, object] | None, names: Sequence[str], options: 
     if not none:
         return []
     more = f" and {len(none) - 8} more" if len(none) > 8 else ""
-    return [f"no marker is called {', '.join(none[:8])}{more}, as {options.markers} has it (--markers)"]
+    return [f"no marker is called {', '.join(none[:8])}{more}, as {options.markers} has it (`markers`)"]
 
 
 def _marker_notes(fitted: MarkerFit, options: FitOptions) -> list[str]:

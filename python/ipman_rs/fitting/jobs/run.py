@@ -16,7 +16,7 @@ from typing import Any
 import ipman_rs.torch as ipt
 
 from ...data.keypoints.detections import join
-from ...files import path_list, safe_names
+from ...files import path_list
 from ...files.errors import FileError
 from ...files.names import Paths
 from ...progress import Progress, silent
@@ -27,8 +27,8 @@ from ..fit import fit
 from ..presented import PresentedBody
 from ..result import FitResult, fit_results
 from . import recordings
-from .items import MARKERS, InputOptions, Item, detect, expand, identity, read_items
-from .options import FitOptions, fit_options
+from .items import IMAGES, KEYPOINTS, MARKERS, InputOptions, Item, detect, expand_all, identity, is_markers, read_all
+from .options import OF_IMAGES, OF_MARKERS, FitOptions, changed, fit_options
 from .outputs import FittedItem, read_item, study_of, write_item
 from .recordings import Pace
 
@@ -73,11 +73,11 @@ def fit_files(
     if pictures < 0:
         raise ValueError(f"pictures: expected 0 or more, got {pictures}")
     pace.check()
-    items, markers, failures = read_inputs(path_list(inputs), reading)
-    of_markers = ("up", "units", "rate", "markers", "subject")
-    needless = next((name for name in of_markers if getattr(options, name) is not None), None)
-    if needless and not markers and not failures:
-        raise ValueError(f"--{needless} belongs to marker files (.trc, .c3d), of which there are none")
+    paths, failures = expand_all(path_list(inputs))
+    _check_kinds(paths, options, reading)
+    markers = [path for path in paths if is_markers(path)]
+    items, unread = read_all([path for path in paths if not is_markers(path)], reading)
+    failures += unread
     studies: list[Study] = []
     flags: list[tuple[str, tuple[str, ...]]] = []
     for recording in recordings.recordings(markers, items if reading.sequence else []):
@@ -95,34 +95,22 @@ def fit_files(
     return Fits(studies, failures, flags)
 
 
-def read_inputs(inputs: Sequence[Path], reading: InputOptions) -> tuple[list[Item], list[Path], list[tuple[str, str]]]:
-    """The people in the inputs, under names of their own; the marker files; and (input, reason) of the others.
-
-    Raises ValueError where a photo is given for more than one input.
-    """
-    items: list[Item] = []
-    paths: list[Path] = []
-    failures: list[tuple[str, str]] = []
-    for path in inputs:
-        try:
-            paths += expand([path])
-        except FileError as error:
-            failures.append((str(path), error.what))
+def _check_kinds(paths: Sequence[Path], options: FitOptions, reading: InputOptions) -> None:
+    """ValueError for an option that no input can use: markers' without a marker file, keypoints' without another."""
     if reading.photo is not None and len(paths) > 1:
-        raise ValueError(f"--image belongs to one keypoint file, got {len(paths)} inputs")
-    markers = [path for path in paths if path.suffix.lower() in MARKERS]
-    for path in paths:
-        if path in markers:
-            continue
-        try:
-            items += read_items(path, reading)
-        except FileError as error:
-            failures.append((str(path), error.what))
-        except (OSError, ValueError) as error:
-            failures.append((str(path), str(error)))
-    for item, name in zip(items, safe_names([item.name for item in items]), strict=True):
-        item.name = name
-    return items, markers, failures
+        raise ValueError(f"photo: belongs to one keypoint file, got {len(paths)} inputs")
+    markers = [path for path in paths if is_markers(path)]
+    images = [path for path in paths if path.suffix.lower() in (*KEYPOINTS, *IMAGES)]
+    if images and options.config.name == "markers":
+        raise ValueError(f"preset: markers fits marker files ({' '.join(MARKERS)}) alone, got {images[0]}")
+    given = {**changed(options), **changed(reading)}
+    for names, there, others, kind in (
+        (OF_MARKERS, markers, images, f"marker files ({' '.join(MARKERS)})"),
+        (OF_IMAGES, images, markers, "photos and keypoint files"),
+    ):
+        needless = [name for name in names if name in given]
+        if needless and others and not there:
+            raise ValueError(f"{needless[0]}: belongs to {kind}, of which there are none")
 
 
 def fit_items(

@@ -146,7 +146,7 @@ class Images:
             warnings.warn(
                 f"{frame.names[0]}: bodies are put where the data set's hips are, {which}, which may lie centimetres "
                 f"from those of the body {self.body.name!r}; SPIN's J_regressor_extra.npy (model.regressor, "
-                "--regressor) makes the same ones where a data set labels hips",
+                "`regressors`) makes the same ones where a data set labels hips",
                 stacklevel=4,
             )
 
