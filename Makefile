@@ -43,7 +43,7 @@ help:
 	@echo 'make demo     demo-poses: the named poses of the embedded body, analysed, report in $(OUT); and'
 	@echo '              demo-fit: a body fitted to the keypoints of a photo, report in $(FIT_OUT) (IMAGE=photo.png draws it'
 	@echo '              under them; installs torch, some minutes the first time, and takes ten seconds afterwards)'
-	@echo 'make check    the fast Python tests, some four minutes on two cores (installs torch and the test tools)'
+	@echo 'make check    the fast Python tests, a good minute on two cores (installs torch and the test tools)'
 	@echo 'make test     every test, Rust and Python (installs torch and the test tools)'
 	@echo 'make lint     formats and lints checked, nothing changed'
 	@echo 'make format   sources formatted'
