@@ -186,7 +186,7 @@ def test_markers_in_millimetres_that_are_said_to_be_metres(folder):
     with pytest.raises(ValueError, match="looks like millimetres: a body spans 1[67][0-9]*, .*; divide by 1000"):
         data.open("opensim", folder / "sway.trc")
     (finding,) = (each for each in opensim.check(folder) if each.level == "wrong")
-    assert finding.option == "--units mm"
+    assert finding.option == "`units='mm'`"
     assert re.match(r"sway.trc: markers: a body spans 1[67]\d\d, expected", finding.what)
 
 
@@ -213,13 +213,13 @@ def test_z_up_instead_of_y_up(folder):
     miniature.trc(folder / "sway.trc", turn=Z_UP)
     (finding,) = (each for each in opensim.check(folder) if each.level == "wrong")
     assert finding.what.startswith("sway.trc: markers: looks like +z up")
-    assert finding.option == "--up z"
+    assert finding.option == "`up='z'`"
 
 
 @pytest.mark.parametrize(
     ("change", "level", "what", "option"),
     [
-        ({"turn": [[1, 0, 0], [0, -1, 0], [0, 0, -1]]}, "wrong", "markers: looks like -y up", "--up -y"),
+        ({"turn": [[1, 0, 0], [0, -1, 0], [0, 0, -1]]}, "wrong", "markers: looks like -y up", "`up='-y'`"),
         ({"names": ("Top.Head", "a", "b", "c", "d")}, "wrong", "4 of 5 markers have names without a known place", ""),
         ({"rate": 0.06}, "odd", "0.06 frames a second", "--rate HZ"),
         ({"names": ("L.Knee.Lat", *miniature.HEAD[1:])}, "odd", "no marker above the pelvis was ever seen", ""),

@@ -43,22 +43,22 @@ def test_no_turned_body_passes(body, name, turn):
     found = plausibility.bodies(vertices[None], body.template, np.array([0.0, 1.0, 0.0]))
     odd = [each for each in found if each.level != "ok"]
     assert odd
-    assert odd[0].option.removeprefix("--up ").lstrip("-") == turn[-1]
+    assert odd[0].option.removeprefix("`up='").removesuffix("'`").lstrip("-") == turn[-1]
 
 
 def test_who_lies_is_odd_unless_up_is_said():
     (found,) = levels("lying")
-    assert (found.level, found.option) == ("odd", "--up -z")
+    assert (found.level, found.option) == ("odd", "`up='-z'`")
     assert levels("lying", up_is_said=True) == []
 
 
 @pytest.mark.parametrize("name", ON_FEET)
 def test_who_stands_on_the_head_is_refused(name):
     (found,) = levels(name, up=(0, -1, 0))
-    assert (found.level, found.option) == ("wrong", "--up y")
-    with pytest.raises(NoPerson, match=r"^a\.obj: stands on its head.*--up y if so.*--force"):
+    assert (found.level, found.option) == ("wrong", "`up='y'`")
+    with pytest.raises(NoPerson, match=r"^a\.obj: stands on its head.*`up='y'` if so.*`force`"):
         admit("a.obj", [found])
-    assert admit("a.obj", [found], force=True) == ("stands on its head, with its feet in the air; --up y if so",)
+    assert admit("a.obj", [found], force=True) == ("stands on its head, with its feet in the air; `up='y'` if so",)
     assert levels(name, up=(0, -1, 0), up_is_said=True) == []
 
 
@@ -68,29 +68,29 @@ def test_another_axis_is_odd_in_one_body_and_wrong_in_many(name):
     vertices = np.repeat(ip.body.posed(body, name)[None], 3, axis=0)
     for up in ((0, 0, 1), (1, 0, 0)):
         (found,) = levels(name, up=up)
-        assert (found.level, found.option) == ("odd", "--up y")
+        assert (found.level, found.option) == ("odd", "`up='y'`")
         *fine, found = plausibility.bodies(vertices, body.template, np.array(up, float))
         assert {each.level for each in fine} == {"ok"}
-        assert (found.level, found.option) == ("wrong", "--up y")
+        assert (found.level, found.option) == ("wrong", "`up='y'`")
 
 
 @pytest.mark.parametrize("name", ["standing", "t_pose", "a_pose", "walking", "lunge"])
 def test_a_mesh_without_known_parts_is_judged_by_its_shape(name):
     (found,) = levels(name, up=(0, -1, 0), parts=False)
-    assert (found.level, found.option) == ("odd", "--up y")
+    assert (found.level, found.option) == ("odd", "`up='y'`")
 
 
 @pytest.mark.parametrize(
     ("scale", "option"),
     [
-        (1e3, "--units mm"),
-        (1e2, "--units cm"),
-        (10, "--units dm"),
-        (1 / 0.0254, "--units in"),
-        (60, "--units in or --units cm"),
-        (1 / 0.3048, "--units ft"),
-        (1e-3, "--units km"),
-        (1e-5, "--units UNIT"),
+        (1e3, "`units='mm'`"),
+        (1e2, "`units='cm'`"),
+        (10, "`units='dm'`"),
+        (1 / 0.0254, "`units='in'`"),
+        (60, "`units='in'` or `units='cm'`"),
+        (1 / 0.3048, "`units='ft'`"),
+        (1e-3, "`units='km'`"),
+        (1e-5, "`units=UNIT`"),
     ],
 )
 def test_other_units_are_refused(scale, option):
@@ -180,7 +180,7 @@ def test_keypoints_that_the_detector_is_not_sure_of_may_lie_outside():
 
 
 def test_keypoints_of_another_image_size_name_the_option():
-    with pytest.raises(NoPerson, match=r"a.json: 9 of 9 .*is that its size\? \(--image-size WxH\) \(--force"):
+    with pytest.raises(NoPerson, match=r"a.json: 9 of 9 .*is that its size\? \(`image_size`\) \(`force`"):
         admit("a.json", of_keypoints(PERSON * 3))
     (said,) = admit("a.json", of_keypoints(PERSON * 3), force=True)
     assert "lie outside the image" in said
@@ -205,7 +205,7 @@ def test_one_body_of_another_size_among_many_is_odd():
     assert "1 of 9 bodies" in found[0].what
 
 
-@pytest.mark.parametrize(("unit", "option"), [(1, None), (100, "--units cm"), (1000, "--units mm")])
+@pytest.mark.parametrize(("unit", "option"), [(1, None), (100, "`units='cm'`"), (1000, "`units='mm'`")])
 def test_places_of_people_about_the_origin(unit, option):
     draw = np.random.default_rng(0)
     places = unit * np.column_stack([draw.normal(0, 1, 200), np.full(200, 0.9), 2 + draw.normal(0, 1, 200)])

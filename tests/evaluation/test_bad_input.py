@@ -93,7 +93,7 @@ def test_vertices_in_millimetres(tmp_path, guessed):
     arrays = {"names": guessed["names"][:8], "vertices": 1000 * np.random.default_rng(0).random((8, 99, 3))}
     refused(
         files.save(tmp_path / "mm.npz", arrays),
-        "vertices: looks like millimetres: a body spans .* (divide by 1000|--units mm if so)",
+        "vertices: looks like millimetres: a body spans .* (divide by 1000|`units='mm'` if so)",
         tmp_path,
     )
 
@@ -124,7 +124,7 @@ def test_other_units_and_degrees_are_mended_or_forced(tmp_path, true, guessed):
     plain = job_of(tmp_path / "plain", true, guessed)
     other = dict(guessed, transl=1000 * guessed["transl"] + [9e5, 0, 0], pose=np.degrees(guessed["pose"]))
     moved = dict(guessed, transl=guessed["transl"] + [900, 0, 0])
-    with pytest.raises(ValueError, match=r"pose: looks like degrees.* --degrees if so|transl: .* --units mm if so"):
+    with pytest.raises(ValueError, match=r"pose: looks like degrees.* --degrees if so|transl: .* `units='mm'` if so"):
         job_of(tmp_path / "wrong", true, other).begin()
     mended = job_of(tmp_path / "mended", true, other, unit=0.001, degrees=True, force=True)
     np.testing.assert_allclose(mended.estimates[:5].pose, plain.estimates[:5].pose, atol=1e-6)  # float32

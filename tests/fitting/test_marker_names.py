@@ -249,17 +249,17 @@ def test_the_axis_is_named_as_the_file_has_it():
     """A file that says z up, whose people stand along −y of the file."""
     raw = STANDING * [1, -1, -1]
     (finding,) = wrong(tracks(raw @ TO_Y_UP["z"].T, up="z"))
-    assert finding.option == "--up -y"
+    assert finding.option == "`up='-y'`"
     np.testing.assert_allclose(turn_up(tracks(raw), (0, -1, 0)).points[0], STANDING, atol=1e-15)
 
 
 def test_units_are_refused_and_mended():
     (finding,) = wrong(tracks(STANDING * 1000, unit=1.0))
-    assert finding.option == "--units mm"
+    assert finding.option == "`units='mm'`"
     (finding,) = wrong(tracks(STANDING / 1000, unit=0.001))
-    assert finding.option == "--units m"
+    assert finding.option == "`units='m'`"
     (finding,) = wrong(tracks(STANDING * 0.0254, unit=0.01 * 0.0254))
-    assert finding.option == "--units cm"
+    assert finding.option == "`units='cm'`"
 
 
 def test_markers_below_the_floor():
