@@ -86,6 +86,8 @@ def _body(study: Study, folder: Path | None) -> dict[str, Any]:
         "source": study.source,
         "notes": list(study.notes),
         "flags": list(study.flags),
+        "level": "" if study.fitted is None else study.fitted.record.get("confidence", {}).get("level", ""),
+        "stages": [] if study.fitted is None else [*map(_stage_in_words, study.fitted.record.get("stages", []))],
         "pictures": _pictures(study, folder),
         "method": study.com_method,
         "preset": study.preset.name,
@@ -112,6 +114,12 @@ def _body(study: Study, folder: Path | None) -> dict[str, Any]:
         "numbers": {key: jsonable(_short(study.numbers[key])) for key in _SHOWN},
         "partVolumes": jsonable(_short(study.numbers["part_volumes"][keys])),
     }
+
+
+def _stage_in_words(stage: dict[str, Any]) -> str:
+    """How a stage of a fit ended, and what each term costs there."""
+    terms = ", ".join(f"{name} {cost:.4g}" for name, cost in stage["terms"].items() if cost is not None)
+    return f"{stage['name']}, {stage['iterations']} iterations ({stage['reason']}): {terms}"
 
 
 def _pictures(study: Study, folder: Path | None) -> list[dict[str, str]]:

@@ -113,10 +113,20 @@ def notes(record: dict[str, Any]) -> list[str]:
         lines.append(_presented(record["presented"]))
     errors = record["reprojection"]
     lines += [f"reprojection: median {errors['median_px']:.1f} px, {errors['median_percent']:.1f} % of the height"]
-    for stage in record["stages"]:
-        terms = ", ".join(f"{name} {cost:.4g}" for name, cost in stage["terms"].items() if cost is not None)
-        lines.append(f"stage {stage['name']}, {stage['iterations']} iterations: {terms}")
+    if "support" in record["confidence"]:
+        lines.append(_explanation(record["confidence"]))
     return [*lines, *record["notes"]]
+
+
+def _explanation(confidence: dict[str, Any]) -> str:
+    """The hypothesis that was chosen, in words."""
+    held = {"feet": "held up by its feet", "seat": "held up by a seat", "nothing": "not at rest"}[confidence["support"]]
+    if "camera_pitch" not in confidence:
+        return held
+    low, high = confidence["camera_pitch_range"]
+    also = f" ({low:.0f} to {high:.0f}° explain the image alike)" if low < high else ""
+    down = confidence["camera_pitch"]
+    return f"{held}; the camera looks {'up' if down < 0 else 'down'} by {abs(down):.0f}°{also}"
 
 
 def _presented(shown: dict[str, Any]) -> str:

@@ -165,6 +165,7 @@
     const badges = v("mass") === null ? [["not measurable", "bad"]] : !v("has_contact") ? [["no contact", "bad"]]
       : v("bose") ? [["CoM over its support", "good"]] : [["CoM outside its support", "bad"]];
     body.status[frame].filter((s) => s !== "NO_CONTACT").forEach((s) => badges.push([s.toLowerCase().replaceAll("_", " "), "bad"]));
+    if (body.level) badges.push([`fit: ${body.level}`, { green: "good", amber: "doubt", red: "bad" }[body.level]]);
     $("badges").replaceChildren(...badges.map(([text, kind]) => element("span", text, `badge ${kind}`)));
     const com = body.com[frame];
     rows($("numbers"), [
@@ -261,6 +262,8 @@
     $("flags").replaceChildren(...body.flags.map((flag) => element("li", flag)));
     $("flags").hidden = !body.flags.length;
     $("notes").replaceChildren(...body.notes.map((note) => element("li", note)));
+    $("stages").replaceChildren(...body.stages.map((stage) => element("li", stage)));
+    $("solver").hidden = !body.stages.length;
     $("pictures-card").hidden = !body.pictures.length;
     $("pictures").replaceChildren(...body.pictures.map(({ title, src }) => {
       const figure = document.createElement("figure"), image = document.createElement("img");
