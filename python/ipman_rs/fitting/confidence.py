@@ -32,6 +32,7 @@ CONTACT = 0.03  # m above the floor: what stands on it, in the margin
 RAISED = 0.02  # m: a sole that is down and higher than this is told
 TILTED = 15.0  # degrees
 
+IN_WORDS = {"feet": "on its feet", "seat": "on a seat", "floor": "on the floor", "nothing": "moving"}
 _LIMBS = {"arm": ("elbow", "wrist"), "leg": ("knee", "ankle")}
 
 
@@ -93,7 +94,7 @@ def _assess_support(
         return
     soles = measure_soles(candidate)
     measures["soles"] = soles
-    for side, sole in soles.items():
+    for side, sole in soles.items() if chosen.support != "floor" else ():
         if sole["down"] and sole["height_mm"] > 1000 * RAISED:
             amber.append(f"the {side} foot is {sole['height_mm']:.0f} mm off the floor")
         elif sole["down"] and abs(sole["tilt_degrees"]) > TILTED:
@@ -135,7 +136,9 @@ def _assess_runner_up(
         "joints_apart_mm": 1000 * apart,
     }
     if dearer < CLOSE and apart > APART:
-        other = {"feet": "on its feet", "seat": "on a seat", "nothing": "moving"}[second.support]
+        other = {"feet": "on its feet", "seat": "on a seat", "floor": "on the floor", "nothing": "moving"}[
+            second.support
+        ]
         seen = "" if math.isnan(second.pitch) else f", seen from {second.pitch:.0f}°"
         amber.append(f"another body explains the image nearly as well ({other}{seen})")
 

@@ -113,46 +113,69 @@ def _fit_hypotheses(
     trace: bool,
 ) -> Fit:
     """`fit` with several rows for each body from one stage on, of which the cheapest go on after each."""
-    names = [stage.name for stage in config.stages]
-    first, people = names.index(weighing.before), problem.num_bodies
+    first = [stage.name for stage in config.stages].index(weighing.before)
     single = fit(problem, variables, replace(config, stages=config.stages[:first], hypotheses=None), progress, trace)
     problem, variables, rows = hypotheses.expand(single.problem, single.variables, weighing)
-    reports = [_turned(report.take(rows.person), single.problem, rows) for report in single.stages]
-    weighed: list[list[tuple[int, Hypothesis]]] = []
-    out: list[list[Hypothesis]] = [[] for _ in range(people)]
-    for stage in config.stages[first:]:
-        if stage.find_ground and not known_ground:
-            problem = with_ground_under_body(problem, variables)
-        problem = hypotheses.with_feet_down(problem, variables)
-        told = None if progress is None else _of_people(progress, len(rows.person) / people)
-        variables, report = run_stage(problem, variables, stage, config.terms, told, trace)
-        weighed = hypotheses.weigh(report.terms, rows, weighing)
-        keep = stage.keep if stage is not config.stages[-1] else max(map(len, weighed))
-        kept = hypotheses.best(weighed, keep)
-        for own, each in zip(out, weighed, strict=True):
-            own[:0] = [worse for _, worse in each[keep:]]
-        problem, variables, rows = problem.rows(torch.from_numpy(kept)), report.take(kept).variables, rows.take(kept)
-        reports = [one.take(kept) for one in (*reports, report)]
-    weighed = hypotheses.weigh(reports[-1].terms, rows, weighing)
+    rivals = _Rivals(problem, variables, rows, [_turned(report, single.problem, rows) for report in single.stages])
+    beaten: list[list[Hypothesis]] = [[] for _ in range(single.problem.num_bodies)]
+    for number, stage in enumerate(config.stages[first:]):
+        rivals = rivals.on_ground(find=stage.find_ground and not known_ground)
+        if number == 0:
+            rivals = rivals.take(hypotheses.distinct(rivals.problem))
+        told = None if progress is None else _of_people(progress, len(rivals.rows.person) / len(beaten))
+        rivals = rivals.run(stage, config.terms, told, trace)
+        weighed = rivals.weighed(weighing)
+        if stage is not config.stages[-1]:
+            rivals = rivals.take(hypotheses.best(weighed, stage.keep))
+            for own, each in zip(beaten, weighed, strict=True):
+                own[:0] = [worse for _, worse in each[stage.keep :]]
+    best = rivals.weighed(weighing)
+    winner, second = (np.array([own[min(place, len(own) - 1)][0] for own in best]) for place in (0, 1))
+    ranked = [[*(each for _, each in own), *worse] for own, worse in zip(best, beaten, strict=True)]
+    return rivals.take(winner).fit(ranked, rivals.take(second).fit(ranked))
 
-    def fit_of(place: int) -> Fit:
-        picked = np.array([own[min(place, len(own) - 1)][0] for own in weighed])
-        index = torch.from_numpy(picked)
-        return Fit(
-            problem.rows(index),
-            {name: value[index] for name, value in variables.items()},
-            [report.take(picked) for report in reports],
-            [[*(each for _, each in own), *worse] for own, worse in zip(weighed, out, strict=True)],
-        )
 
-    return replace(fit_of(0), runner_up=fit_of(1))
+@dataclass(frozen=True)
+class _Rivals:
+    """Fits of several rows for each person, and how they went so far."""
+
+    problem: Problem
+    variables: Variables
+    rows: hypotheses.Rows
+    reports: list[StageReport]
+
+    def take(self, kept: np.ndarray) -> _Rivals:
+        index = torch.from_numpy(kept)
+        variables = {name: value[index] for name, value in self.variables.items()}
+        reports = [report.take(kept) for report in self.reports]
+        return _Rivals(self.problem.rows(index), variables, self.rows.take(kept), reports)
+
+    def on_ground(self, find: bool) -> _Rivals:
+        """With a floor under each body, if it is to be found, and what is down on it."""
+        problem = with_ground_under_body(self.problem, self.variables) if find else self.problem
+        return replace(self, problem=hypotheses.with_contacts(problem, self.variables))
+
+    def run(
+        self,
+        stage: Stage,
+        terms: Mapping[str, Mapping[str, Any]],
+        progress: Callable[[str, int], None] | None,
+        trace: bool,
+    ) -> _Rivals:
+        variables, report = run_stage(self.problem, self.variables, stage, terms, progress, trace)
+        return replace(self, variables=variables, reports=[*self.reports, report])
+
+    def weighed(self, weighing: Hypotheses) -> list[list[tuple[int, Hypothesis]]]:
+        return hypotheses.weigh(self.reports[-1].terms, self.rows, weighing)
+
+    def fit(self, ranked: list[list[Hypothesis]], runner_up: Fit | None = None) -> Fit:
+        return Fit(self.problem, self.variables, self.reports, ranked, runner_up)
 
 
 def _turned(report: StageReport, problem: Problem, rows: hypotheses.Rows) -> StageReport:
-    """A report of the stages before the hypotheses, its bodies turned as the camera of each was."""
-    return replace(
-        report, variables=hypotheses.turn(problem.rows(torch.from_numpy(rows.person)), report.variables, rows)[1]
-    )
+    """A report of the stages before the hypotheses, for the rows, its bodies turned as the camera of each is."""
+    report, problem = report.take(rows.person), problem.rows(torch.from_numpy(rows.person))
+    return replace(report, variables=hypotheses.turn(problem, report.variables, rows)[1])
 
 
 def _of_people(progress: Callable[[str, int], None], rows: float) -> Callable[[str, int], None]:

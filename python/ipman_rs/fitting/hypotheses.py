@@ -5,6 +5,7 @@ and a support:
 
 feet     the feet that are down hold the person up, at rest
 seat     a seat does, too, at a height of its own
+floor    hands, knees, hips, shoulders or head do, too, on the floor
 nothing  the person moves: neither balance nor floor are asked for, and the pitch is the likeliest
 
 The body is fitted to the image first, which no pitch changes: a camera that looks down and a body that leans back look
@@ -24,17 +25,19 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ..body.landmarks import SIDES
 from .camera import Camera, level_camera
 from .candidate import Candidate
-from .landmarks import Landmarks
 from .problem import Problem
 from .rotations import matrix, vector
+from .support_points import NAMES, OTHERS, TOES, support_points
 from .variables import Variables
 
 PITCH_PRIOR = ("mean", "deviation", "weight")
-SUPPORTS = ("feet", "seat", "nothing")
-FEET = ("left_heel", "left_big_toe", "right_heel", "right_big_toe")
-NEAR = 0.12  # m above the lower foot: up to there the other one counts as down, and the terms may bring it to the floor
+SUPPORTS = ("feet", "seat", "floor", "nothing")
+_FEET = [NAMES.index(f"{side}_{point}") for side in SIDES for point in ("heel", "big_toe")]
+_OTHERS = [NAMES.index(name) for name in OTHERS]
+NEAR = 0.12  # m above the lowest: up to there the others count as down, and the terms may bring them to the floor
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,7 @@ def expand(problem: Problem, variables: Variables, hypotheses: Hypotheses) -> tu
     """Each person's rows: of all pitches with each support that rests, and of the likeliest with nothing."""
     pitches = (math.nan,) if problem.pitch_known else hypotheses.pitches
     likeliest = min(pitches, key=lambda pitch: abs(pitch - hypotheses.mean))
-    each = [*product(SUPPORTS[:2], pitches), (SUPPORTS[2], likeliest)]
+    each = [*product(SUPPORTS[:3], pitches), (SUPPORTS[3], likeliest)]
     people = problem.num_bodies
     rows = Rows(
         np.repeat(np.arange(people), len(each)),
@@ -91,8 +94,8 @@ def expand(problem: Problem, variables: Variables, hypotheses: Hypotheses) -> tu
     index = torch.from_numpy(rows.person)
     problem, variables = problem.rows(index), {name: value[index] for name, value in variables.items()}
     problem, variables = turn(problem, variables, rows)
-    static, seated = (torch.from_numpy(rows.support == name) for name in ("nothing", "seat"))
-    return replace(problem, static=~static, seated=seated), variables, rows
+    moves, seated, on_floor = (torch.from_numpy(rows.support == name) for name in ("nothing", "seat", "floor"))
+    return replace(problem, static=~moves, seated=seated, on_floor=on_floor), variables, rows
 
 
 def turn(problem: Problem, variables: Variables, rows: Rows) -> tuple[Problem, dict[str, Tensor]]:
@@ -114,17 +117,34 @@ def turn(problem: Problem, variables: Variables, rows: Rows) -> tuple[Problem, d
     return replace(problem, camera=Camera(camera.focal, camera.center, rotation, camera.translation)), variables
 
 
-def with_feet_down(problem: Problem, variables: Variables) -> Problem:
-    """The problem with the feet that are down: the lower one and, near its height, the other; none of a body that
-    moves. Unchanged if the ground is unknown."""
+def with_contacts(problem: Problem, variables: Variables) -> Problem:
+    """The problem with what is down: the lower foot and, near its height, the other; of a body that the floor may hold
+    by more than its feet, all that is near its lowest part. Nothing of a body that moves. Unchanged if the ground is
+    unknown."""
     if problem.ground is None or problem.static is None:
         return problem
     with torch.no_grad():
-        points = Candidate(problem, variables).points_of(Landmarks(problem.body, FEET))
+        points = Candidate(problem, variables).points_of(support_points(problem.body))
         normal = problem.ground.normal.to(points).expand(len(points), 3)
-        heights = (points * normal[:, None]).sum(dim=-1).unflatten(1, (2, 2)).amin(dim=-1)
-    down = heights <= heights.amin(dim=1, keepdim=True) + NEAR
-    return replace(problem, feet_down=down & problem.static[:, None])
+        heights = (points * normal[:, None]).sum(dim=-1)
+    feet = heights[:, _FEET].unflatten(1, (2, 2)).amin(dim=-1)
+    others = heights[:, _OTHERS] - torch.tensor(list(OTHERS.values()), dtype=heights.dtype)
+    lowest_foot = feet.amin(dim=1, keepdim=True)
+    on_floor = torch.zeros(len(points), dtype=torch.bool) if problem.on_floor is None else problem.on_floor
+    lowest = torch.where(on_floor[:, None], torch.minimum(lowest_foot, others.amin(dim=1, keepdim=True)), lowest_foot)
+    static = problem.static[:, None]
+    others_down = (others <= lowest + NEAR) & static & on_floor[:, None]
+    toes = torch.tensor([name in TOES for name in OTHERS])
+    others_down = others_down & (others_down & ~toes).any(dim=1, keepdim=True)
+    return replace(problem, feet_down=(feet <= lowest + NEAR) & static, others_down=others_down)
+
+
+def distinct(problem: Problem) -> np.ndarray:
+    """The rows that differ from all others: where feet alone are down, the floor holds nobody by more than those."""
+    assert problem.on_floor is not None
+    assert problem.others_down is not None
+    twin = problem.on_floor & ~problem.others_down.any(dim=1)
+    return np.flatnonzero(~twin.numpy())
 
 
 def weigh(terms: Mapping[str, np.ndarray], rows: Rows, hypotheses: Hypotheses) -> list[list[tuple[int, Hypothesis]]]:

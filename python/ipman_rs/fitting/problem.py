@@ -47,6 +47,8 @@ class Problem:
     presented: Presented | None = None
     static: Tensor | None = None  # (B,) bool: something holds it up, and it rests; None: not asked for
     pitch_known: bool = True  # whether the camera's rotation tells where down is
+    others_down: Tensor | None = None  # (B, 13) bool, of `support_points.OTHERS`, as `feet_down`; None: none of them
+    on_floor: Tensor | None = None  # (B,) bool: more than feet may rest on the floor; None: of nobody
     seated: Tensor | None = None  # (B,) bool: a seat does, too; None: nobody sits
 
     @property

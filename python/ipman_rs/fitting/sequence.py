@@ -28,7 +28,7 @@ from ipman_rs.checks import not_negative
 from ..torch.threads import one_thread
 from .config import FitConfig, Stage
 from .fit import CHUNK, Fit, StageReport, run_stage, with_ground_under_body, with_static_mask
-from .hypotheses import with_feet_down
+from .hypotheses import with_contacts
 from .objective import Objective
 from .problem import Problem
 from .solvers import SolverOptions, ValueAndGradient, minimise
@@ -67,7 +67,7 @@ def fit_sequence(
         for number, stage in enumerate(config.stages):
             if stage.find_ground and not known:
                 problem = on_one_ground(problem, variables)
-            problem = with_feet_down(with_static_mask(problem, variables), variables)
+            problem = with_contacts(with_static_mask(problem, variables), variables)
             if number == 0:
                 variables = warm_start(problem, variables, stage, config, rate, done, progress)
             together = SequenceObjective(problem, variables, stage, config, smooth)

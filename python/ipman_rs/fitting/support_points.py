@@ -12,7 +12,14 @@ from .landmarks import Landmarks
 
 SOLE = ("heel", "big_toe", "small_toe")
 _JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-NAMES = ("mid_hip", "neck", "head", *(f"{side}_{point}" for side in SIDES for point in (*SOLE, *_JOINTS)))
+NAMES = ("mid_hip", "neck", "head", *(f"{side}_{point}" for side in SIDES for point in (*SOLE, "index", *_JOINTS)))
+# What else than feet can rest on the floor, and how high its point is then, m: half as thick as that part of a body.
+OTHERS = {
+    "left_index": 0.02, "right_index": 0.02, "left_elbow": 0.05, "right_elbow": 0.05, "left_knee": 0.06,
+    "right_knee": 0.06, "left_hip": 0.1, "right_hip": 0.1, "left_shoulder": 0.1, "right_shoulder": 0.1, "head": 0.1,
+    "left_big_toe": 0.02, "right_big_toe": 0.02,
+}  # fmt: skip
+TOES = ("left_big_toe", "right_big_toe")  # of `OTHERS`: only beside another one, else the soles are down
 
 
 @lru_cache(maxsize=4)

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from ..result import FitResult
 
 _BEFORE = "before_"
+HELD = {
+    "feet": "held up by its feet", "seat": "held up by a seat", "floor": "held up by the floor", "nothing": "moving",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +123,7 @@ def notes(record: dict[str, Any]) -> list[str]:
 
 def _explanation(confidence: dict[str, Any]) -> str:
     """The hypothesis that was chosen, in words."""
-    held = {"feet": "held up by its feet", "seat": "held up by a seat", "nothing": "not at rest"}[confidence["support"]]
+    held = HELD[confidence["support"]]
     if "camera_pitch" not in confidence:
         return held
     low, high = confidence["camera_pitch_range"]

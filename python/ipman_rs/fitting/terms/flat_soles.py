@@ -4,7 +4,9 @@
 
 h is the height of heel, big toe and small toe above the ground, and h₀ that of the zero pose, in which soles are flat.
 So a sole is neither tilted nor above or below the floor; with ρ a foot that the image lifts or stands on its toes stops
-pulling. Only the feet that `Problem.feet_down` names take part.
+pulling. Only the feet that `Problem.feet_down` names take part. Hands, elbows, knees, hips, shoulders and head that
+`Problem.others_down` names touch the floor likewise, with the h₀ of `support_points.OTHERS`; then the soles are left
+alone, for who kneels or does push-ups has no flat ones.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from ipman_rs.checks import positive
 from ...body.landmarks import SIDES, skin_points
 from ..candidate import Candidate
 from ..problem import Problem
-from ..support_points import NAMES, SOLE, support_points
+from ..support_points import NAMES, OTHERS, SOLE, support_points
 from .term import LeastSquares
 
 
@@ -34,14 +36,16 @@ class FlatSoles(LeastSquares):
         body = problem.body.body
         self.landmarks = support_points(problem.body)
         soles = [f"{side}_{point}" for side in SIDES for point in SOLE]
-        self.places = [NAMES.index(name) for name in soles]
+        self.places = [NAMES.index(name) for name in (*soles, *OTHERS)]
         vertices, skin = body.v_template, skin_points(body)
         rest = vertices[[skin[name] for name in soles], 1] - vertices[:, 1].min()
-        self.flat = torch.as_tensor(rest, dtype=torch.float64)
-        down = problem.feet_down
-        if down is None:
-            down = torch.ones(problem.num_bodies, 2, dtype=torch.bool)
-        self.weight = down.double().repeat_interleave(len(SOLE), dim=1)
+        others = torch.tensor(list(OTHERS.values()), dtype=torch.float64)
+        self.flat = torch.cat([torch.as_tensor(rest, dtype=torch.float64), others])
+        feet, more = problem.feet_down, problem.others_down
+        feet = torch.ones(problem.num_bodies, 2, dtype=torch.bool) if feet is None else feet
+        more = torch.zeros(problem.num_bodies, len(OTHERS), dtype=torch.bool) if more is None else more
+        feet = feet & ~more.any(dim=1, keepdim=True)
+        self.weight = torch.cat([feet.repeat_interleave(len(SOLE), dim=1), more], dim=1).double()
 
     def residuals(self, candidate: Candidate) -> Tensor:
         difference = self._heights(candidate) - self.flat

@@ -1,11 +1,12 @@
 """Balance of segments: the body's centre of mass, from its joints alone, over what holds it up,
 
-    max(d − r, 0)²     d: horizontal distance from the centre of mass to the line between the supports, metres
+    max(d − r, 0)²     d: horizontal distance from the centre of mass to the hull of the supports, metres
 
-The line leads from foot to foot, of those that are down (`Problem.feet_down`), or from the seat to the feet if the
-person sits (`Problem.seated`); r is half the length of a foot. The centre of mass is that of the segments of P. de
-Leva, *Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters*, J. Biomechanics 29 (1996), the mean of women
-and men. This is what tells hypotheses about a photo apart before `balance` looks at the mesh of the best ones.
+Supports are the feet that are down (`Problem.feet_down`), the hips if the person sits (`Problem.seated`), and hands,
+knees, hips, shoulders or head on the floor (`Problem.others_down`), each seen as a point; r is half the length of a
+foot. The centre of mass is that of the segments of P. de Leva, *Adjustments to Zatsiorsky-Seluyanov's segment inertia
+parameters*, J. Biomechanics 29 (1996), the mean of women and men. This is what tells hypotheses about a photo apart
+before `balance` looks at the mesh of the best ones.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from ipman_rs.checks import positive
 
 from ..candidate import Candidate
 from ..problem import Problem
-from ..support_points import NAMES, support_points
+from ..support_points import NAMES, OTHERS, support_points
 from .term import LeastSquares
 
 # Share of the whole mass, the segment's two ends, and where between them its centre of mass lies; limbs on either side.
@@ -28,8 +29,9 @@ LIMBS = (
     ("shoulder", "elbow", 0.0263, 0.58), ("elbow", "wrist", 0.0150, 0.46), ("wrist", "wrist", 0.0059, 0.0),
     ("hip", "knee", 0.1447, 0.39), ("knee", "ankle", 0.0457, 0.44), ("ankle", "big_toe", 0.0133, 0.4),
 )  # fmt: skip
-SUPPORTS = ("left_heel", "left_big_toe", "right_heel", "right_big_toe", "left_hip", "right_hip")
-NEVER = 1e-9
+FEET = (("left_heel", "left_big_toe"), ("right_heel", "right_big_toe"))
+HIPS = ("left_hip", "right_hip")
+NEVER = 1e-9  # m, m²: nothing is so near
 
 
 class SegmentBalance(LeastSquares):
@@ -44,61 +46,72 @@ class SegmentBalance(LeastSquares):
         segments += [
             (f"{side}_{a}", f"{side}_{b}", share, at) for side in ("left", "right") for a, b, share, at in LIMBS
         ]
-        names = NAMES
         self.landmarks = support_points(problem.body)
-        mass = torch.zeros(len(names), dtype=torch.float64)
+        mass = torch.zeros(len(NAMES), dtype=torch.float64)
         for a, b, share, at in segments:
-            mass[names.index(a)] += share * (1 - at)
-            mass[names.index(b)] += share * at
-        bodies = problem.num_bodies
-        down = torch.ones(bodies, 2, dtype=torch.bool) if problem.feet_down is None else problem.feet_down
-        seated = torch.zeros(bodies, dtype=torch.bool) if problem.seated is None else problem.seated
-        # The line's two ends, and the centre of mass, as weights of the points (B, 3, K).
-        rows = torch.zeros(bodies, 3, len(names), dtype=torch.float64)
-        rows[:, 0] = mass / mass.sum()
-        feet = torch.zeros(2, len(names), dtype=torch.float64)
-        for foot in range(2):
-            feet[foot, [names.index(name) for name in SUPPORTS[2 * foot : 2 * foot + 2]]] = 0.5
-        hips = torch.zeros(len(names), dtype=torch.float64)
-        hips[[names.index(name) for name in SUPPORTS[4:]]] = 0.5
-        left, right = down[:, :1].double(), down[:, 1:].double()
-        neither = 1 - torch.maximum(left, right)
-        left, right = left + neither, right + neither
-        one = left * feet[0] + (1 - left) * feet[1]
-        other = right * feet[1] + (1 - right) * feet[0]
-        rows[:, 1] = torch.where(seated[:, None], hips, one)
-        rows[:, 2] = torch.where(seated[:, None], (one + other) / 2, other)
-        self.rows = rows
-        static = torch.ones(bodies, dtype=torch.bool) if problem.static is None else problem.static
+            mass[NAMES.index(a)] += share * (1 - at)
+            mass[NAMES.index(b)] += share * at
+        self.mass = mass / mass.sum()
+        self.sites = torch.stack([_middle(names) for names in (*FEET, HIPS, *((name,) for name in OTHERS))])
+        self.down = _down(problem)
+        pairs = torch.combinations(torch.arange(len(self.sites)), with_replacement=True)
+        self.starts, self.ends = pairs.unbind(dim=1)
+        static = torch.ones(problem.num_bodies, dtype=torch.bool) if problem.static is None else problem.static
         self.weight = static.double()
-        normal = problem.ground.normal.double().expand(bodies, 3)
+        normal = problem.ground.normal.double().expand(problem.num_bodies, 3)
         self.level = torch.eye(3, dtype=torch.float64) - normal[:, :, None] * normal[:, None, :]
 
     def residuals(self, candidate: Candidate) -> Tensor:
-        return self._outside(self._three(candidate.points_of(self.landmarks)))[0]
+        return self._outside(candidate.points_of(self.landmarks))[0]
 
     def linearised(self, candidate: Candidate, free: Sequence[str]) -> tuple[Tensor, Tensor]:
-        """The line's nearest point moves as its ends do: by the envelope theorem its place on the line adds nothing."""
-        places = self._three(candidate.points_of(self.landmarks))
-        residuals, direction, share = self._outside(places)
+        """The hull's nearest point moves as its supports do: by the envelope theorem its place adds nothing."""
+        residuals, direction, nearest = self._outside(candidate.points_of(self.landmarks))
         slopes = candidate.slopes_of(self.landmarks, free)  # (B, P, K, 3)
         along = (slopes * direction[:, None, None]).sum(dim=-1)  # (B, P, K)
-        rows = self.rows[:, 0] - (1 - share)[:, None] * self.rows[:, 1] - share[:, None] * self.rows[:, 2]
-        return residuals, (along * rows[:, None]).sum(dim=-1, keepdim=True)
+        return residuals, (along * (self.mass - nearest)[:, None]).sum(dim=-1, keepdim=True)
 
-    def _three(self, points: Tensor) -> Tensor:
-        """Centre of mass and the line's ends (B, 3, 3), on the level."""
-        three = (self.rows[..., None] * points[:, None]).sum(dim=2)
-        return (self.level[:, None] * three[:, :, None]).sum(dim=-1)
-
-    def _outside(self, three: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """How far the centre is outside (B, 1), the weighted direction (B, 3) of more, and where on the line (B,)."""
-        centre, start, end = three.unbind(dim=1)
-        line = end - start
+    def _outside(self, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """How far the centre of mass of the points (B, K, 3) is outside (B, 1), the weighted direction (B, 3) of more,
+        and the hull's nearest point as weights of the points (B, K)."""
+        level = (self.level[:, None] * points[:, :, None]).sum(dim=-1)
+        centre = (self.mass[:, None] * level).sum(dim=1)
+        sites = (self.sites[:, :, None] * level[:, None]).sum(dim=2)
+        # Of a point outside, the nearest point of the hull lies between two supports.
+        start, line = sites[:, self.starts], sites[:, self.ends] - sites[:, self.starts]
         square = (line * line).sum(dim=-1)
-        share = (((centre - start) * line).sum(dim=-1) / square.clamp(min=NEVER)).clamp(0, 1)
-        away = centre - start - share[:, None] * line
-        distance = (away * away).sum(dim=-1).clamp(min=NEVER**2).sqrt()
+        away = centre[:, None] - start
+        share = ((away * line).sum(dim=-1) / square.clamp(min=NEVER)).clamp(0, 1)
+        away = away - share[..., None] * line
+        distances = (away * away).sum(dim=-1)
+        there = self.down[:, self.starts] & self.down[:, self.ends]
+        best = torch.where(there, distances.detach(), torch.inf).argmin(dim=1)
+        rows = torch.arange(len(best))
+        away, share = away[rows, best], share[rows, best].detach()
+        nearest = centre - away
+        # Inside, some support lies farther in that direction than the centre's own side.
+        beyond = ((sites - nearest[:, None]) * away[:, None]).sum(dim=-1).detach()
+        inside = (self.down & (beyond > NEVER)).any(dim=1)
+        distance = distances[rows, best].clamp(min=NEVER**2).sqrt()
         outside = (distance - self.radius).clamp(min=0)
-        weight = self.weight * (outside > 0)
-        return (weight * outside)[:, None], (weight / distance)[:, None] * away, share.detach()
+        weight = self.weight * (~inside & (outside > 0))
+        place = (1 - share)[:, None] * self.sites[self.starts[best]] + share[:, None] * self.sites[self.ends[best]]
+        return (weight * outside)[:, None], (weight / distance)[:, None] * away, place
+
+
+def _middle(names: Sequence[str]) -> Tensor:
+    """The middle of some points, as weights (K,) of all."""
+    weights = torch.zeros(len(NAMES), dtype=torch.float64)
+    weights[[NAMES.index(name) for name in names]] = 1 / len(names)
+    return weights
+
+
+def _down(problem: Problem) -> Tensor:
+    """Which supports hold each body (B, S): both feet where nothing else does."""
+    bodies = problem.num_bodies
+    feet = torch.ones(bodies, 2, dtype=torch.bool) if problem.feet_down is None else problem.feet_down
+    seated = torch.zeros(bodies, dtype=torch.bool) if problem.seated is None else problem.seated
+    others = problem.others_down
+    others = torch.zeros(bodies, len(OTHERS), dtype=torch.bool) if others is None else others
+    nothing = ~(feet.any(dim=1) | seated | others.any(dim=1))
+    return torch.cat([feet | nothing[:, None], seated[:, None], others], dim=1)
