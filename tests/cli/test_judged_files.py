@@ -68,7 +68,8 @@ def test_millimetres(run, mesh, weight, command, ending):
     (body,) = strict(forced.out)["bodies"]
     (flag,) = body["flags"]
     assert "looks like millimetres" in flag
-    assert forced.err == f"ipman: warning: {path}: {flag}\n"
+    in_flags = flag.replace("`units='mm'`", "--units mm")
+    assert forced.err == f"ipman: warning: {path}: {in_flags}\n"
 
 
 @pytest.mark.parametrize(
@@ -117,7 +118,7 @@ def test_a_body_that_stands_on_its_head_is_refused(run, mesh, command):
 
 def test_a_body_on_its_back_is_marked(run, mesh):
     path = mesh("zup.obj", Rotation.from_euler("x", 90, degrees=True).as_matrix())
-    assert analyze(run, path)["flags"] == ["lies: its head is beside its feet; --up z if so"]
+    assert analyze(run, path)["flags"] == ["lies: its head is beside its feet; `up='z'` if so"]
     assert analyze(run, path, "--up", "z")["flags"] == []
 
 
@@ -185,7 +186,7 @@ def test_places_in_centimetres_are_marked(run, tmp_path):
     np.savez(tmp_path / "cm.npz", **{**stored, "trans": 100 * stored["trans"]})
     flags = analyze(run, tmp_path / "cm.npz", "--body", "anny-lite")["flags"]
     fast, high = flags
-    assert fast.startswith("trans: moves at 114.3 m/s in the median, expected up to 15; is its unit (--units) or its")
+    assert fast.startswith("trans: moves at 114.3 m/s in the median, expected up to 15; is its unit (`units`) or its")
     assert high.startswith("vertices: 89.09 m above the origin of their world; is the unit of their places another")
 
 
@@ -198,7 +199,7 @@ def test_rates(run, tmp_path):
     body = analyze(run, tmp_path / "0.npz", "--body", "anny-lite", "--rate", "50")
     assert [frame["seconds"] for frame in body["frames"]] == [number / 50 for number in range(8)]
     np.savez(tmp_path / "fast.npz", **{**stored, "trans": 0 * stored["trans"], "mocap_framerate": 20_000.0})
-    assert analyze(run, tmp_path / "fast.npz")["flags"] == ["2e+04 frames a second; --rate HZ says otherwise"]
+    assert analyze(run, tmp_path / "fast.npz")["flags"] == ["2e+04 frames a second; `rate=HZ` says otherwise"]
 
 
 def test_a_rate_for_each_frame(run, tmp_path):
@@ -311,7 +312,7 @@ def test_all_betas_that_the_body_has_are_used(run, tmp_path):
     found = analyze(run, tmp_path / "walk_poses.npz", "--body", tmp_path / "SMPLH_F.npz")
     assert "shape: the first 12 of 16 betas, as many as SMPLH_F has" in found["notes"]
     assert found["flags"] == [
-        "the file's gender is male, and the body model SMPLH_F is female; --body with the male model"
+        "the file's gender is male, and the body model SMPLH_F is female; `model` with the male model"
     ]
 
 
@@ -344,7 +345,7 @@ def test_a_body_of_another_mass(run, tmp_path):
     line = refused(run, "analyze", tmp_path / "box.ply")
     assert "a person of 1702 kg; --units UNIT says otherwise (--force: it is right as it is)" in line
     assert analyze(run, tmp_path / "box.ply", "--force")["flags"] == [
-        "a person of 1702 kg; --units UNIT says otherwise"
+        "a person of 1702 kg; `units=UNIT` says otherwise"
     ]
 
 

@@ -139,8 +139,8 @@ def test_a_rate_that_the_header_says_otherwise():
     right = raw.c3d(raw.points_of(5, 40), np.ones((400, 6)), samples=10)
     assert c3d_format.content(right).notes == ()
     found = c3d_format.content(right.replace(raw.parameter(1, "RATE", 100.0), raw.parameter(1, "RATE", 50.0)))
-    assert "its header says 100 Hz, POINT:RATE says 50 Hz, which is believed (--rate)" in found.notes
-    assert "ANALOG:RATE and 10 samples a frame say 100 Hz, POINT:RATE says 50 Hz, which is believed (--rate)" in (
+    assert "its header says 100 Hz, POINT:RATE says 50 Hz, which is believed (`rate`)" in found.notes
+    assert "ANALOG:RATE and 10 samples a frame say 100 Hz, POINT:RATE says 50 Hz, which is believed (`rate`)" in (
         found.notes
     )
 
@@ -217,7 +217,7 @@ def test_subjects(read):
     names = [f"{who}:{name}" for who in ("Ann", "Bob") for name in SUBJECT]
     points = raw.points_of(6)
     with pytest.raises(
-        ValueError, match=r"two people in it, Ann \(3 markers\) and Bob \(3 markers\): say which one .*--subject"
+        ValueError, match=r"two people in it, Ann \(3 markers\) and Bob \(3 markers\): say which one .*`subject='Ann'`"
     ):
         read(raw.c3d(points, names=names))
     found = read(raw.c3d(points, names=names), subject="bob", up="y")
@@ -231,7 +231,7 @@ def test_subjects(read):
     np.testing.assert_array_equal(alone.confidence, 1)
     ball = read(raw.c3d(names=["Ann:C7", "Ann:LASI", "Ball:top"]))
     assert ball.names == ("C7", "LASI", "top")
-    assert ball.notes == ("the markers of Ann, Ball are taken as one person's (subject, --subject: those of one)",)
+    assert ball.notes == ("the markers of Ann, Ball are taken as one person's (`subject`: those of one)",)
     with pytest.raises(ValueError, match="subject: expected none, for no marker has one, got 'Ann'"):
         read(raw.c3d(), subject="Ann")
 
@@ -254,7 +254,7 @@ def test_points_without_a_name_and_two_of_one(read):
 def test_an_axis_that_is_none(read, tmp_path):
     found = read(raw.c3d(up="QQ"))
     assert found.up == "z"
-    assert found.notes == ("its Y_SCREEN is 'QQ', which is no axis: taken as z up (--up)",)
+    assert found.notes == ("its Y_SCREEN is 'QQ', which is no axis: taken as z up (`up`)",)
     assert not any("substring" in each.what for each in force_plates.check(tmp_path / "a.c3d"))
 
 

@@ -226,7 +226,7 @@ def test_a_unit_that_is_not_given(tmp_path, load):
     found, of_markers = force_plates.read(path), c3d.markers(path)
     np.testing.assert_array_equal(found.points, given.points)
     np.testing.assert_array_equal(of_markers.points, markers_given.points)
-    note = "its unit of length is not given: taken as mm (--units)"
+    note = "its unit of length is not given: taken as mm (`units`)"
     assert note in found.notes
     assert note in of_markers.notes
     assert [each.what for each in force_plates.check(path)].count(f"a.c3d: {note}") == 1

@@ -221,7 +221,7 @@ def test_z_up_instead_of_y_up(folder):
     [
         ({"turn": [[1, 0, 0], [0, -1, 0], [0, 0, -1]]}, "wrong", "markers: looks like -y up", "`up='-y'`"),
         ({"names": ("Top.Head", "a", "b", "c", "d")}, "wrong", "4 of 5 markers have names without a known place", ""),
-        ({"rate": 0.06}, "odd", "0.06 frames a second", "--rate HZ"),
+        ({"rate": 0.06}, "odd", "0.06 frames a second", "`rate=HZ`"),
         ({"names": ("L.Knee.Lat", *miniature.HEAD[1:])}, "odd", "no marker above the pelvis was ever seen", ""),
         ({"names": ("Top.Head", *miniature.HEAD[1:4], "L.Heel")}, "odd", "more than one marker is called L.Heel", ""),
     ],

@@ -180,7 +180,7 @@ def test_keypoints_that_the_detector_is_not_sure_of_may_lie_outside():
 
 
 def test_keypoints_of_another_image_size_name_the_option():
-    with pytest.raises(NoPerson, match=r"a.json: 9 of 9 .*is that its size\? \(`image_size`\) \(`force`"):
+    with pytest.raises(NoPerson, match=r"a.json: 9 of 9 .*is that its size\? \(`image_size=WxH`\) \(`force`"):
         admit("a.json", of_keypoints(PERSON * 3))
     (said,) = admit("a.json", of_keypoints(PERSON * 3), force=True)
     assert "lie outside the image" in said

@@ -81,7 +81,7 @@ def test_doubled_tabs_in_the_values_alone(read):
     lines[2] = lines[2].replace("mm", "  ")
     found = read("\n".join(lines))
     same(found)  # nobody is 250 m long
-    assert found.notes == ("its unit of length is not given: taken as mm (--units)",)
+    assert found.notes == ("its unit of length is not given: taken as mm (`units`)",)
 
 
 def test_doubled_tabs_in_the_rows_alone(read):
@@ -170,13 +170,13 @@ def test_two_people_who_share_no_name(read):
         text(rows[:, :11], names=[*[f"Al:M{k}" for k in range(6)], *[f"Wand:{k}" for k in range(5)]], markers=11)
     )
     assert wand.names[-1] == "4"
-    assert wand.notes == ("the markers of Al, Wand are taken as one person's (subject, --subject: those of one)",)
+    assert wand.notes == ("the markers of Al, Wand are taken as one person's (`subject`: those of one)",)
 
 
 def test_two_people_of_whom_one_has_no_name(read):
     points = np.concatenate([ROWS, ROWS + 700], axis=1)
     content = text(points, names=[*NAMES, *(f"B:{name}" for name in NAMES)])
-    with pytest.raises(ValueError, match=r'two people in it, "" \(without.*\) \(3 markers\) and B .*--subject B\)'):
+    with pytest.raises(ValueError, match=r"two people in it, \"\" \(without.*\) \(3 markers\) and B .*`subject='B'`\)"):
         read(content)
     same(read(content, subject="b"), NAMES, points[:, 3:])
     same(read(content, subject=""), NAMES, ROWS)

@@ -139,7 +139,7 @@ def test_other_units_and_degrees_are_mended_or_forced(tmp_path, true, guessed):
 
 def test_too_few_frames_and_foreign_names(tmp_path, true, guessed):
     few = {key: value if key == "body" else value[:-1] for key, value in guessed.items()}
-    with pytest.raises(ValueError, match=r"has 299 frames, but the data set own has 300; --partial leaves out"):
+    with pytest.raises(ValueError, match=r"has 299 frames, but the data set own has 300; `partial` leaves out"):
         job_of(tmp_path, true, few).begin()
     foreign = dict(guessed, names=np.char.add("other/", guessed["names"]))
     job = job_of(tmp_path, true, foreign)

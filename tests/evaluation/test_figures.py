@@ -261,7 +261,7 @@ def test_models_are_found_in_a_folder(tmp_path):
         ValueError, match=r"smpl \(male\) needs its model file, SMPL_MALE.npz or .pkl: there is none under"
     ):
         Models(tmp_path).get("smpl", "male")
-    with pytest.raises(ValueError, match="no folder is named by --models"):
+    with pytest.raises(ValueError, match="no folder is named by `models`"):
         Models().get("smplx")
 
 

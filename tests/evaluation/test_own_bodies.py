@@ -149,7 +149,7 @@ def test_measured_joints_take_the_regressor_of_the_protocol(bodies, regressors, 
     code, said = evaluated(*asked, "-o", tmp_path / "refused")
     assert code == 1
     assert "human36m: has measured joints and no bodies here, and the predictions are bodies" in said
-    assert "--regressor J_regressor_h36m.npy makes the measured ones of the predicted vertices" in said
+    assert "--regressor with J_regressor_h36m.npy makes the measured ones of the predicted vertices" in said
     assert not (tmp_path / "refused" / "methods" / "guess" / "000000.npz").exists()
     code, said = evaluated(*asked, "--regressor", regressors[0], "-o", tmp_path / "out")
     assert code == 0, said

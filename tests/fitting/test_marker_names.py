@@ -240,7 +240,7 @@ def test_a_person_who_stands():
 def test_another_axis_up_is_refused_and_mended(axis):
     other = tracks(STANDING @ TO_Y_UP[axis])  # y up said, and it is not
     (finding,) = wrong(other)
-    assert finding.option == f"--up {axis}"
+    assert finding.option == f"`up={axis!r}`"
     assert wrong(other, up_is_said=True) == []
     np.testing.assert_allclose(turn_up(other, np.eye(3)["xyz".index(axis)]).points[0], STANDING, atol=1e-15)
 
@@ -265,7 +265,7 @@ def test_units_are_refused_and_mended():
 def test_markers_below_the_floor():
     (finding,) = plausibility.check_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES))
     assert finding.what == "the lowest markers are 0.95 m below the floor in the median"
-    assert finding.option == "--ground HEIGHT"
+    assert finding.option == "`ground=HEIGHT`"
     assert plausibility.check_floor(tracks(STANDING - [0, 1, 0]), meanings(NAMES), ground=-1.0) == []
     assert plausibility.check_floor(tracks(), meanings(NAMES)) == []
 

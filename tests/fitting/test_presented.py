@@ -283,7 +283,7 @@ def test_what_cannot_be_is_refused(arrays, says, lite, tmp_path):
 
 
 def test_options_of_files_do_not_go_with_names(lite):
-    with pytest.raises(ValueError, match="leave out --pose-frame"):
+    with pytest.raises(ValueError, match="leave out `pose_frame`"):
         presented.load("tree", lite, frame=3)
 
 
