@@ -11,17 +11,26 @@ import pytest
 import torch
 
 from ipman_rs.body import joints
-from ipman_rs.fitting.problem import Presented
+from ipman_rs.fitting.landmarks import Landmarks
+from ipman_rs.fitting.problem import Presented, Problem
 from ipman_rs.fitting.terms.bending import Bending
+from ipman_rs.fitting.terms.bone_directions import BoneDirections
+from ipman_rs.fitting.terms.flat_soles import FlatSoles
 from ipman_rs.fitting.terms.gmm_prior import GaussianMixture
 from ipman_rs.fitting.terms.hand_prior import HandPrior
 from ipman_rs.fitting.terms.joint_limits import JointLimits
 from ipman_rs.fitting.terms.points_3d import Points3D
 from ipman_rs.fitting.terms.pose_prior import PosePrior
 from ipman_rs.fitting.terms.presented_pose import PresentedPose
+from ipman_rs.fitting.terms.seat import Seat
+from ipman_rs.fitting.terms.segment_balance import SegmentBalance
 from ipman_rs.fitting.terms.shape_prior import ShapePrior
 from ipman_rs.fitting.terms.vposer import VPoser
 from tests.helpers import fit_terms_cases as cases
+
+DETECTED = (
+    "left_shoulder", "left_elbow", "left_wrist", "left_hip", "left_knee", "left_heel", "left_big_toe", "right_hip",
+)  # fmt: skip
 
 
 def known(batch: int, dtype: torch.dtype = torch.float64) -> dict:
@@ -29,7 +38,13 @@ def known(batch: int, dtype: torch.dtype = torch.float64) -> dict:
     points = torch.randn(batch, 5, 3, generator=generator, dtype=torch.float64).to(dtype)
     confidence = torch.rand(batch, 5, generator=generator, dtype=torch.float64).to(dtype)
     confidence[0, 2] = 0
-    return {"points_3d": points, "confidence_3d": confidence, "presented": cases.presented(batch, dtype)}
+    told = cases.held(batch, len(DETECTED), dtype)
+    return {"points_3d": points, "confidence_3d": confidence, "presented": cases.presented(batch, dtype), **told}
+
+
+def bone_directions(problem: Problem) -> BoneDirections:
+    """Of the points that `relative_points` are of."""
+    return BoneDirections(replace(problem, landmarks=Landmarks(problem.body, DETECTED)))
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +56,7 @@ def checkpoint(tmp_path_factory):
 
 @pytest.fixture(
     params=["points_3d", "robust_points_3d", "joint_limits", "pose_prior", "vposer", "presented_pose", "shape_prior",
-            "bending", "hand_prior"]
+            "bending", "hand_prior", "bone_directions", "flat_soles", "segment_balance", "seat"]
 )  # fmt: skip
 def make(request, checkpoint):
     """problem -> term"""
@@ -55,6 +70,10 @@ def make(request, checkpoint):
         "shape_prior": ShapePrior,
         "bending": Bending,
         "hand_prior": HandPrior,
+        "bone_directions": bone_directions,
+        "flat_soles": FlatSoles,
+        "segment_balance": SegmentBalance,
+        "seat": Seat,
     }[request.param]
 
 
@@ -64,7 +83,7 @@ def test_gradients_in_both_modes(make):
     values = cases.variables(1)
 
     def residuals(pose, betas, transl):
-        residuals = term.residuals(cases.candidate(problem, pose=pose, betas=betas, transl=transl))
+        residuals = term.residuals(cases.candidate(term.problem, pose=pose, betas=betas, transl=transl))
         return residuals[:, torch.arange(0, residuals.shape[1], max(residuals.shape[1] // 12, 1))]
 
     inputs = tuple(values[name].requires_grad_() for name in ("pose", "betas", "transl"))
@@ -74,7 +93,7 @@ def test_gradients_in_both_modes(make):
 def test_the_cost_is_the_sum_of_squares(make):
     problem = cases.problem(3, **known(3))
     term = make(problem)
-    body = cases.candidate(problem, **cases.variables(3))
+    body = cases.candidate(term.problem, **cases.variables(3))
     residuals = term.residuals(body)
     assert residuals.ndim == 2
     torch.testing.assert_close(term.cost(body), residuals.square().sum(dim=1), rtol=1e-15, atol=0)
@@ -82,7 +101,7 @@ def test_the_cost_is_the_sum_of_squares(make):
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_rows_are_alone(make, dtype):
-    cases.assert_rows_are_alone(make, cases.problem(5, dtype, **known(5, dtype)), cases.variables(5, dtype))
+    cases.assert_rows_are_alone(make, cases.problem(6, dtype, **known(6, dtype)), cases.variables(6, dtype))
 
 
 def test_zeros_have_finite_gradients_in_both_modes(make):
@@ -95,7 +114,7 @@ def test_zeros_have_finite_gradients_in_both_modes(make):
         dual = {
             name: torch.autograd.forward_ad.make_dual(value, tangents[name]) for name, value in cases.zeros().items()
         }
-        residuals = term.residuals(cases.candidate(problem, **dual))
+        residuals = term.residuals(cases.candidate(term.problem, **dual))
         tangent = torch.autograd.forward_ad.unpack_dual(residuals).tangent
     assert tangent is None or tangent.isfinite().all()
 

@@ -17,9 +17,13 @@ from ipman_rs.body.hands import Hands
 from ipman_rs.fitting.camera import Camera
 from ipman_rs.fitting.candidate import Candidate
 from ipman_rs.fitting.problem import Presented, Problem
+from ipman_rs.fitting.support_points import OTHERS
 from ipman_rs.fitting.terms import Term
 
-PER_BODY = ("points_3d", "confidence_3d", "height", "mass")
+HELD = (
+    "feet_down", "others_down", "on_floor", "static", "seated", "relative_points", "relative_confidence",
+)  # fmt: skip
+PER_BODY = ("points_3d", "confidence_3d", "height", "mass", *HELD)
 
 
 @functools.cache
@@ -214,6 +218,27 @@ def smplx_observed(batch: int, seed: int = 6) -> tuple[Problem, dict[str, Tensor
     points = Candidate(known, given).projected
     confidence = torch.ones_like(points[..., 0])
     return replace(known, points=points, confidence=confidence), given
+
+
+def held(batch: int, points: int, dtype: torch.dtype = torch.float64, seed: int = 8) -> dict[str, Tensor]:
+    """What hypotheses and a detector of 3D points say of bodies: rows that sit and rows that stand, on one foot, on
+    both or on neither, and one (the sixth) that moves; points (B, `points`, 3) of which one was not seen."""
+    generator = torch.Generator().manual_seed(seed)
+    relative = torch.randn(batch, points, 3, generator=generator, dtype=torch.float64)
+    confidence = torch.rand(batch, points, generator=generator, dtype=torch.float64)
+    confidence[0, 2] = 0
+    others = torch.rand(batch, len(OTHERS), generator=generator) > 0.7
+    row = torch.arange(batch)
+    on_floor = row % 4 == 1
+    return {
+        "others_down": others & on_floor[:, None],
+        "on_floor": on_floor,
+        "feet_down": torch.stack([row % 4 < 2, row % 2 == 0], dim=1),
+        "static": row != 5,
+        "seated": row % 3 == 0,
+        "relative_points": relative.to(dtype),
+        "relative_confidence": confidence.to(dtype),
+    }
 
 
 def presented(batch: int = 1, dtype: torch.dtype = torch.float64, contact: Tensor | None = None) -> Presented:

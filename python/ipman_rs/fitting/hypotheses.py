@@ -28,6 +28,7 @@ from torch import Tensor
 from ..body.landmarks import SIDES
 from .camera import Camera, level_camera
 from .candidate import Candidate
+from .landmarks import Landmarks
 from .problem import Problem
 from .rotations import matrix, vector
 from .support_points import NAMES, OTHERS, TOES, support_points
@@ -105,7 +106,8 @@ def turn(problem: Problem, variables: Variables, rows: Rows) -> tuple[Problem, d
     rotation = level_camera(torch.from_numpy(rows.pitch).deg2rad())
     turn = rotation.transpose(1, 2) @ problem.camera.rotation
     with torch.no_grad():
-        root = Candidate(problem, variables).posed.joints[:, 0].double()  # about which `orient` turns
+        pelvis = Landmarks(problem.body, problem.body.body.joint_names[:1])
+        root = Candidate(problem, variables).points_of(pelvis)[:, 0]  # about which `orient` turns
     moved = (turn @ root[:, :, None])[..., 0] - (root - variables["transl"])
     variables = {
         **variables,

@@ -36,7 +36,7 @@ class Seat(LeastSquares):
         self.places = [NAMES.index(f"{side}_{joint}") for joint in LEGS for side in SIDES]
         seated = torch.zeros(problem.num_bodies, dtype=torch.bool) if problem.seated is None else problem.seated
         self.weight = seated.double()[:, None]
-        self.up = problem.ground.normal.double().expand(problem.num_bodies, 3)
+        self.up = problem.ground.normal.double().reshape(-1, 3)
 
     def residuals(self, candidate: Candidate) -> Tensor:
         return self._outside(candidate.points_of(self.landmarks)[:, self.places])[0]

@@ -58,7 +58,7 @@ class SegmentBalance(LeastSquares):
         self.starts, self.ends = pairs.unbind(dim=1)
         static = torch.ones(problem.num_bodies, dtype=torch.bool) if problem.static is None else problem.static
         self.weight = static.double()
-        normal = problem.ground.normal.double().expand(problem.num_bodies, 3)
+        normal = problem.ground.normal.double().reshape(-1, 3)
         self.level = torch.eye(3, dtype=torch.float64) - normal[:, :, None] * normal[:, None, :]
 
     def residuals(self, candidate: Candidate) -> Tensor:
