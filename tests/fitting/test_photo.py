@@ -102,3 +102,47 @@ def test_without_the_extra(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
     with pytest.raises(ImportError, match=r'pip install "ipman_rs\[photo\]"'):
         photo.detect([tmp_path / "a.png"])
+
+
+class OneOfParts:
+    """A detector that finds a person who fills at least a third of what it is shown, at a place in the image."""
+
+    def __init__(self, whole: np.ndarray, box: tuple[int, int, int, int]):
+        self.whole, self.box, self.looks = whole, box, 0
+
+    def process(self, part: np.ndarray):
+        from types import SimpleNamespace as Record
+
+        self.looks += 1
+        y, x = np.argwhere(self.whole[..., 0] == part[0, 0, 0])[0]  # every pixel of the red channel is another
+        left, top, width, height = self.box
+        inside = x <= left and y <= top and x + part.shape[1] >= left + width and y + part.shape[0] >= top + height
+        if not inside or 3 * height < part.shape[0]:
+            return Record(pose_landmarks=None)
+        places = np.linspace(0, 1, 33)
+        points = [
+            Record(
+                x=(left - x + p * width) / part.shape[1], y=(top - y + p * height) / part.shape[0], z=0, visibility=1
+            )
+            for p in places
+        ]
+        found = Record(landmark=points)
+        return Record(pose_landmarks=found, pose_world_landmarks=found)
+
+
+def test_small_people_are_found_in_parts_of_the_image(monkeypatch):
+    whole = np.arange(300 * 400, dtype=np.int64).reshape(300, 400, 1)
+    detector = OneOfParts(whole, (250, 180, 20, 60))
+    landmarks, _, size = photo._landmarks(detector, "far.png", whole)
+    assert size == (400, 300)
+    np.testing.assert_allclose(landmarks[[0, -1], :2] * size, [[250, 180], [270, 240]], atol=1e-9)
+    assert detector.looks > 2  # the whole, parts, and once more around the person
+    alone = OneOfParts(whole, (250, 180, 20, 200))
+    photo._landmarks(alone, "near.png", whole)
+    assert alone.looks == 1
+
+
+def test_nobody_in_any_part():
+    whole = np.arange(300 * 400, dtype=np.int64).reshape(300, 400, 1)
+    with pytest.raises(ValueError, match=r"a.png: expected a person, found none; crop the image around one person"):
+        photo._landmarks(OneOfParts(whole, (0, 0, 400, 301)), "a.png", whole)
