@@ -120,12 +120,8 @@ class OneOfParts:
         if not inside or 3 * height < part.shape[0]:
             return Record(pose_landmarks=None)
         places = np.linspace(0, 1, 33)
-        points = [
-            Record(
-                x=(left - x + p * width) / part.shape[1], y=(top - y + p * height) / part.shape[0], z=0, visibility=1
-            )
-            for p in places
-        ]
+        across, down = (left - x + places * width) / part.shape[1], (top - y + places * height) / part.shape[0]
+        points = [Record(x=a, y=b, z=0, visibility=1) for a, b in zip(across, down, strict=True)]
         found = Record(landmark=points)
         return Record(pose_landmarks=found, pose_world_landmarks=found)
 
@@ -137,7 +133,7 @@ def test_small_people_are_found_in_parts_of_the_image(monkeypatch):
     assert size == (400, 300)
     np.testing.assert_allclose(landmarks[[0, -1], :2] * size, [[250, 180], [270, 240]], atol=1e-9)
     assert detector.looks > 2  # the whole, parts, and once more around the person
-    alone = OneOfParts(whole, (250, 180, 20, 200))
+    alone = OneOfParts(whole, (250, 80, 20, 200))
     photo._landmarks(alone, "near.png", whole)
     assert alone.looks == 1
 
