@@ -327,7 +327,7 @@ def test_a_photo_of_another_size(fit, tmp_path, standing):
     notes = fit(path, *photo).report["bodies"][0]["fit"]["notes"]
     assert "the file says that its image has 480 × 640 pixels; 96 × 128 were given" in notes[0]
     notes = fit(path, *photo, "--image-size", "480x640").report["bodies"][0]["fit"]["notes"]
-    assert "the photo has 96 × 128 pixels, --image-size says 480 × 640" in notes[0]
+    assert "the photo has 96 × 128 pixels, `image_size` says 480 × 640" in notes[0]
 
 
 @pytest.mark.slow
@@ -344,7 +344,7 @@ def test_a_video_of_mmpose(fit, tmp_path, standing):
     assert said.code == 0, said.err
     notes = {body["name"]: body["fit"]["notes"] for body in said.report["bodies"]}
     assert sorted(notes) == ["video_0", "video_1"]
-    for what in ("scores up to 5", "1 of 3 images left out", "--sequence fits one person over time"):
+    for what in ("scores up to 5", "1 of 3 images left out", "`sequence` fits one person over time"):
         assert any(what in note for note in notes["video_0"])
     assert notes["video_1"] == []  # of the file, and said once
     over_time = fit(tmp_path / "video.json", "--image-size", "480x640", "--sequence")

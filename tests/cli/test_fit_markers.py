@@ -84,7 +84,7 @@ def test_a_file_that_says_nothing_rightly(points, tmp_path):
     assert found["mean_marker_error_m"] < 0.003
     assert found["unknown"] == []
     assert "up: (0, 0, 1) of the file's axes, turned to y: the bodies are y up" in found["notes"]
-    assert f"no marker is called M999, as {tmp_path / 'names.json'} has it (--markers)" in found["notes"]
+    assert f"no marker is called M999, as {tmp_path / 'names.json'} has it (`markers`)" in found["notes"]
     assert set(found["skin_distances_m"]) == set(own)
     assert 0.005 < np.median(list(found["skin_distances_m"].values())) < 0.015  # they were put 10 mm off the skin
 
@@ -104,7 +104,7 @@ def test_markers_that_do_not_say_all(points, tmp_path):
     above = "no marker above the pelvis was ever seen: trunk, arms, mass and centre of mass are the body's mean"
     assert above in found["flags"]
     assert (
-        "1 of 13 markers have names without a known place: Box.1; --markers FILE says where they are" in found["flags"]
+        "1 of 13 markers have names without a known place: Box.1; `markers=FILE` says where they are" in found["flags"]
     )
     assert above in said.stderr
     assert "Box.1" in said.stderr

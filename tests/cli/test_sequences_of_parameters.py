@@ -128,8 +128,8 @@ def test_ctrl_c_ends_a_long_analysis(tmp_path):
     finally:
         watchdog.cancel()
         process.kill()
-    assert process.returncode == 1
-    assert "Aborted" in err
+    assert process.returncode == 130
+    assert "ipman: interrupted" in err
     assert "Traceback" not in err
     assert took < 2.0
     assert not (tmp_path / "out").exists()

@@ -219,7 +219,7 @@ def test_forces_in_other_axes_than_the_markers(person, tmp_path):
         found = validation_run._read(plan, plan.trials[0], told)
         if up is None:
             assert "walk_grf.mot: looks like z up" in str(told.failures[0])
-            assert "(--force-up z)" in str(told.failures[0])
+            assert "`force_up='z'` if so" in str(told.failures[0])
     assert told.failures == []
     np.testing.assert_allclose(found.plates.center(), np.tile([x, y, z], (len(found.plates), 1)), atol=1e-6)
 

@@ -124,7 +124,7 @@ def test_the_old_header_of_simm(shared):
     assert table.columns["f1_3"][0] == -14.20642757
     with pytest.raises(ValueError, match=r"looks like millimetres: centres of pressure 718.9 .* say unit='mm'"):
         opensim.plates(table)
-    with pytest.raises(ValueError, match=r"looks like z up: loaded plates push along z .* say up='z'"):
+    with pytest.raises(ValueError, match=r"looks like z up: loaded plates push along z .* `force_up='z'` if so"):
         opensim.plates(table, unit="mm")
     assert opensim.plates(table, "mm", "z").loads.max() == pytest.approx(948.3, abs=0.1)
 

@@ -113,7 +113,7 @@ def test_own_bodies_have_no_error(table, with_regressor, bodies, regressors, tmp
     if with_regressor:
         assert compared["names"] == list(COUNTED)
         assert "truth and estimate by J_regressor_h36m × vertices; aligned at the pelvis." in page
-    paper = "The paper compares 14 other joints here: give --regressor J_regressor_h36m.npy." in page
+    paper = "The paper compares 14 other joints: give `regressors=J_regressor_h36m.npy`." in page
     assert paper == (source.regressor and not with_regressor)
     for method, printed in source.published.items():
         row = page if source.across else next(line for line in page.splitlines() if f"| {method} (printed) |" in line)
@@ -237,7 +237,7 @@ def test_measured_joints_of_spin_s_definition_take_its_extra_regressor(bodies, r
     asked = own, "--data", "rich-ipman", "--path", file, "--models", bodies
     code, said = evaluated(*asked, "--regressor", regressors[0], "-o", tmp_path / "refused")
     assert code == 1
-    assert "--regressor J_regressor_extra.npy" in said
+    assert "--regressor with J_regressor_extra.npy" in said
     code, said = evaluated(*asked, "--regressor", regressors[1], "-o", tmp_path / "out")
     assert code == 0, said
     found = record(tmp_path / "out")

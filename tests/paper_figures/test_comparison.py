@@ -150,7 +150,7 @@ def test_folders_of_predictions_for_moyo(figure, tmp_path):
     assert not blue[len(blue) // 2 :].any()
     unseen = figure("compare", *words)
     assert unseen.code == 1
-    assert "no camera for it; of moyo one is chosen by --option camera=1" in unseen.err
+    assert "no camera for it; of moyo one is chosen by the option camera=1" in unseen.err
     alone = figure("compare", tmp_path / "fit")
     assert alone.code == 1
     assert "name that with --data and --path" in alone.err

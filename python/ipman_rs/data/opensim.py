@@ -216,7 +216,7 @@ def _check_plates(plates: ForcePlates, up: str) -> None:
     if axis != up:
         raise ValueError(
             f"{plates.source}: looks like {axis} up: loaded plates push along {axis} ({push[0]:.0f}, {push[1]:.0f}, "
-            f"{push[2]:.0f} N), expected along {up}; say up={axis!r} if so (`force_up={axis!r}`)"
+            f"{push[2]:.0f} N), expected along {up}; `force_up={axis!r}` if so"
         )
 
 
