@@ -20,7 +20,7 @@ import ipman_rs as ip
 from ..body.landmarks import SIDES
 from .candidate import Candidate
 from .hypotheses import Hypothesis
-from .landmarks import Landmarks
+from .support_points import NAMES, SOLES, flat_heights, support_points
 from .terms.bone_directions import BONES
 
 POOR = 5.0  # % of the person's height: a median error above it is flagged
@@ -111,8 +111,8 @@ def _assess_support(
     margin = float(ip.support_margin(vertices, candidate.problem.body.body.template, plane, threshold=CONTACT))
     measures["margin_mm"] = 1000 * margin if math.isfinite(margin) else None
     if not margin > 0:
-        where = f"{-1000 * margin:.0f} mm outside" if math.isfinite(margin) else "over nothing:"
-        red.append(f"its centre of mass is {where} what it stands on")
+        outside = f"its centre of mass is {-1000 * margin:.0f} mm outside what it stands on"
+        red.append(outside if math.isfinite(margin) else "nothing of it touches the floor")
 
 
 def _assess_runner_up(
@@ -155,35 +155,23 @@ def measure_soles(candidate: Candidate) -> dict[str, dict[str, Any]]:
     problem = candidate.problem
     body, ground = problem.body.body, problem.ground
     assert ground is not None
-    names = [f"{side}_{point}" for side in SIDES for point in ("heel", "big_toe")]
-    landmarks = Landmarks(problem.body, names)
-    normal = ground.normal.reshape(-1, 3)[0].double()
+    normal, level = ground.normal.reshape(-1, 3)[0].double(), ground.height.reshape(-1)[0].double()
     with torch.no_grad():
-        points = candidate.points_of(landmarks)[0]
-        vertices = candidate.vertices.double()[0]
-    flat = torch.as_tensor(body().vertices[_vertices_of(candidate, names)])
+        points = candidate.points_of(support_points(problem.body))[0, [NAMES.index(name) for name in SOLES]]
+        heights = candidate.vertices.double()[0] @ normal - level
+    raised = points @ normal - flat_heights(body)
     owner = np.array(body.joint_names)[body.weights.argmax(axis=1)]
-    heights = vertices @ normal - ground.height.reshape(-1)[0].double()
     soles = {}
     for number, side in enumerate(SIDES):
         foot = torch.from_numpy(np.isin(owner, (f"{side}_ankle", f"{side}_foot")))
-        heel, toe = points[2 * number], points[2 * number + 1]
-        rest = flat[2 * number] - flat[2 * number + 1]
-        rise = float((heel - toe) @ normal) - float(rest[1])
-        down = problem.feet_down is None or bool(problem.feet_down[0, number])
+        heel, toe = (SOLES.index(f"{side}_{point}") for point in ("heel", "big_toe"))
+        long = float((points[heel] - points[toe]).norm())
         soles[side] = {
-            "down": down,
+            "down": problem.feet_down is None or bool(problem.feet_down[0, number]),
             "height_mm": 1000 * float(heights[foot].min()),
-            "tilt_degrees": math.degrees(math.atan2(rise, float((heel - toe).norm()))),
+            "tilt_degrees": math.degrees(math.atan2(float(raised[heel] - raised[toe]), long)),
         }
     return soles
-
-
-def _vertices_of(candidate: Candidate, names: Sequence[str]) -> list[int]:
-    from ..body.landmarks import skin_points
-
-    skin = skin_points(candidate.problem.body.body)
-    return [skin[name] for name in names]
 
 
 def unseen_limbs(candidate: Candidate) -> list[str]:

@@ -5,12 +5,17 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-import ipman_rs.torch as ipt
+import torch
+from torch import Tensor
 
-from ..body.landmarks import SIDES
+import ipman_rs.torch as ipt
+from ipman_rs.body import BodyModel
+
+from ..body.landmarks import SIDES, skin_points
 from .landmarks import Landmarks
 
 SOLE = ("heel", "big_toe", "small_toe")
+SOLES = tuple(f"{side}_{point}" for side in SIDES for point in SOLE)
 _JOINTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
 NAMES = ("mid_hip", "neck", "head", *(f"{side}_{point}" for side in SIDES for point in (*SOLE, "index", *_JOINTS)))
 # What else than feet can rest on the floor, and how high its point is then, m: half as thick as that part of a body.
@@ -26,3 +31,10 @@ TOES = ("left_big_toe", "right_big_toe")  # of `OTHERS`: only beside another one
 def support_points(body: ipt.BodyModel) -> Landmarks:
     """The points `NAMES`. Raises ValueError for a body without feet."""
     return Landmarks(body, NAMES)
+
+
+def flat_heights(body: BodyModel) -> Tensor:
+    """How high (6,) the points `SOLES` are above the ground when the soles are flat, as in the zero pose."""
+    skin, vertices = skin_points(body), body.v_template
+    heights = vertices[[skin[name] for name in SOLES], 1] - vertices[:, 1].min()
+    return torch.as_tensor(heights, dtype=torch.float64)

@@ -18,10 +18,9 @@ from torch import Tensor
 
 from ipman_rs.checks import positive
 
-from ...body.landmarks import SIDES, skin_points
 from ..candidate import Candidate
 from ..problem import Problem
-from ..support_points import NAMES, OTHERS, SOLE, support_points
+from ..support_points import NAMES, OTHERS, SOLE, SOLES, flat_heights, support_points
 from .term import LeastSquares
 
 
@@ -33,14 +32,10 @@ class FlatSoles(LeastSquares):
         if problem.ground is None:
             raise ValueError("ground: expected one for flat soles; give it, or let a stage find it (find_ground)")
         self.rho = positive("rho", rho)
-        body = problem.body.body
         self.landmarks = support_points(problem.body)
-        soles = [f"{side}_{point}" for side in SIDES for point in SOLE]
-        self.places = [NAMES.index(name) for name in (*soles, *OTHERS)]
-        vertices, skin = body.v_template, skin_points(body)
-        rest = vertices[[skin[name] for name in soles], 1] - vertices[:, 1].min()
+        self.places = [NAMES.index(name) for name in (*SOLES, *OTHERS)]
         others = torch.tensor(list(OTHERS.values()), dtype=torch.float64)
-        self.flat = torch.cat([torch.as_tensor(rest, dtype=torch.float64), others])
+        self.flat = torch.cat([flat_heights(problem.body.body), others])
         feet, more = problem.feet_down, problem.others_down
         feet = torch.ones(problem.num_bodies, 2, dtype=torch.bool) if feet is None else feet
         more = torch.zeros(problem.num_bodies, len(OTHERS), dtype=torch.bool) if more is None else more
