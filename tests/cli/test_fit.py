@@ -451,3 +451,29 @@ def test_markers(fit, shared):
     assert record["mean_marker_error_m"] < 0.02
     stored = arrays(said.folder / "subject01_static" / "subject01_static.npz")
     assert len(stored["transl"]) == len(stored["body_pose"])
+
+
+@pytest.mark.slow
+def test_all_people_of_an_image(fit, tmp_path, standing):
+    """A row each, with one pitch of the camera for all; without --people all the most visible one alone."""
+    from ipman_rs.data.keypoints import coco, mediapipe
+
+    places = dict(zip(mediapipe.NAMES, standing[:, :2] * files.SIZE, strict=True))
+    points = np.array([places[name] for name in coco.NAMES])
+    people = [
+        {"keypoints": (points * [1, 1] + [shift, 0]).tolist(), "keypoint_scores": [0.9 - 0.1 * number] * 17}
+        for number, shift in enumerate((-100.0, 100.0))
+    ]
+    path = tmp_path / "two.json"
+    path.write_text(json.dumps([{"frame_id": 0, "instances": people}]))
+    said = fit(path, "--image-size", "480x640", "--people", "all", preset="fast")
+    assert said.code == 0, said.err
+    assert [body["name"] for body in said.report["bodies"]] == ["two_0", "two_1"]
+    one, other = (
+        json.loads((said.folder / name / "fit.json").read_text())["confidence"] for name in ("two_0", "two_1")
+    )
+    assert one["camera_pitch"] == other["camera_pitch"]
+    assert [body["name"] for body in fit(path, "--image-size", "480x640").report["bodies"]] == ["two"]
+    refused = fit(path, "--image-size", "480x640", "--people", "all", "--person", "0")
+    assert refused.code == 2
+    assert "goes neither with --person" in refused.err

@@ -111,9 +111,8 @@ def test_a_known_camera_leaves_the_supports(standing):
 
 
 def test_what_a_hypothesis_costs():
-    rows = Rows(
-        np.array([0, 0, 0, 1]), np.array(["feet", "seat", "nothing", "feet"]), np.array([20.0, 10.0, 10.0, 5.0])
-    )
+    people, supports = np.array([0, 0, 0, 1]), np.array(["feet", "seat", "nothing", "feet"])
+    rows = Rows(people, supports, np.array([20.0, 10.0, 10.0, 5.0]), people)
     terms = {"reprojection": np.array([1.0, 2.0, np.inf, 7.0]), "balance": np.array([4.0, 0.5, 0.0, np.nan])}
     first, second = hypotheses.weigh(terms, rows, WEIGHING)
     assert [(row, each.support, each.cost) for row, each in first] == [
@@ -126,7 +125,7 @@ def test_what_a_hypothesis_costs():
 
 
 def test_ties_keep_their_order():
-    rows = Rows(np.zeros(3, int), np.array(["feet"] * 3), np.full(3, 10.0))
+    rows = Rows(np.zeros(3, int), np.array(["feet"] * 3), np.full(3, 10.0), np.zeros(3, int))
     (own,) = hypotheses.weigh({"a": np.ones(3)}, rows, WEIGHING)
     assert [row for row, _ in own] == [0, 1, 2]
 
@@ -218,3 +217,33 @@ def test_the_record_says_what_was_weighed():
     assert record["confidence"]["level"] == "green"
     assert record["confidence"]["reasons"] == []
     assert set(record["confidence"]["soles"]) == {"left", "right"}
+
+
+def test_people_of_one_photo_share_a_pitch():
+    """One of them alone would take 0°, and both together take 20°; whoever is in another photo takes their own."""
+    people, pitches = np.repeat([0, 1, 2], 2), np.array([0.0, 20.0] * 3)
+    rows = Rows(people, np.array(["feet"] * 6), pitches, np.array([0, 0, 0, 0, 1, 1]))
+    level = replace(WEIGHING, mean=10.0)  # both pitches cost the same
+    terms = {"all": np.array([1.0, 3.0, 9.0, 2.0, 1.0, 3.0])}
+    chosen = [own[0][1] for own in hypotheses.weigh(terms, rows, level)]
+    assert [each.pitch for each in chosen] == [20, 20, 0]
+    price = float(level.pitch_cost(np.array(20.0)))
+    assert [each.cost for each in chosen] == [5 + price, 5 + price, 1 + price]
+    alone = replace(rows, image=np.arange(3).repeat(2))
+    assert [own[0][1].pitch for own in hypotheses.weigh(terms, alone, level)] == [0, 20, 0]
+
+
+@pytest.mark.slow
+def test_two_people_before_one_camera():
+    """Seen from 25°, one of whom is hard to tell: both take the same pitch, whichever comes first."""
+    seen = [photo_of(pose_of(name), 25.0, seed) for seed, name in ((60, "standing"), (61, "lunge"), (62, "squat"))]
+    for order in ([0, 1, 2], [2, 0, 1]):
+        one = joined(*(seen[k] for k in order))
+        problem = problem_from_detections(ipt.BodyModel("anny-lite"), one, focal=FOCAL)
+        preset = config.load("fast")
+        problem, variables = start.initial_state(
+            replace(problem, image=torch.zeros(3, dtype=torch.int64)), preset.start
+        )
+        found = fit_results(fit(problem, variables, preset), preset, variables)
+        assert len({result.confidence.measures["camera_pitch"] for result in found}) == 1
+        assert abs(found[0].confidence.measures["camera_pitch"] - 25) <= 10

@@ -142,3 +142,21 @@ def test_nobody_in_any_part():
     whole = np.arange(300 * 400, dtype=np.int64).reshape(300, 400, 1)
     with pytest.raises(ValueError, match=r"a.png: expected a person, found none; crop the image around one person"):
         photo._landmarks(OneOfParts(whole, (0, 0, 400, 301)), "a.png", whole)
+
+
+class TwoPeople(OneOfParts):
+    """The same with two people, of whom the nearer to the middle of what is shown is found."""
+
+    def process(self, part: np.ndarray):
+        left, right = (OneOfParts(self.whole, box).process(part) for box in ((40, 60, 30, 110), (300, 80, 30, 100)))
+        y, x = np.argwhere(self.whole[..., 0] == part[0, 0, 0])[0]
+        near_left = abs(x + part.shape[1] / 2 - 55) < abs(x + part.shape[1] / 2 - 315)
+        first, second = (left, right) if near_left else (right, left)
+        return first if first.pose_landmarks is not None else second
+
+
+def test_everyone_in_an_image():
+    whole = np.arange(300 * 400, dtype=np.int64).reshape(300, 400, 1)
+    people = photo._look_for_everyone(TwoPeople(whole, (0, 0, 0, 0)), whole)
+    boxes = [(*(one[0][:, :2].min(axis=0) * (400, 300)), *(one[0][:, :2].max(axis=0) * (400, 300))) for one in people]
+    np.testing.assert_allclose(boxes, [(40, 60, 70, 170), (300, 80, 330, 180)], atol=1e-9)

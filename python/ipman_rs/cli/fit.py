@@ -70,6 +70,10 @@ if TYPE_CHECKING:
     help="Which person of an image, from 0, or which track of a file that follows people. Default: the most visible.",
 )  # fmt: skip
 @click.option(
+    "--people", type=click.Choice(("one", "all")), default="one", show_default=True,
+    help="Of a photo or a keypoint file: one person of each image, or all, who share its camera.",
+)  # fmt: skip
+@click.option(
     "--up", type=UP, metavar="AXIS",
     help="What points up in a marker file: x, y, z, -x, -y, -z, or a normal; the bodies are y up. Default: y for .trc, "
     "what it says for .c3d.",
@@ -152,6 +156,7 @@ def fit(
     \b
     ipman fit photo.jpg -o out
     ipman fit keypoints/ -o out --image-size 1920x1080 --resume
+    ipman fit group.jpg -o out --people all         everybody in the photo, with one camera
     ipman fit person.json --image photo.png -o out --focal 1100 --camera-pitch 8
     ipman fit yoga.json -o out --preset balanced --pose tree --height 1.7
     ipman fit yoga.json -o out --preset ipman-o --pose shown.npz --height 1.7 --mass 62
@@ -211,8 +216,9 @@ def _fit(
     from . import console
 
     options["preset"], options["model"] = options["preset"] or "fast", options["model"] or "anny-lite"
-    reading = InputOptions(options.pop("person"), options.pop("image_size"), photo, sequence, options["force"])
+    person, size, everyone = options.pop("person"), options.pop("image_size"), options.pop("people") == "all"
     try:
+        reading = InputOptions(person, size, photo, sequence, options["force"], everyone)
         chosen = fit_options(**options)
         with writing(output, "outputs"):
             return fit_files(inputs, output, chosen, reading, Pace(*pace), resume, pictures, console.progress)

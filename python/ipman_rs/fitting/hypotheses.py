@@ -71,26 +71,30 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Rows:
-    """Several rows of a problem for each person. person, support: of each row; pitch: degrees."""
+    """Several rows of a problem for each person. person, support: of each row; pitch: degrees; image: that the person
+    is in, with others perhaps."""
 
     person: np.ndarray
     support: np.ndarray
     pitch: np.ndarray
+    image: np.ndarray
 
     def take(self, rows: np.ndarray) -> Rows:
-        return Rows(self.person[rows], self.support[rows], self.pitch[rows])
+        return Rows(self.person[rows], self.support[rows], self.pitch[rows], self.image[rows])
 
 
 def expand(problem: Problem, variables: Variables, hypotheses: Hypotheses) -> tuple[Problem, dict[str, Tensor], Rows]:
     """Each person's rows: of all pitches with each support that rests, and of the likeliest with nothing."""
     pitches = (math.nan,) if problem.pitch_known else hypotheses.pitches
     likeliest = min(pitches, key=lambda pitch: abs(pitch - hypotheses.mean))
-    each = [*product(SUPPORTS[:3], pitches), (SUPPORTS[3], likeliest)]
+    # People of one photo must agree on a pitch, which one who moves has no word in.
+    each = [*product(SUPPORTS[:3], pitches), *product(SUPPORTS[3:], (likeliest,) if problem.image is None else pitches)]
     people = problem.num_bodies
     rows = Rows(
         np.repeat(np.arange(people), len(each)),
         np.array([support for support, _ in each] * people),
         np.array([pitch for _, pitch in each] * people),
+        np.repeat(np.arange(people) if problem.image is None else problem.image.numpy(), len(each)),
     )
     index = torch.from_numpy(rows.person)
     problem, variables = problem.rows(index), {name: value[index] for name, value in variables.items()}
@@ -150,17 +154,32 @@ def distinct(problem: Problem) -> np.ndarray:
 
 
 def weigh(terms: Mapping[str, np.ndarray], rows: Rows, hypotheses: Hypotheses) -> list[list[tuple[int, Hypothesis]]]:
-    """Each person's rows and what they cost, the cheapest first; a cost that is not finite comes last."""
+    """Each person's rows and what they cost, the cheapest first; a cost that is not finite comes last. To a row's cost
+    belongs what its pitch costs the other people in the photo, so that all of them take the same."""
     cost = sum(terms.values(), np.zeros(len(rows.person)))
-    cost = cost + np.nan_to_num(hypotheses.pitch_cost(rows.pitch), nan=0.0)
     cost = cost + np.array([hypotheses.prices[support] for support in rows.support])
     cost = np.where(np.isfinite(cost), cost, np.inf)
+    cost = cost + _cost_of_others(cost, rows) + np.nan_to_num(hypotheses.pitch_cost(rows.pitch), nan=0.0)
     order = np.lexsort((np.arange(len(cost)), cost, rows.person))
     weighed: list[list[tuple[int, Hypothesis]]] = [[] for _ in range(rows.person[-1] + 1)]
     for row in order:
         own = Hypothesis(str(rows.support[row]), float(rows.pitch[row]), float(cost[row]))
         weighed[rows.person[row]].append((int(row), own))
     return weighed
+
+
+def _cost_of_others(cost: np.ndarray, rows: Rows) -> np.ndarray:
+    """For each row, the least that the other people of its image cost at its pitch, summed; infinite where one of them
+    has no row of it."""
+    others = np.zeros(len(cost))
+    if len(np.unique(rows.image)) == len(np.unique(rows.person)):
+        return others
+    for row in range(len(cost)):
+        same = (rows.image == rows.image[row]) & (rows.person != rows.person[row])
+        for person in np.unique(rows.person[same]):
+            theirs = (rows.person == person) & (np.nan_to_num(rows.pitch) == np.nan_to_num(rows.pitch[row]))
+            others[row] += cost[theirs].min(initial=np.inf)
+    return others
 
 
 def best(weighed: Sequence[Sequence[tuple[int, Hypothesis]]], keep: int) -> np.ndarray:

@@ -46,6 +46,7 @@ class Problem:
     mass: Tensor | None = None  # (B,) kg
     presented: Presented | None = None
     static: Tensor | None = None  # (B,) bool: something holds it up, and it rests; None: not asked for
+    image: Tensor | None = None  # (B,) int, which of the images: people of one share its pitch; None: one person each
     pitch_known: bool = True  # whether the camera's rotation tells where down is
     others_down: Tensor | None = None  # (B, 13) bool, of `support_points.OTHERS`, as `feet_down`; None: none of them
     on_floor: Tensor | None = None  # (B,) bool: more than feet may rest on the floor; None: of nobody

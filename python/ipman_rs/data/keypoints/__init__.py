@@ -46,20 +46,22 @@ def read(
     format: str | None = None,
     person: int | None = None,
     image_size: tuple[float, float] | None = None,
+    everyone: bool = False,
 ) -> Detections:
     """The keypoints of one file: a row an image, one person each.
 
     `person`: its number in each image, or its track where the file follows people over images; else the largest and
-    most confident, with a note. `image_size`: width and height in pixels, where the file does not say. Notes tell of
-    everything that was left out, assumed or scaled. ValueError, naming the file and the place in it, for a missing or
-    corrupt file, an unknown format, wrong counts, what is no finite number, nobody found, and nothing seen of a person.
+    most confident, with a note. `everyone`: a row for each person of each image instead. `image_size`: width and height
+    in pixels, where the file does not say. Notes tell of everything that was left out, assumed or scaled. ValueError,
+    naming the file and the place in it, for a missing or corrupt file, an unknown format, wrong counts, what is no
+    finite number, nobody found, and nothing seen of a person.
     """
     source = str(path)
     given = None if image_size is None else width_height(image_size, source)
     reader, content = _opened(Path(path), format)
     images = reader.images(content, source)
     notes = confidences(images)
-    rows, warnings = _rows(images, person, source)
+    rows, warnings = _everyone(images) if everyone else _rows(images, person, source)
     sizes, other = _sizes([image for image, _ in rows], given, source)
     points, scaled = reader.pixels([one.points for _, one in rows], sizes, source)
     worlds = [one.world for _, one in rows if one.world is not None]
@@ -128,6 +130,16 @@ def _rows(images: Sequence[Image], person: int | None, source: str) -> tuple[lis
         first = faults[0].removeprefix(f"{source}: ")
         notes.append(f"{source}: {len(faults)} of {len(images)} images left out; first of all: {first}")
     return rows, notes
+
+
+def _everyone(images: Sequence[Image]) -> tuple[list[Row], list[str]]:
+    """All people of each image of whom something was seen, and notes on those who cannot be used. ValueError where no
+    image has one."""
+    rows = [(image, one) for image in images for one in image.usable.values() if (one.points[:, 2] > 0).any()]
+    if not rows:
+        choose(images[0], None)  # says why
+    faults = [one for image in images for one in image.people if isinstance(one, str)]
+    return rows, [f"cannot be used: {fault}" for fault in faults]
 
 
 def _tracks(images: Sequence[Image]) -> dict[int | str, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,8 +51,11 @@ class InputOptions:
     photo: Path | None = None
     sequence: bool = False  # the images of a file are frames of one person
     force: bool = False  # keypoints that cannot be a person's are fitted, too
+    everyone: bool = False  # of an image, not one person alone; they share its camera's pitch
 
     def __post_init__(self) -> None:
+        if self.everyone and (self.person is not None or self.sequence):
+            raise ValueError("`people='all'` goes neither with `person`, which names one, nor with `sequence`")
         spellings.read_fields(self, image_size=spellings.image_size)
 
 
@@ -118,15 +121,15 @@ def read_items(path: Path, options: InputOptions) -> list[Item]:
 
     try:
         size, odd = _size(options)
-        detections = keypoints.read(path, person=options.person, image_size=size)
+        detections = keypoints.read(path, person=options.person, image_size=size, everyone=options.everyone)
     except ValueError as error:
         raise FileError(path, _advice(str(error))) from error
     if detections.image_size is None:
         raise FileError(path, "does not say how large its image is; give `image_size=WIDTHxHEIGHT` or `photo=PHOTO`")
     people, notes = _admitted(path, [_row(detections, row) for row in range(len(detections))], options.force)
-    many = len(detections) > 1
-    if many and not options.sequence:
-        notes.append(f"{path}: {len(detections)} images, each fitted on its own; `sequence` fits one person over time")
+    many, images = len(detections) > 1, len(set(detections.sources))
+    if images > 1 and not options.sequence:
+        notes.append(f"{path}: {images} images, each fitted on its own; `sequence` fits one person over time")
     items = [
         Item(
             f"{path.stem}_{number}" if many else path.stem,
@@ -184,6 +187,24 @@ def detect(item: Item) -> None:
     item.focal = focal_length(item.path)
     if item.focal is not None:
         item.notes.append(f"focal length: {item.focal:.0f} px, as the camera wrote it into the photo")
+
+
+def detect_everyone(item: Item) -> list[Item]:
+    """An item for each person in an item's photo. Raises FileError."""
+    from .. import photo
+
+    try:
+        people = photo.detect_everyone(item.path)
+        focal = focal_length(item.path)
+    except (ValueError, ImportError) as error:
+        raise FileError(item.path, str(error)) from error
+    rows = [_row(people, row) for row in range(len(people))]
+    found = f"{item.path}: {len(rows)} people found; MediaPipe finds one at a time, and some may be missing"
+    item.notes.append(found)
+    return [
+        replace(item, name=f"{item.name}_{n}", detections=one, focal=focal, notes=[*item.notes], flags=[])
+        for n, one in enumerate(rows)
+    ]
 
 
 def _size(options: InputOptions) -> tuple[tuple[float, float] | None, list[str]]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
+
+import torch
 
 import ipman_rs as ip
 import ipman_rs.torch as ipt
@@ -89,14 +91,19 @@ class FitOptions:
         detections: Detections,
         presented_body: PresentedBody | None = None,
         focal: Sequence[float | None] | None = None,
+        together: bool = False,
     ) -> Problem:
         """The fitting problem of detected people, who imitate a presented pose if there is one. focal: pixels, of each
-        photo, where it is known and the options do not say another."""
+        photo, where it is known and the options do not say another. together: people of the same source share a camera.
+        """
         known = {"focal": focal if self.focal is None else self.focal, "pitch": self.pitch, "ground": self.ground}
         known |= {} if self.camera is None else {"camera": self.camera}
         problem = detection_problem.problem_from_detections(
             model, detections, **known, height=self.height, mass=self.mass
         )
+        if together:
+            sources = list(dict.fromkeys(detections.sources))
+            problem = replace(problem, image=torch.tensor([sources.index(source) for source in detections.sources]))
         if presented_body is None:
             return problem
         return presented.present(problem, [presented_body], self.config.moves_camera)

@@ -16,7 +16,7 @@ from typing import Any
 import ipman_rs.torch as ipt
 
 from ...data.keypoints.detections import join
-from ...files import path_list
+from ...files import path_list, safe_names
 from ...files.errors import FileError
 from ...files.names import Paths
 from ...progress import Progress, silent
@@ -27,7 +27,19 @@ from ..fit import fit
 from ..presented import PresentedBody
 from ..result import FitResult, fit_results
 from . import recordings
-from .items import IMAGES, KEYPOINTS, MARKERS, InputOptions, Item, detect, expand_all, identity, is_markers, read_all
+from .items import (
+    IMAGES,
+    KEYPOINTS,
+    MARKERS,
+    InputOptions,
+    Item,
+    detect,
+    detect_everyone,
+    expand_all,
+    identity,
+    is_markers,
+    read_all,
+)
 from .options import OF_IMAGES, OF_MARKERS, FitOptions, changed, fit_options
 from .outputs import FittedItem, read_item, study_of, write_item
 from .recordings import Pace
@@ -90,7 +102,9 @@ def fit_files(
         except OSError as error:
             failures.append((recording.source, str(error)))
     if items and not reading.sequence:
-        studies += fit_items(items, options, output, resume, pictures, progress)
+        if reading.everyone:
+            items = _everyone(items, progress)
+        studies += fit_items(items, options, output, resume, pictures, progress, reading.everyone)
         failures += [(item.source, item.failure) for item in items if item.failure is not None]
     return Fits(studies, failures, flags)
 
@@ -120,8 +134,11 @@ def fit_items(
     resume: bool = False,
     pictures: int = 8,
     progress: Progress = silent,
+    together: bool = False,
 ) -> list[Study]:
     """Fit items, write the folder of each under `output`, and analyse those that have a body, in their order.
+
+    together: the people of one image share its camera, and are fitted anew if one of them is.
 
     Items without a body say why in `failure`. Raises ValueError for options that fit no item, and OSError.
     """
@@ -134,8 +151,12 @@ def fit_items(
     if resume:
         stored = [read_item(item, body, output / item.name, hashes[item.name]) for item in items]
         finished = {fitted.item.name: fitted for fitted in stored if fitted is not None}
-    for batch in _batches([item for item in items if item.name not in finished], progress):
-        for item, result in _fit_batch(batch, options, model, presented_body, progress):
+    todo = [item for item in items if item.name not in finished]
+    if together:
+        images = {_image_of(item) for item in todo}
+        todo = [item for item in items if _image_of(item) in images]
+    for batch in _batches(todo, progress, together):
+        for item, result in _fit_batch(batch, options, model, presented_body, progress, together):
             record: dict[str, Any] = {**result.record(), "preset": options.config.name, "model": body.name}
             if presented_body is not None:
                 record["presented"] = presented_body.record(body)
@@ -150,13 +171,36 @@ def fit_items(
     return studies
 
 
-def _batches(items: Iterable[Item], progress: Progress) -> Iterator[list[Item]]:
-    """Items whose points have the same names, up to `BATCH` together: what else is in a batch changes no bit of any."""
+def _everyone(items: Sequence[Item], progress: Progress) -> list[Item]:
+    """An item for each person of each photo, under names of their own; items that are no photos stay."""
+    people: list[Item] = []
+    with progress("looking for people", len(items)) as step:
+        for item in items:
+            try:
+                people += [item] if item.detections is not None else detect_everyone(item)
+            except FileError as error:
+                item.failure = error.what
+                people.append(item)
+            step.one()
+    for item, name in zip(people, safe_names([item.name for item in people]), strict=True):
+        item.name = name
+    return people
+
+
+def _image_of(item: Item) -> str:
+    return item.source if item.detections is None else item.detections.sources[0]
+
+
+def _batches(items: Iterable[Item], progress: Progress, together: bool = False) -> Iterator[list[Item]]:
+    """Items whose points have the same names, up to `BATCH` together: what else is in a batch changes no bit of any.
+    together: those of one image are in one batch, which may be longer for them."""
     groups: dict[tuple[str, ...], list[Item]] = {}
     todo = list(items)
     with progress("reading", len(todo)) as step:
         for item in todo:
             try:
+                if item.failure is not None:
+                    continue
                 if item.detections is None:
                     detect(item)
                 assert item.detections is not None
@@ -165,8 +209,13 @@ def _batches(items: Iterable[Item], progress: Progress) -> Iterator[list[Item]]:
                 item.failure = error.what
             step.one()
     for group in groups.values():
-        for first in range(0, len(group), BATCH):
-            yield group[first : first + BATCH]
+        batch: list[Item] = []
+        for item in group:
+            if len(batch) >= BATCH and not (together and _image_of(item) == _image_of(batch[-1])):
+                yield batch
+                batch = []
+            batch.append(item)
+        yield batch
 
 
 def _fit_batch(
@@ -175,13 +224,14 @@ def _fit_batch(
     model: ipt.BodyModel,
     presented_body: PresentedBody | None,
     progress: Progress,
+    together: bool = False,
 ) -> Iterator[tuple[Item, FitResult]]:
     """The items of a batch that have a body, each with its result."""
     usable = [item for item in batch if not _refuse(item, model, options.camera)]
     if not usable:
         return
     detections = join([item.detections for item in usable if item.detections is not None])
-    problem = options.problem(model, detections, presented_body, [item.focal for item in usable])
+    problem = options.problem(model, detections, presented_body, [item.focal for item in usable], together)
     config = options.config
     with progress(f"fitting {len(usable)}", len(usable) * len(config.stages)) as step:
         problem, variables = start.initial_state(problem, config.start)
