@@ -138,6 +138,8 @@ def test_ties_keep_their_order():
         ("pitches: []", "hypotheses, pitches: expected degrees between -90 and 90"),
         ("prices: {feet: 0, seat: 1, floor: 1}", "hypotheses, prices, nothing: expected a number ≥ 0, got None"),
         ("prices: {feet: -1, seat: 1, floor: 1, nothing: 1}", "hypotheses, prices, feet: expected a number ≥ 0"),
+        ("pitch: {mean: null, deviation: 1, weight: 1}", "hypotheses, pitch, mean: expected a number ≥ -90, got None"),
+        ("pitch: [1, 2]", "hypotheses, pitch: expected names with values"),
         ("pitch: {mean: 1, deviation: 0, weight: 1}", "hypotheses, pitch, deviation: expected a number above 0"),
         ("sides: 3", "hypotheses: expected some of before"),
     ],

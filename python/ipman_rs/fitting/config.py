@@ -144,12 +144,12 @@ def _hypotheses(content: Any, stages: list[str]) -> Hypotheses | None:
         ("prices", content.get("prices"), SUPPORTS),
     ):
         _known(f"{place}, {name}", given, known)
-        numbers[name] = {key: float(value) for key, value in given.items()}
         for key in known:
             least = {"mean": -90.0, "deviation": 1e-3}.get(key, 0.0)
             if not _is(given.get(key), "float") or given[key] < least:
                 wanted = f"≥ {least:g}" if least <= 0 else "above 0"
                 raise ValueError(f"{place}, {name}, {key}: expected a number {wanted}, got {_short(given.get(key))}")
+        numbers[name] = {key: float(value) for key, value in given.items()}
     return Hypotheses(before, tuple(map(float, pitches)), prices=numbers["prices"], **numbers["pitch"])
 
 
